@@ -33,7 +33,7 @@ def bus_fault(error: OSError, chip: int) -> DeviceError:
 def find_chip(bus: I2cBus, chip_id: Register, addresses: Sequence[int], title: str) -> int:
     """The first address at which the chip answers whose ``chip_id`` register holds its reset value.
 
-    ``title`` is its name with an article. Raises the error that tells most otherwise: a held bus at once, then a wrong
+    ``title`` is its name with an article. Raises the most informative error otherwise: a held bus at once, then a wrong
     chip or an occupied address, and only then that nobody is there.
     """
     faults: list[DeviceError] = []

@@ -18,7 +18,7 @@ WORTH_TELLING = 0.005
 """Share of lost samples from which on a person is asked to look for the cause."""
 
 DRIFT = 0.005
-"""Share of its rate through which a clock has to drift to be told of: a quartz clock keeps to a hundredth of that."""
+"""Share of its rate through which a clock has to drift to be reported: a quartz clock keeps to a hundredth of that."""
 
 BURSTS_S = 0.2
 """Samples that come so much at a time are kept by something on the way: our own reading makes 0.1 s at most."""

@@ -3,7 +3,7 @@
 Problem. A recording is made in a car whose power goes without warning, is played back at hundreds of times
 real time, and may come from anybody. So the writer must lose no more than what came after its last flush,
 the reader must be quick, must never hold more than a few blocks in memory (also for a compressed file that
-unpacks to terabytes), and must tell a recording that was cut short from one that is damaged.
+unpacks to terabytes), and must distinguish a recording that was cut short from one that is damaged.
 
 Solution. One line per event, ``<t_s> <source> <hex>``, after a first line ``# ridelog-dump 1 {JSON}``. Times
 are read and written as integers, so the six decimals come back exactly. A last line without its newline, or a
@@ -196,8 +196,8 @@ class DumpWriter:
 
     Events are kept back until ``flush`` or until a block is full; a kill loses at most what came after the last flush.
     Each flush of a compressed file ends a gzip member, whose check value covers all that came since the one before:
-    so what is damaged in a file that was cut off can be told from what is not (``intact_bytes``). The price is a
-    fifth more bytes than one stream.
+    so what is damaged in a file that was cut off can be distinguished from what is not (``intact_bytes``). The price is
+    a fifth more bytes than one stream.
 
     Raises ``FileExistsError`` rather than overwrite a recording, and other ``OSError`` of the disk. After one of those
     nothing more can be recorded; ``abandon`` lets go of the file.

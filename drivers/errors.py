@@ -6,7 +6,7 @@
     |  |- Timeout         it was there and has gone silent, or the bus is held low
     |  '- BadReply        something answers, but not what this device would say
     |     |- WrongDevice  another chip or instrument sits at this place
-    |     '- SettingsLost it no longer holds what was written to it: start it anew at once
+    |     '- SettingsLost it no longer holds what was written to it: restart it at once
     |- SettingsError      a setting the device does not have; trying again cannot help
     '- DumpError          a recorded dump that cannot be read: file, line, what was expected
 """

@@ -105,8 +105,8 @@ def open_serial(path: str, baud: int) -> BytePort:
 
 
 class _SerialPort:
-    """A pyserial port that never waits, behind a ``select`` that does: setting pyserial's own timeout anew for each
-    read would configure the port anew each time."""
+    """A pyserial port that never waits, behind a ``select`` that does: setting pyserial's own timeout for each
+    read would configure the port each time."""
 
     def __init__(self, path: str, port: Serial) -> None:
         self._path = path

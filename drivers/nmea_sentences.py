@@ -1,7 +1,7 @@
 """NMEA 0183, sentence by sentence: bytes between ``$`` and line end into numbers.
 
 The problem: sentences arrive damaged or run together, and what receivers put into a field differs by maker and age.
-The solution: pure functions. Nothing without a right checksum gets through, whoever the talker is, and field counts,
+The solution: pure functions. Nothing without a right checksum gets through, whatever its talker, and field counts,
 number formats and ranges must be right as well, since an 8-bit checksum passes one damaged line in 256.
 
 Sources: NMEA 0183 as described by the gpsd project ("NMEA Revealed"), with its limits (130 characters, years below

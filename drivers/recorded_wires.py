@@ -7,7 +7,7 @@ the methods of the real ones and raise the same ``OSError``. Each works in one o
 - loaded: the player calls ``load`` with the bytes of an event, and the driver reads them;
 - playing: the recording runs against a clock that is handed in, and a read gives what is there by now.
 
-A ``Cue`` says what goes wrong and when. After ``close`` the wire may be used again: that is opening it anew.
+A ``Cue`` says what goes wrong and when. After ``close`` the wire may be used again: that opens it again.
 """
 
 from __future__ import annotations

@@ -50,21 +50,21 @@ class SampleClock:
        period of the line, or ``JITTER_US`` where that is more and the arrivals do not show a smaller one, samples were
        lost: the line moves by as many periods and leaves a hole. (A link that is late by 30 ms at random has such a
        second now and then: once in 1,000 samples.) Arrivals that stay more than ``OFF_US`` late, or that come that much
-       too early, make the clock settle anew.
+       too early, make the clock start over.
     5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
        those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
        samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
        neither, nor on a line with the losses that were noticed, the profile's own rate is taken; a device of another
        rate is refused until it has kept one through ``STEADY`` findings in a row.
     6. Too many losses. Where steps come close together, a place between two is as likely as the true one, and the
-       period can no longer be told from the losses. Once there were more than ``STEPS_MAX`` in a ``LOOK_AHEAD_US``, on
-       average over the last ``BLOCKS`` blocks, and until there are half as many, the line is followed, but no sample
-       is dated.
+       period can no longer be distinguished from the losses. Once there were more than ``STEPS_MAX`` in a
+       ``LOOK_AHEAD_US``, on average over the last ``BLOCKS`` blocks, and until there are half as many, the line is
+       followed, but no sample is dated.
 
     Times come out in whole microseconds, strictly increasing (where they must, by 1 us), and do not depend on how
     the arrivals were cut into calls. The smallest latency cannot be known and stays in the times.
 
-    resyncs    times the line was lost and settled anew
+    resyncs    times the line was lost and found again
     lost       samples that were noticed to be missing, each by itself or some in a row
     too_many_lost   more than can be located: samples are not dated now
     rates_hz   least and most that the rate was since it was found [Hz]
@@ -144,7 +144,7 @@ class SampleClock:
         return np.concatenate(times)
 
     def restart(self) -> Times:
-        """Samples may be missing from here on: settle anew. Returns the times of those held so far."""
+        """Samples may be missing from here on: start over. Returns the times of those held so far."""
         self._ended = True
         times = self.feed(np.empty(0, dtype=np.int64))
         self._ended = False
@@ -389,7 +389,7 @@ class SampleClock:
             self._note_rate()
 
     def _note_rate(self) -> None:
-        """Widen what is known of the rate by the one of now, or begin anew with it."""
+        """Widen what is known of the rate by the one of now, or start over with it."""
         rate_hz = 1e6 / self._period_us
         known = (rate_hz,) if self._is_new_rate else (*self.rates_hz, rate_hz)
         self.rates_hz = min(known), max(known)

@@ -1,7 +1,7 @@
 """The period of a sampler from the times at which some of its samples arrived at once.
 
 The problem: samples that are lost at even intervals look like a slower sensor. How many arrived in how much time does
-not tell one from the other.
+not distinguish one from the other.
 
 The solution: what arrives at once does so a multiple of the true period after any other such sample, however many are
 lost between them: the arrivals stand on a comb. Its period is where the periodogram of the instants is largest

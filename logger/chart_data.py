@@ -12,7 +12,8 @@ Array = npt.NDArray[np.float64]
 MOST_POINTS = 4000
 
 CLASS_COLOURS = ("#2f6db5", "#58a9d4", "#f2c744", "#ef8d32", "#d0402b", "#9e1b5e", "#651a70", "#35104a")
-"""Of classes from best to worst: from blue over yellow and red to purple, told apart with any common colour vision."""
+"""Of classes from best to worst: from blue over yellow and red to purple, distinguishable with any common colour
+vision."""
 NO_CLASS_COLOUR = "#9aa4ad"
 SERIES = (0, 4, 1, 5, 3, 6, 2, 7)
 """Numbers of these colours for the lines of a chart: neighbours differ most, yellow comes late on white."""

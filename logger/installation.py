@@ -3,7 +3,7 @@
 Problem. A service needs a user, groups, units, rules and settings in six folders, and somebody will want to see what
 is done before it is done as root, do it again with a newer version, and undo it, without losing what they changed by
 hand. Solution: everything is a list of small steps that are made before any is taken, so that a dry run prints what a
-real one does. A record of the checksums of all files put in place tells what is still ours: only that is replaced or
+real one does. A record of the checksums of all files put in place shows what is still ours: only that is replaced or
 removed. What has been changed by hand stays, and a newer version of it is put beside it as ``NAME.new``. The same steps
 fill a folder that is to become a machine's root. Logs are never touched.
 """

@@ -79,12 +79,14 @@ class LowPass:
     cutoff_hz, order    of Butterworth's filter that is likest
     causal              it delayed the record; else it was run forth and back
     ends_band           the pass band ends where it begins
+    hidden              noise that arose behind it hides what it took away: it is seen by its delay alone
     """
 
     cutoff_hz: float
     order: float
     causal: bool = False
     ends_band: bool = False
+    hidden: bool = False
 
 
 @dataclass(frozen=True, eq=False)

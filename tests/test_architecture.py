@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -76,6 +77,36 @@ def closure(start: list[str]) -> set[str]:
         found |= new
         new = {name for module in new for name in imports(module) if name in TREES} - found
     return found
+
+
+MOST_CONSTANTS = 77
+"""Lines of the lab, without its laws and plans, that give a number a name; 53 of them in ``lab.likelihood``."""
+
+
+def has_number(value: ast.AST) -> bool:
+    """Whether an expression holds a number that is written there."""
+    return any(isinstance(node, ast.Constant) and type(node.value) in (int, float) for node in ast.walk(value))
+
+
+def named_numbers(module: str) -> Iterator[tuple[str, bool]]:
+    """Names that a module gives to numbers, and whether a reason stands with each: a docstring or a comment."""
+    text = next(path for path, name in FILES.items() if name == module).read_text("utf-8").splitlines()
+    body = TREES[module].body
+    for node, after in zip(body, [*body[1:], None], strict=True):
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and has_number(node.value):
+            is_said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            beside = [text[node.lineno - 2], *text[node.lineno - 1 : node.end_lineno]]
+            yield ast.unparse(node), is_said or any("#" in line for line in beside)
+
+
+LAB = [name for name in MODULES if name.startswith("logger.lab.") and name.split(".")[2] not in ("laws", "planning")]
+
+
+def test_the_lab_has_few_constants_and_says_where_each_is_from() -> None:
+    named = [(module, *one) for module in LAB for one in named_numbers(module)]
+    assert len(named) <= MOST_CONSTANTS
+    said_elsewhere = "logger.lab.likelihood."  # in the docstrings of its functions
+    assert not [(module, text) for module, text, is_said in named if not is_said and said_elsewhere not in module]
 
 
 def test_every_folder_has_a_floor() -> None:

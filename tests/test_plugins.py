@@ -63,8 +63,8 @@ def test_what_a_users_own_file_prints_is_no_answer_of_the_command(
             offer()
         offer()
     print("answer")
-    told = capsys.readouterr()
-    assert (told.out, told.err.split()) == ("answer\n", ["loaded", *3 * ["asked"]])
+    reported = capsys.readouterr()
+    assert (reported.out, reported.err.split()) == ("answer\n", ["loaded", *3 * ["asked"]])
 
 
 def test_threads_that_leave_a_users_own_file_in_another_order_leave_stdout_as_it_was(tmp_path: Path) -> None:

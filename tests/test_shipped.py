@@ -11,6 +11,7 @@ import pytest
 from logger.errors import BadInput
 from logger.report.page import SCRIPTS
 from logger.shipped import vehicle_file, vehicle_path
+from logger.studies.field.lab_examination import COUNTS
 
 
 def test_a_name_is_a_vehicle_that_comes_along_whatever_lies_around(
@@ -30,6 +31,12 @@ def test_the_page_s_script_and_style_are_in_the_package() -> None:
                    for path in place.glob(pattern)}
         assert shipped == {path.name for path in (place / "assets").iterdir()}
     assert {*SCRIPTS, "page.css"} == shipped
+
+
+def test_the_counts_of_the_examination_are_in_the_package() -> None:
+    settings = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
+    assert [COUNTS.name] == settings["tool"]["setuptools"]["package-data"]["logger.studies.field"]
+    assert COUNTS.is_file()
 
 
 @pytest.mark.parametrize("word", ["mine.yaml", "./mine", "cars/mine.yaml", "/cars/mine"])

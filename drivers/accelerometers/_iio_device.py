@@ -165,7 +165,7 @@ class IioDevice:
                            f"found {self._of_axis('x', 'scale', 'none')}{may}")
 
     def _channels(self) -> list[list[str]]:
-        """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are told."""
+        """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are named."""
         scans = self.path / "scan_elements"
         names = [switch.name.removesuffix("_en") for switch in sorted(scans.glob("*_en"))]
         if self.why_polled:
@@ -229,7 +229,7 @@ def _set(path: Path, text: str) -> None:
 
 
 def _text(path: Path) -> str:
-    """A setting's text; empty where the device has no such file or does not tell it now."""
+    """A setting's text; empty where the device has no such file or does not give it now."""
     try:
         return path.read_text(errors="replace").strip()
     except (FileNotFoundError, NotADirectoryError):

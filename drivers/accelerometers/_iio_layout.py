@@ -72,7 +72,7 @@ class Element:
 class Layout:
     """A description, understood.
 
-    axes         of x, y, z in a scan; empty where single values are read and the kernel does not tell their type
+    axes         of x, y, z in a scan; empty where single values are read and the kernel does not give their type
     timestamp    of the instant of a scan [ns, monotonic]; None: the scan has none that can be used
     scan_bytes   size of a scan
     scale, offset, matrix    acceleration [m/s2] along the board's axes = matrix @ ((raw + offset) * scale)
@@ -94,7 +94,7 @@ class Layout:
         return np.asarray(along_chip @ np.array(self.matrix).T)
 
     def clipped(self, raw: Integers) -> npt.NDArray[np.bool_]:
-        """(n, 3) -> (n,): an axis is at the end of its range, as far as the kernel tells it."""
+        """(n, 3) -> (n,): an axis is at the end of its range, as far as the kernel gives it."""
         ends = np.array([axis.range for axis in self.axes] or [(-(1 << 62), 1 << 62)] * 3)
         return np.asarray(((raw <= ends[:, 0]) | (raw >= ends[:, 1])).any(axis=1))
 

@@ -3,7 +3,7 @@
 Problem: the chip samples by its own clock, whose rate is no more than nominal, into a buffer of 32 entries that gives
 them without times; a buffer that ran over has lost the oldest; and after a dip of its supply the chip stands by.
 Solution: the buffer (FIFO, in stream mode) is emptied some 20 times a second, ``SampleClock`` recovers the rate and the
-times from when that was, an overrun begins anew, and settings are read back in turn (``ChipSource``).
+times from when that was, an overrun starts them over, and settings are read back in turn (``ChipSource``).
 
 It runs in full resolution at +-16 g: one count is 3.9 mg at every range, and a smaller range would only clip sooner.
 

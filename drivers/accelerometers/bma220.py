@@ -126,7 +126,7 @@ class Bma220(ConfiguredChip):
     NotPresent   nothing acknowledges, or a kernel driver owns the address
     Timeout      the bus is held low
     WrongDevice  another chip is at the address
-    BadReply     the chip does not do what it was told
+    BadReply     the chip does not do what was written to it
     SettingsLost    it did, and no longer does
     """
 
@@ -174,7 +174,7 @@ class Bma220(ConfiguredChip):
         return t_us, self.read_raw()
 
     def stop(self) -> None:
-        """Suspend the chip if it was running. Never raises: a chip that cannot be told is left as it is."""
+        """Suspend the chip if it was running. Never raises: a chip that does not answer stays as it is."""
         chip, self._chip = self._chip, None
         if chip is not None:
             with suppress(OSError, DeviceError):

@@ -3,7 +3,7 @@
 Problem: the kernel knows some hundred chips; each would need a driver here. Solution: its interface is read instead. In
 the best case its buffer gives scans with a time each (``in_timestamp``, on the monotonic clock); without it the times
 are recovered from when the scans came; without a buffer the raw values are read one by one, 100 times a second, each at
-the time of its read. Which of these it is, the recording tells, and ``status`` says where there is no buffer.
+the time of its read. Which of these it is, the recording says, and ``status`` says where there is no buffer.
 
 What the bytes mean is only known once a device is there, and another one may be plugged in later. So the first event,
 and one every ``DESCRIBE_US``, is a description (``_iio_layout``): a JSON object. All others begin with a letter: ``s``,
@@ -328,15 +328,18 @@ class _Iio(Accelerometer[IioConfig]):
 
     def header(self, settings: IioConfig) -> dict[str, Any]:
         """What is not in the events."""
-        return {"scale_mps2": settings.scale_mps2, "noise_mps2": settings.noise_mps2}
+        return {"rate_hz": settings.rate_hz, "scale_mps2": settings.scale_mps2, "noise_mps2": settings.noise_mps2}
 
     def recorded(self, header: Mapping[str, Any], settings: IioConfig, is_given: bool) -> IioConfig:
-        """The step is the recording's, the noise that of the settings where they are given."""
+        """Rate and step are the recording's, the noise that of the settings where they are given."""
+        rate_hz = header.get("rate_hz", settings.rate_hz)
+        if type(rate_hz) is not int or rate_hz < 1:
+            raise SettingsError("expected a whole number above 0 for 'rate_hz'")
         said = {key: header.get(key, getattr(settings, key)) for key in ("scale_mps2", "noise_mps2")}
         for key, value in said.items():
             if not ((type(value) in (int, float) and 0 < value <= 10) or (value is None and key == "scale_mps2")):
                 raise SettingsError(f"expected a number above 0, of at most 10, for {key!r}")
-        return replace(settings, scale_mps2=said["scale_mps2"],
+        return replace(settings, rate_hz=rate_hz, scale_mps2=said["scale_mps2"],
                        noise_mps2=settings.noise_mps2 if is_given else said["noise_mps2"])
 
     def advice(self, state: str) -> str:

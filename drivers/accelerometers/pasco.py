@@ -111,7 +111,7 @@ class PascoCounters:
     frames          good ones
     bad_frames      in their place, but with values or a checksum that cannot be
     dropped_bytes   bytes that belonged to no frame
-    resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
+    resyncs         times the sample clock lost the line and had to find it again: samples went missing unseen
     lost            samples that were noticed to be missing between others
     undated         samples left out because they came at a rate that cannot be used, or too many were lost among them
     """
@@ -267,14 +267,14 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
             raise SettingsError(str(error), "profile") from None
         if not profile.verified and not settings.accept_unverified:
             raise SettingsError(f"expected a verified profile, and {profile.name!r} is not verified on hardware; set "
-                                "accept_unverified: true beside it to use it all the same", "profile")
+                                "accept_unverified: true as well to use it all the same", "profile")
 
     def line(self, settings: PascoConfig) -> tuple[str, int]:
         """Port and baud rate."""
         return settings.port, settings.baud
 
     def decoder(self, settings: PascoConfig, upright_axis: int) -> PascoDecoder:
-        """By the profile; frames without start bytes are told apart by the axis that feels gravity."""
+        """By the profile; frames without start bytes are distinguished by the axis that feels gravity."""
         return PascoDecoder(_mounted(load_profile(settings.profile), upright_axis), settings.calibration)
 
     def readings(self, settings: PascoConfig) -> Readings:

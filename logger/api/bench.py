@@ -1,6 +1,6 @@
 """A model and runs on it, checked together, and what the lab does with them.
 
-Problem: whoever asks the lab, at a terminal or in a notebook, brings a vehicle, runs and maybe effects of their own,
+Problem: a user of the lab, at a terminal or in a notebook, brings a vehicle, runs and maybe effects of their own,
 which may not fit each other; a search takes minutes, and what is wrong has to be said before it. Solution:
 ``bench_of`` checks all of it once, and its methods are the questions that can be asked.
 """
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 _SLOW = "expect ten minutes or more for each minute driven"
-_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
+_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
 
 Tell = Callable[[str], None]
 """Told what is under way."""
@@ -203,12 +203,12 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
              searches: str | None = None, warn: Tell = unsaid, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
-    low-passed, or that say so, what is left is compared.
+    low-passed, or that say so, only the band that remains is compared.
 
     word        by which the user knows the vehicle
     numbers     as ``deviation_of``
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
-    warn        told where it will take long, and what was wrong where the user goes on ``anyway``
+    warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
     low_pass_hz what lies above is not compared; None: all is that the records hold
     """
     effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))

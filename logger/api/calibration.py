@@ -22,7 +22,7 @@ from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.estimation.rms_calibration import Settings, SpeedCalibration
+    from logger.estimation.rms_calibration import CalibrationSettings, SpeedCalibration
     from logger.report.calibration_text import Calibrated
     from logger.vehicle.effect import Chosen
     from logger.vehicle.vehicle import Vehicle
@@ -106,7 +106,7 @@ def calibrate(
     sprung_mass_factor    so many times the body's mass, 0.2 to 10
     seed                  another number, other roads
     recompute             do not look for a stored result
-    progress              told where the result is from
+    progress              called with where the result is from
 
     Raises BadInput for numbers out of range, and as ``read_vehicle``. Source: Blum 2015,
     section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
@@ -144,14 +144,14 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Question,
     vehicle that lacks what its model or an effect needs.
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
-    tell    told where they are from
+    tell    called with where they are from
     """
-    from logger.estimation.rms_calibration import Settings, loaded
+    from logger.estimation.rms_calibration import CalibrationSettings, loaded
     from logger.report.calibration_text import Calibrated, Load
     from logger.service.signal_chain import recorder_gain
 
     try:
-        settings = Settings(window_m=question.window_m, seed=question.seed)
+        settings = CalibrationSettings(window_m=question.window_m, seed=question.seed)
     except ValueError as error:
         raise BadInput(f"{question.said}: {error}") from None
     vehicle = model.vehicle
@@ -170,12 +170,12 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Question,
 
 @dataclass(frozen=True)
 class _Ask:
-    """What is asked of a vehicle, where an answer may lie, and who is told where it was."""
+    """What is asked of a vehicle, where a stored answer may be, and what is called with its source."""
 
     path: Path | None
     effects: Sequence[Chosen]
     gain: Callable[[Array], Array]
-    settings: Settings
+    settings: CalibrationSettings
     recompute: bool
     tell: Tell
 

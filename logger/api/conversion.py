@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from logger.api.outputs import check_out
 from logger.api.shown import Shown
 from logger.errors import BadInput
 from logger.printable import counted
+
+if TYPE_CHECKING:
+    from logger.exchange.layer import Layer
+    from logger.store.log.log_reader import LoggedFile
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -18,9 +23,10 @@ class Conversion(Shown):
 
     path             the file
     format           its ending
-    rows             windows in it
+    rows             windows in it, or ways
     placed           those of them with a place on the ground
     damaged_lines    lines of the logs that were left out
+    of               what a row is
     """
 
     path: Path
@@ -28,9 +34,10 @@ class Conversion(Shown):
     rows: int
     placed: int
     damaged_lines: int
+    of: str = "window"
 
     def __repr__(self) -> str:
-        said = f"{self.path}: {counted(self.rows, 'window')}"
+        said = f"{self.path}: {counted(self.rows, self.of)}"
         if self.placed < self.rows:
             said += f", {self.rows - self.placed} of them without a position"
         if self.damaged_lines:
@@ -38,14 +45,18 @@ class Conversion(Shown):
         return said
 
 
-def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversion:
+def convert(logs: Path | str | Sequence[Path | str], to: Path | str, smoothness: Path | str | None = None
+            ) -> Conversion:
     """Write the intact rows of segment logs for other programs, in the format that the file's ending asks for.
 
     logs    folders at any depth, or files, of segment logs; open ones too
     to      ``.csv``, ``.geojson`` (RFC 7946), ``.gpkg`` (OGC 12-128), ``.gpx`` (1.1), ``.kml`` (2.2) or ``.parquet``
             (GeoParquet 1.1); GeoPackage and Parquet need the ``maps`` extra. Written whole, or not at all.
+    smoothness    GeoJSON with ways of OpenStreetMap: instead of the rows, each way that was driven, with the value of
+                  the key ``smoothness`` that its IRI suggests, for a person to review
 
-    Raises BadInput for another ending, a missing extra, no log or none with an intact row.
+    Raises BadInput for another ending, a missing extra, no log or none with an intact row, a file without ways, and
+    where none of them was driven.
 
     >>> convert(folder / "logs", folder / "drive.geojson").rows > 0
     True
@@ -58,10 +69,21 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
     form = format_of(path)
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
     found = find_logs_in(places)
-    check_out(path, (), [log for log, _ in found], "--to")
+    check_out(path, (), [*([] if smoothness is None else [Path(smoothness)]), *(log for log, _ in found)], "--to")
     files = read_found(found)
-    layer = windows_layer(files)
-    if not layer.features:
+    if not any(one.records for one in files):
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
+    layer = windows_layer(files) if smoothness is None else _ways(files, smoothness)
     write_layer(layer, path)
-    return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files))
+    return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files),
+                      "window" if smoothness is None else "way")
+
+
+def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
+    from logger.report.smoothness_layer import smoothness_layer
+    from logger.store.formats.road_lines import read_map_ways
+
+    layer = smoothness_layer([one for file in files for one in file.records], read_map_ways(roads))
+    if not layer.features:
+        raise BadInput(f"{roads}: expected ways that these logs passed with an IRI, found none")
+    return layer

@@ -2,7 +2,7 @@
 
 Problem: such a recording has its own names, units and axes, an uneven clock, and was made by a phone that lay anyhow.
 Solution: columns are recognised or named (``store.formats.logger_columns``), the time is repaired
-(``extraction.even_samples``), gravity tells up and the unit (``extraction.levelling``); what is left is cut, laid on
+(``extraction.even_samples``), gravity shows up and the unit (``extraction.levelling``); what is left is cut, laid on
 a profile and written as a dump is (``api.extracted_runs``). What cannot be known is refused, with the option that says
 it.
 """
@@ -37,7 +37,7 @@ Array = npt.NDArray[np.float64]
 
 _FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
 _CUT_S = 1.0  # to either side of a turn in the mount
-_LATEST_S = 1e5  # of later times the ten digits of a drive do not tell samples apart
+_LATEST_S = 1e5  # of later times the ten digits of a drive do not distinguish samples
 _DISORDER_S = 0.5
 
 
@@ -233,11 +233,11 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
             notes.append(f"unit by the size of gravity: {word}")
         if asked.up is not None:
             raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {found.size:.4g} "
-                           f"{word}, which tells up: leave out --up")
+                           f"{word}, which shows which way is up: leave out --up")
         return samples * found.unit_mps2, True
     if unit is None:
-        raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to tell the unit, found a mean of "
-                       f"{found.size:.3g}: name the unit in --columns, {named}, one of "
+        raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to recognise the unit, found a "
+                       f"mean of {found.size:.3g}: name the unit in --columns, {named}, one of "
                        f"{', '.join(units_of(roles[0]))}")
     samples = samples * ACCELERATION_UNITS[unit]
     size_mps2 = found.size * ACCELERATION_UNITS[unit]
@@ -308,7 +308,7 @@ def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[st
     heard = np.flatnonzero(present)
     turned = turns(time_s[heard], even.samples[heard]) if even.samples.shape[1] == 3 else []
     for at_s, words in turned:
-        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled anew")
+        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled again")
         present &= np.abs(time_s - at_s) > _CUT_S
     ends_s = [-np.inf, *(at_s for at_s, _ in turned), np.inf]
     tilts = []

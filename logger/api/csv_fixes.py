@@ -84,7 +84,7 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
 
 
 def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> Belief:
-    """How late fixes are: by the settings, else what is usual and what braking tells."""
+    """How late fixes are: by the settings, else what is usual and what braking shows."""
     from logger.estimation.drive_alignment import DriveAlignment
     from logger.estimation.receiver_delay import combined
     from logger.service.receiver_learning import at_start

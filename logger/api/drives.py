@@ -1,4 +1,4 @@
-"""Drives: recorded ones as runs, simulated ones, and the roughness of the road that a drive tells."""
+"""Drives: recorded ones as runs, simulated ones, and the roughness of the road as a drive shows it."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def _profile_of(track: Track) -> Profile:
     return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
 
 
-# --- the road that a drive tells ---
+# --- the road as a drive shows it ---
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -271,7 +271,7 @@ class Estimate(CommandResult):
     iri_exact_m_per_km   (w,) that of the run's profile; NaN where there is none
     limit_std_m_per_km   (w,) standard error that an estimator would reach which knew everything but the road
     flags                w sets of words
-    profile              the road, as far as the readings tell it, in its parts; it is smoother than the road
+    profile              the road, as far as the readings resolve it, in its parts; it is smoother than the road
     doubts               what may be wrong with the drive's record, a line each
     """
 
@@ -307,7 +307,7 @@ def estimate(
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
 
-    run           as ``read_run``; its distance may go back by up to 1 m, and is then laid anew
+    run           as ``read_run``; its distance may go back by up to 1 m, and is then computed again from the speed
     vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
                   its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
@@ -363,7 +363,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
              warn: Tell = unsaid, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
-    ``anyway`` (then ``warn`` is told)."""
+    ``anyway`` (then ``warn`` is called)."""
     from logger.estimation.assessment import Unusable, assess, estimable
 
     if run.excitation is not None:
@@ -385,7 +385,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
 def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Tell,
                 anyway: bool) -> None:
     """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
-    left out: whether it is the road can be told without them, and some take long."""
+    left out: whether it is the road can be decided without them, and some take long."""
     from logger.api.model_checks import check_roads
     from logger.runs import SKIP_S
     from logger.runs import Run as Record

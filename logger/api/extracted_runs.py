@@ -23,7 +23,7 @@ from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief
-    from logger.extraction.along_track import Motion, Observations
+    from logger.extraction.along_track import Observations, TrackMotion
     from logger.extraction.measured_line import MeasuredLine, Pass
     from logger.extraction.registration import Predict, Registered
     from logger.service.drive_readings import GridReadings
@@ -34,7 +34,7 @@ Tell = Callable[[str], None]
 
 RATE_HZ = 100.0
 LEAST_S, LEAST_M = 5.0, 30.0
-"""A shorter run tells the lab nothing: it leaves out the first two seconds."""
+"""A shorter run is of no use to the lab: it leaves out the first two seconds."""
 _AROUND_M = 150.0  # of the profile, kept before and after what was driven: a model comes to the first sample over it
 
 
@@ -283,7 +283,7 @@ def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
     return predict
 
 
-def _drive(readings: tuple[Array, Array, Array], fixes: Fixes, motion: Motion, ahead_m: float = 0.0,
+def _drive(readings: tuple[Array, Array, Array], fixes: Fixes, motion: TrackMotion, ahead_m: float = 0.0,
            registered: Registered | None = None) -> _Drive:
     """Readings as ``_readings`` gives them, with their motion; the front tires are so far ahead of it [m]."""
     time_s, accel, usable = readings

@@ -132,8 +132,8 @@ def identify(
     road          "measured" (``anyway``: go on where a run does not seem to be of its road); "unmeasured": each run has
                   a road of its own, of ``waviness``; or "same": all are over one
 
-    Raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not tell. Source:
-    L. Ljung, System Identification (1999), chapters 7 and 9.
+    Raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not determine.
+    Source: L. Ljung, System Identification (1999), chapters 7 and 9.
 
     >>> true = car.with_numbers({"sprung_mass_kg": 900.0})
     >>> drive = simulate(true, random_road(iso_class="C", length_m=150.0), 12.0, noise_mps2=0.03)
@@ -208,7 +208,7 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
 
     word    by which the user knows the vehicle
-    warn    told where it will take long
+    warn    called where it will take long
     """
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, error_before

@@ -29,13 +29,13 @@ Runs = Run | Path | str | Sequence[Run | Path | str]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(CommandResult):
-    """A model beside its measurements. Errors are rms(measured - model) / rms(measured), the first 2 s of each run left
-    out.
+    """A model compared with its measurements. Errors are rms(measured - model) / rms(measured), the first 2 s of each
+    run left out.
 
     error            as the model stands
     refitted_error   with its numbers and the distances refitted within their tolerance
     run_errors       by name of the run, as the model stands
-    missing          whether what is left depends on the road and the car's motion
+    missing          whether the residual depends on the road and the car's motion
     evidence         sentences
     moves            by which share each number moved for the refit; ``moved_far``: farther than their tolerance
     """
@@ -50,7 +50,7 @@ class Comparison(CommandResult):
     spectra: tuple[Chart, ...]
 
     def charts(self) -> Sequence[Chart]:
-        """What was measured, what the model says and what is left after the refit, by frequency."""
+        """Spectra of measurement, model and residual after the refit."""
         return self.spectra
 
 
@@ -143,7 +143,7 @@ def diagnose(
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     candidates      names of the effects to be tried; None: all
     effect_files    Python files, each with an effect of your own to be tried as well
-    progress        told what is under way, such as ``print``
+    progress        called with what is under way, such as ``print``
 
     Raises BadInput as ``compare``, for effects that there are not, and where the compiler is missing.
 
@@ -240,7 +240,7 @@ def add_effect(
     name         of an effect that comes with ridelog, or the path of a Python file with one of your own
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     start        where the fit of its parameters begins, by name; the rest is searched for
-    progress     told what is under way, such as ``print``
+    progress     called with what is under way, such as ``print``
 
     Raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot be there.
 

@@ -46,7 +46,7 @@ Learns = Callable[[], bool]
 """Whether a law is to be learned where no effect explains what is missing."""
 Progress = Callable[[], AbstractContextManager[Tell]]
 Explain = Callable[[str, str, str], str]
-"""What to tell under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
+"""What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
 added, and the vehicle file that is read, or written where an effect is added; of learn the law's file."""
 
 
@@ -63,7 +63,7 @@ class LabStory(CommandResult):
     error_before         of the model as it was given; ``error_after`` of the last one, refitted
     noise_floor_error    that the sensor's noise alone makes
     steps                models on the way, each with its error on all samples
-    page                 the file that tells all of it
+    page                 the file with all of it
     """
 
     model: Model
@@ -145,7 +145,7 @@ def _asking(ask: Callable[[str], str | None]) -> Ask:
 
 
 def unsaid_lines(_lines: Iterable[str]) -> None:
-    """Lines that nobody is told."""
+    """Drop the lines: a loop that prints nothing."""
 
 
 def make_ready(given: Bench, out: Path, option: str = "") -> None:
@@ -160,7 +160,7 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
 
 
 def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
-    """Nothing to tell beside what is found."""
+    """No explanation in addition to what is found."""
     return ""
 
 
@@ -174,9 +174,9 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, expla
     """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
 
     learns      asked once, where no effect explains what is missing
-    tell        told what was found
-    progress    around whatever takes its time, told what is under way
-    explain     what to tell of each step beside what it finds
+    tell        called with what was found
+    progress    context around what takes long, called with what is under way
+    explain     what to say of each step in addition to what it finds
     """
     from logger.report.session_text import ending
     from logger.report.story_page import page
@@ -228,7 +228,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
             step, made_now = step.added(wanted, one if same else None, len(rounds) + 1)
             rounds.append(made_now)
             word = made_now.file
-            if not same:  # what is missing beside another effect is to be found anew
+            if not same:  # with another effect, what is missing is searched again
                 going = True
                 break
     return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused), law), step.given.model
@@ -236,7 +236,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """Where the loop stands: the bench, and how what is done is told."""
+    """Where the loop stands: the bench, and how what is done is reported."""
 
     given: Bench
     out: Path
@@ -311,7 +311,7 @@ def _compared(given: Bench, progress: Progress) -> compare.Comparison:
 
 
 def chapter(title: str, explained: str = "") -> list[str]:
-    """The lines of a heading, with what is told under it."""
+    """The lines of a heading, with what stands under it."""
     return ["", f"=== {title} ===", *([explained] if explained else []), ""]
 
 

@@ -39,7 +39,7 @@ class LearnedLaw(CommandResult):
     parameters           with ``standard_errors``, by name
     error_before         of the model as it was; ``error_after`` with the law, ``error_after_unseen`` on what no fit saw
     noise_floor_error    that the sensor's noise alone makes
-    verdict              known effects that are missing, beside the law or instead of one
+    verdict              known effects that are missing, together with the law or instead of one
     """
 
     family: str | None
@@ -83,7 +83,7 @@ def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Pat
 
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     effect_files    Python files, each with an effect of your own that is known as well
-    progress        told what is under way, such as ``print``
+    progress        called with what is under way, such as ``print``
 
     Raises BadInput as ``diagnose``.
 

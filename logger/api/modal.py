@@ -34,7 +34,8 @@ class Modes(CommandResult):
     channels              names of those
     frequency_hz          (m,) natural frequencies without regard to damping, ``frequency_std_hz`` (m,) their standard
                           deviations [Hz]
-    damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be told
+    damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be
+                          measured
     shapes                (m, c) motion of the channels, the largest 1; complex where they are not in step
     rejected              frequencies that were found and not believed [Hz], each with the reason
     how                   the way that it was done, in words; ``order`` of the model, 0 where there is none
@@ -246,7 +247,7 @@ def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -
     samples = record.samples[inside]
     outputs = [place for place, one in enumerate(record.names) if one != pushed]
     if not outputs:
-        raise BadInput(f"{at}: expected a column beside the input {pushed}")
+        raise BadInput(f"{at}: expected a column other than the input {pushed}")
     if not (samples.std(axis=0) > 0).all():
         raise BadInput(f"{name}: expected every column to move between {question.said('from_s')} and "
                        f"{question.said('to_s')}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import log
 from typing import TYPE_CHECKING
@@ -51,9 +51,9 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
 
     predictions = check_moves(word, model, runs)
     car = compose(model.vehicle, model.effects)
-    matches, band_hz = _matches(runs, predictions, car)
+    followed = _followed(runs, predictions, car)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
-    _say(chain(_other_ways_up(runs, matches), _other_units(runs, matches), _other_roads(runs, matches, car, band_hz),
+    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed), _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, numbers)), warn, anyway)
     return predictions
 
@@ -80,8 +80,8 @@ def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     from logger.vehicle.compose import compose
 
     car = compose(model.vehicle, model.effects)
-    matches, band_hz = _matches(runs, predicted(word, model, runs, model.effects), car)
-    _say(_other_roads(runs, matches, car, band_hz), warn, anyway)
+    followed = _followed(runs, predicted(word, model, runs, model.effects), car)
+    _say(_other_roads(runs, followed, car), warn, anyway)
 
 
 def predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
@@ -106,17 +106,27 @@ def _say(complaints: Iterable[str], warn: Callable[[str], None], anyway: bool) -
         warn(complaint)
 
 
-def _matches(runs: SimulatedRuns, predictions: Sequence[Array],
-             car: Car) -> tuple[list[RoadMatch], tuple[float, float]]:
-    """How well each run goes with its road, and in which band [Hz]."""
-    from logger.lab.road_match import bounce_band_hz, road_match
+@dataclass(frozen=True)
+class _Followed:
+    """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it. What is wrong
+    with a whole record, its sign or its unit, is wrong in both."""
+
+    around: list[RoadMatch]
+    below: list[RoadMatch]
+    band_hz: tuple[float, float]
+
+
+def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
+    from logger.lab.road_match import below_bounce_band_hz, bounce_band_hz, road_match
     from logger.vehicle.models import structure_of
     from logger.vehicle.modes import undamped_frequencies_hz
 
     structure = structure_of(car.vehicle)
-    band_hz = bounce_band_hz(undamped_frequencies_hz(structure)[: -len(structure.wheels)])
-    matches = [road_match(run, run.main(one), band_hz) for run, one in zip(runs.runs, predictions, strict=True)]
-    return matches, band_hz
+    body_hz = undamped_frequencies_hz(structure)[: -len(structure.wheels)]
+    band_hz = bounce_band_hz(body_hz)
+    around, below = ([road_match(run, run.main(one), hz) for run, one in zip(runs.runs, predictions, strict=True)]
+                     for hz in (band_hz, below_bounce_band_hz(body_hz)))
+    return _Followed(around, below, band_hz)
 
 
 def _moves(run: Run, prediction: Array) -> bool:
@@ -124,39 +134,39 @@ def _moves(run: Run, prediction: Array) -> bool:
     return float(model @ model) >= _LEAST_MPS2**2 * len(model)
 
 
-def _other_ways_up(runs: SimulatedRuns, matches: Sequence[RoadMatch]) -> Iterator[str]:
+def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
-    for run, match in zip(runs.runs, matches, strict=True):
-        if match.is_upside_down:
+    for run, around, below in zip(runs.runs, followed.around, followed.below, strict=True):
+        if around.is_upside_down and below.turned > below.correlation:
             yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
-                   f"the model (correlation {match.turned:.2f})")
+                   f"the model (correlation {around.turned:.2f})")
 
 
-def _other_units(runs: SimulatedRuns, matches: Sequence[RoadMatch]) -> Iterator[str]:
+def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
-    if it is one, and all runs agree."""
-    clear = [(run.name, one.gain) for run, one in zip(runs.runs, matches, strict=True) if one.is_clear]
-    for name, gain in clear:
+    if it is one, and all runs agree, below the bounce as well."""
+    clear = [(run.name, around.gain, below.gain) for run, around, below in
+             zip(runs.runs, followed.around, followed.below, strict=True) if around.is_clear]
+    for name, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
         of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
-        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for _, one in clear):
+        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for _, *gains in clear for one in gains):
             yield (f"{name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the model "
                    f"says: {what} in {unit}")
 
 
-def _other_roads(runs: SimulatedRuns, matches: Sequence[RoadMatch], car: Car,
-                 band_hz: tuple[float, float]) -> Iterator[str]:
+def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
     """Which runs do not follow their road, and where they would fit."""
     from logger.lab.road_match import pooled
 
-    strangers = [k for k, one in enumerate(matches) if one.is_refuted]
-    if not strangers and pooled(matches).is_refuted:
-        strangers = list(range(len(matches)))
+    strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
+    if not strangers and pooled(followed.around).is_refuted:
+        strangers = list(range(len(followed.around)))
     for k in strangers:
-        found, run = matches[k], runs.runs[k]
+        found, run = followed.around[k], runs.runs[k]
         what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
-               f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, band_hz)}")
+               f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
 
 
 def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],

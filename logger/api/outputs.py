@@ -31,7 +31,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
 
 def _may_be_written(path: Path) -> bool:
     """Whether a file can be written, as far as that shows without writing. What is there stays as it is; one that is
-    not there is made and taken away: permissions alone do not tell of all that root, or a file system, cannot do."""
+    not there is made and taken away: permissions alone do not show all that root, or a file system, cannot do."""
     if path.exists():
         return os.access(path, os.W_OK)
     try:

@@ -1,4 +1,4 @@
-"""Repeated drives of logs laid over each other."""
+"""Repeated drives of logs, combined by place and direction."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
 if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.exchange.layer import Layer
+    from logger.report.combined_drives import CombinedDrives
     from logger.report.html import Html
-    from logger.report.laid_drives import LaidDrives
 
 Array = npt.NDArray[np.float64]
 USUAL = "25m"
@@ -46,12 +46,12 @@ class RepeatedDrives(CommandResult):
     lat_deg: Array
     lon_deg: Array
     heading_deg: Array
-    _found: LaidDrives
+    _found: CombinedDrives
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the way that most cells lie on."""
         from logger.chart_data import Curves, Line
-        from logger.report.laid_drives import chains
+        from logger.report.combined_drives import chains
 
         longest = max(chains(self._found), key=len, default=None)
         if longest is None:
@@ -91,7 +91,7 @@ def day_of(text: str, option: str) -> float:
 def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL, since: str | None = None,
            until: str | None = None, split: str | None = None, above_m_per_km: float = ROUGH_M_PER_KM
            ) -> RepeatedDrives:
-    """Lay the drives of segment logs over each other, by place and direction.
+    """Combine repeated drives of segment logs, by place and direction.
 
     logs              folders at any depth, or files, of segment logs; open ones too
     length            of a cell of road, with its unit, or in metres
@@ -106,7 +106,7 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     >>> bool((found.drives >= 1).all())
     True
     """
-    from logger.report.laid_drives import laid_drives
+    from logger.report.combined_drives import combined_drives
     from logger.report.passes_text import as_json, lines
     from logger.store.log.log_reader import find_logs_in, read_found
 
@@ -123,7 +123,7 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     if not records:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row"
                        + (" of these days" if since or until else ""))
-    found = laid_drives(records, length_m, above_m_per_km, split_s)
+    found = combined_drives(records, length_m, above_m_per_km, split_s)
     return RepeatedDrives(
         "\n".join(lines(found)), as_json(found), found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)

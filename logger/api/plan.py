@@ -1,4 +1,4 @@
-"""Before anybody drives: which effects runs, or planned drives, could show and tell apart."""
+"""Before anybody drives: which effects runs, or planned drives, could show and distinguish."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Plan(CommandResult):
     _figure: Html = field(repr=False)
 
     def figures(self) -> list[Html]:
-        """The matrix of what remains of one effect beside another."""
+        """The matrix of what remains of one effect when another is fitted."""
         return [self._figure]
 
 
@@ -71,7 +71,7 @@ def plan(
     tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
     anyway: bool = False,
 ) -> Plan:
-    """Which effects runs, or drives that are planned, could show and tell apart, and which drive would add most. It
+    """Which effects runs, or drives that are planned, could show and distinguish, and which drive would add most. It
     takes seconds, and the compiler of the ``lab`` extra.
 
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``; no runs: only what is planned

@@ -37,6 +37,7 @@ T = TypeVar("T")
 WINDOWS_M = (10.0, 100.0)
 """What profilers report, and what roads are judged by."""
 _FIX_S, _SMOOTH_FIXES = 1.0, 21
+_BETWEEN_UNITS = 5.0  # gravity is 1 g or 9.8 m/s2
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,11 @@ class DrivenWindows:
     exact_m_per_km: Array
 
 
+def unit_by_gravity(accel: Array) -> str:
+    """The unit of accelerations (n, 3) that hold gravity: ``g`` or ``m/s2``, by the middle of their lengths."""
+    return "g" if float(np.median(np.linalg.norm(accel, axis=1))) < _BETWEEN_UNITS else "m/s2"
+
+
 def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
                    profile: Path | None = None) -> list[DrivenWindows]:
     """The windows of a pass, for each length those of all its drives; the sensor's noise is learnt from each drive.
@@ -101,7 +107,7 @@ def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
     """A drive on a line's own distance, less ``from_m``, by its places alone: a run for each pass over the line.
 
     Where the receiver puts the car along the line is averaged over ``_SMOOTH_FIXES`` fixes: between them the speed
-    tells the way better.
+    shows the way better.
     """
     if run.lat_deg is None or run.lon_deg is None:
         return []

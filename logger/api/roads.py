@@ -18,7 +18,8 @@ from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.roads.elevation_spectrum import Bands
+    from logger.roads.elevation_spectrum import BandedSpectrum
+    from logger.roads.localized_roughness import Area
 
 Array = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class Profile(profile_file.Profile, Shown):
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     """Read a road profile.
 
-    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line)
+    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line)
     resample_m    for one that is unevenly spaced: lay straight lines between its samples, and take one every so many
                   metres [m]
 
@@ -147,6 +148,7 @@ class Iri(CommandResult):
     edges_m               (w + 1,) ends of the windows [m]; the last one may be shorter
     windows_m_per_km      (w,) IRI of each, of two tracks their mean
     profile               the road
+    localized             areas of localized roughness, where they were asked for
     """
 
     iri_m_per_km: float
@@ -156,6 +158,7 @@ class Iri(CommandResult):
     edges_m: Array
     windows_m_per_km: Array
     profile: Profile
+    localized: tuple[Area, ...] = ()
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the windows along the way, the continuous one over 25 ft (AASHTO R 54), and the profile."""
@@ -172,12 +175,14 @@ class Iri(CommandResult):
             *road.charts()]
 
 
-def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: float | None = None) -> Iri:
+def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: float | None = None,
+        localized_m_per_km: float | None = None) -> Iri:
     """The International Roughness Index of a profile, exactly as defined (ASTM E1926; Sayers, TRR 1501, 1995).
 
     profile       11 m or longer, samples 0.3 m apart or less; or its file
     window_m      length of a window [m]
     resample_m    of a file, as ``read_profile`` [m]
+    localized_m_per_km    say where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)
 
     Raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
 
@@ -186,7 +191,10 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     (4.44, [4.3, 4.69, 4.44, 4.32])
     """
     from logger.report.iri_text import as_json, lines
-    from logger.roads.profile_iri import profile_iri
+    from logger.report.localized_text import area_lines, area_values
+    from logger.roads.localized_roughness import areas
+    from logger.roads.profile_iri import continuous_iri, profile_iri
+    from logger.units import WINDOW_M
 
     name, road = _named(profile, resample_m)
     try:
@@ -196,9 +204,16 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
-    return Iri("\n".join(lines(found, road, Path(name).name)), as_json(found, road), whole["iri_m_per_km"],
+    said, values = lines(found, road, Path(name).name), as_json(found, road)
+    rough: tuple[Area, ...] = ()
+    if localized_m_per_km is not None:
+        middle_m, sliding = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
+        rough = tuple(areas(road.start_m + middle_m, sliding, localized_m_per_km))
+        said += ["", *area_lines(rough, localized_m_per_km)]
+        values |= {"localized": [area_values(one) for one in rough]}
+    return Iri("\n".join(said), values, whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
-               road.start_m + np.array(ends_m), shown[1:], road)
+               road.start_m + np.array(ends_m), shown[1:], road, rough)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -218,7 +233,7 @@ class RoadClass(CommandResult):
     waviness: float
     waviness_std: float
     iri_m_per_km: float
-    spectrum: Bands
+    spectrum: BandedSpectrum
 
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""
@@ -249,7 +264,6 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
     ('C', True)
     """
     from logger.report.road_text import as_json, lines
-    from logger.roads.elevation_spectrum import band_edges, smooth, spectrum
     from logger.roads.track_class import track_class
 
     name, road = _named(profile, resample_m)
@@ -260,9 +274,7 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
         raise BadInput(f"{name}: {error}") from None
     left = found[0].roughness
     return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
-                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km,
-                     smooth(
-                         spectrum(road.elevation_m, road.spacing_m), band_edges(left.lowest_cpm, left.highest_cpm)))
+                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km, left.bands)
 
 
 def _named(profile: Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:

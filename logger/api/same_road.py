@@ -20,25 +20,25 @@ from logger.runs import Run as Record
 from logger.store.formats import drive_file, vehicle_file
 
 if TYPE_CHECKING:
-    from logger.lab.unknown_road.diagnosis import Found
+    from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 
 Array = npt.NDArray[np.float64]
 
 _PLACES_EVERY_M = 10.0
 _LEAST_SHARED_M = 50.0
-"""Some seconds of a drive: over less road nothing is told (``lab.unknown_road.likelihood``)."""
+"""Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SameRoadDiagnosis(Diagnosis):
-    """Which physical effects a model lacks, as far as drives over an unmeasured road tell.
+    """Which physical effects a model lacks, as far as drives over an unmeasured road show it.
 
-    An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives tell.
+    An error is rms(measured - model) / rms(measured) of each drive over the road estimated from the other drives.
 
     run_errors       by name of the run: error before, and with the effects that were found
-    taken_by_road    effects that another road would imitate, and the share of their information that is left beside it
+    taken_by_road    effects that another road would imitate, and the share of their information that remains with it
     not_tried        effects that could not be tried, and why
-    cannot_tell      sentences: what these drives do not tell
+    cannot_tell      sentences: what these drives do not show
     """
 
     run_errors: Mapping[str, tuple[float, float]]
@@ -146,7 +146,7 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 def diagnosed(
     word: str, model: vehicle_file.Model, records: Sequence[Record], effect_files: Sequence[str], tolerance: float,
     candidates: Collection[str] | None = None, tell: Tell = unsaid,
-) -> Found:
+) -> UnknownRoadDiagnosis:
     """Which effects the model lacks. BadInput as ``diagnose_same_road``.
 
     word    by which the user knows the vehicle

@@ -81,7 +81,7 @@ def length_of(text: str) -> float:
 
 
 def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUAL_M, units: str = "si",
-             route: Path | str | None = None) -> Sections:
+             route: Path | str | None = None, localized_m_per_km: float | None = None) -> Sections:
     """The drives of segment logs in sections of one length, each from its own beginning.
 
     logs      folders at any depth, or files, of segment logs; open ones too
@@ -89,6 +89,8 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     units     of the text: si or us
     route     GeoJSON of one LineString, with ``begin_km`` and ``end_km`` or points with ``km`` beside it: sections then
               are of its measures, for each pass over it, along or against it
+
+    localized_m_per_km    list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)
 
     The standard error of a section is that of independent windows. It holds nothing of what all windows of a car share:
     a vehicle file that is wrong. Rows flagged ``unsettled`` stand in no mean.
@@ -116,7 +118,8 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
         "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
     return Sections(
-        "\n".join(lines(drives, length_m, units)), as_json(drives, length_m), length_m,
+        "\n".join(lines(drives, length_m, units, localized_m_per_km)), as_json(drives, length_m, localized_m_per_km),
+        length_m,
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
         speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)

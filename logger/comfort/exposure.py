@@ -21,7 +21,7 @@ S_PER_HOUR = 3600.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class ExposureLimits:
     """A value from which to act, and one not to be exceeded."""
 
     action: float
@@ -35,8 +35,8 @@ class Limits:
 
 
 # Directive 2002/44/EC article 3(2): A(8) [m/s2] and VDV [m/s^1.75] of the whole body.
-A8_MPS2 = Limits(0.5, 1.15)
-VDV_MPS175 = Limits(9.1, 21.0)
+A8_MPS2 = ExposureLimits(0.5, 1.15)
+VDV_MPS175 = ExposureLimits(9.1, 21.0)
 
 
 def a8(a_w_mps2: float, hours: float) -> float:

@@ -2,7 +2,7 @@
 
 Problem: one number cannot say both how a road shakes and how hard it hits. The standard has several, all from
 the weighted acceleration: its r.m.s. over the stretch, the largest running r.m.s. over one second, the fourth-power
-dose, and the crest factor that tells which of them to believe.
+dose, and the crest factor that says which of them to believe.
 
 Solution: plain functions of the weighted samples, the standard's rule for which of them to use, and running r.m.s.
 values that work on a stream and do not drift however long the stream is.
@@ -32,7 +32,7 @@ COMFORT_WORDS = (
     (0.0, "not_uncomfortable"),
 )
 
-# Above these the r.m.s. does not tell the whole story (clauses 6.2.1 and 6.3.3).
+# Above these the r.m.s. does not say all (clauses 6.2.1 and 6.3.3).
 CREST_LIMIT = 9.0
 MTVV_LIMIT = 1.5
 VDV_LIMIT = 1.75
@@ -55,7 +55,7 @@ def vdv(weighted_mps2: Floats, dt_s: float) -> float:
 def crest_factor(weighted_mps2: Floats) -> float:
     """Largest weighted acceleration (n,) over its r.m.s.; nan when nothing moves. Clause 6.2.1.
 
-    Up to CREST_LIMIT the r.m.s. tells the whole story; above, MTVV or VDV belongs beside it.
+    Up to CREST_LIMIT the r.m.s. says all; above, MTVV or VDV belongs beside it.
     """
     rms_mps2 = a_w(weighted_mps2)
     return float(np.abs(weighted_mps2).max()) / rms_mps2 if rms_mps2 > 0.0 else math.nan

@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     parser.add_argument("--window", type=float, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     add_number(parser, "--low-pass", *LOW_PASS, metavar="HZ",
-               help="low_pass_hz of the recorder's settings (default: none; what every recorder does, to leave out "
-                    "gravity and what 100 Hz cannot hold, is always in)")
+               help="low_pass_hz of the recorder's settings (default: none; the filters of every recorder, against "
+                    "gravity and aliasing, always apply)")
     add_number(parser, "--passengers", *PASSENGERS, kind=int, default=0, metavar="N",
                help="people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a "
                     "quarter car a quarter")

@@ -5,7 +5,7 @@ accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is t
 phase, applied to the whole record by Fourier transform.
 
 A record that repeats samples, whose times are uneven, or that is in g is refused, with the option that mends it. What
-is doubtful is told on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
+is doubtful is named on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,ele
   ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
 
 The error is rms(measured - model) / rms(measured), the first 2 s of each run left out. Then the car's numbers and the
-distances are refitted within what they are usually off, and what is left is read: only that is evidence of physics that
+distances are refitted within their usual errors, and the residual is analysed: only that is evidence of physics that
 the model lacks. ridelog diagnose says which.
 """
 

@@ -4,6 +4,12 @@
 Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
 neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
 known is empty.
+
+  ridelog convert /media/RIDELOG --to drive.geojson
+  ridelog convert /media/RIDELOG --smoothness ways.geojson --to review.geojson
+
+With --smoothness each row is a way of OpenStreetMap that was driven: the value of its key smoothness that the IRI
+suggests, how sure that is, and what is tagged. It is for a person to look through; nothing is sent anywhere.
 """
 
 from __future__ import annotations
@@ -21,6 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="folder of segment logs, exported stick, or log file")
     parser.add_argument("--to", metavar="FILE", type=Path, required=True,
                         help="file to write; its ending says what: .csv .geojson .gpkg .gpx .kml .parquet")
+    parser.add_argument("--smoothness", metavar="WAYS.geojson", type=Path,
+                        help="suggest OpenStreetMap's smoothness for the ways of this extract (with @id and highway)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -28,7 +36,8 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog convert``."""
     from logger.api.conversion import convert
 
-    done = convert(args.logs, args.to)
-    print(json.dumps({"file": str(done.path), "format": done.format, "rows": done.rows, "placed": done.placed,
+    done = convert(args.logs, args.to, args.smoothness)
+    rows = "rows" if args.smoothness is None else "ways"
+    print(json.dumps({"file": str(done.path), "format": done.format, rows: done.rows, "placed": done.placed,
                       "damaged_lines": done.damaged_lines}) if args.json else done)
     return EXIT_DONE

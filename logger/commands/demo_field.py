@@ -32,9 +32,9 @@ _EXPLAINED = {
     "extract": "First the bytes become runs. Look at the places: fixes are late and wrong by a metre or two, but the "
                "car felt the road that was measured, and that says where it was.",
     "before": "What would the box say of the fourth street? Look at the bias, and at the share of windows within two "
-              "standard errors: 0.95 would be right. On a street that nobody measured, nothing would tell.",
+              "standard errors: 0.95 would be right. On a street that nobody measured, nothing would show it.",
     "compare": "Does the model fail on the three drives, or are only its numbers a little off? They are refitted "
-               "within a few per cent first. Look at what is left then, and where.",
+               "within a few per cent first. Look at the residual then, and where it is.",
     "diagnose": "Which physical effect would explain that? Look at the chance, and at the errors: on stretches that no "
                 "fit saw, the right one comes down to the sensor's noise.",
     "add": "It is fitted on all three drives, with the car's numbers. Look at those that were biased without it.",

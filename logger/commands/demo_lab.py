@@ -21,13 +21,13 @@ _INTRODUCTION = (
 )
 _EXPLAINED = {
     "compare": "First question: does the model fail at all, or are only its numbers a little off? Nominal masses and "
-               "springs are never exact, so they are refitted within a few per cent, and only what is left then is "
-               "evidence.",
-    "diagnose": "Second question: which physical effect would explain what is left? Each that ridelog knows is "
+               "springs are never exact, so they are refitted within a few per cent, and only the residual after "
+               "that is evidence.",
+    "diagnose": "Second question: which physical effect would explain the residual? Each that ridelog knows is "
                 "simulated and fitted together with the car's numbers, on two thirds of each drive; the other third is "
                 "the judge.",
-    "add": "The effect is fitted on all of the drives, with the car's numbers. Look at the table: what the missing "
-           "effect had made of masses, springs and dampers. They looked like results, and were wrong.",
+    "add": "The effect is fitted on all of the drives, with the car's numbers. Look at the table: how the missing "
+           "effect had biased masses, springs and dampers. They looked like results, and were wrong.",
     "again": "The same comparison once more, with the new vehicle file.",
 }
 
@@ -69,7 +69,7 @@ def unpack(out: Path) -> list[Path]:
 
 
 def _answer(story: Story) -> list[str]:
-    """What the simulated car truly was, beside what was found."""
+    """What the simulated car truly was, and what was found."""
     from logger.api.lab_loop import chapter
     from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
 
@@ -79,7 +79,7 @@ def _answer(story: Story) -> list[str]:
 
 def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Mapping[str, float]
                  ) -> tuple[str, list[str]]:
-    """What a simulated car truly was, beside what was found: a sentence, and the lines of a table.
+    """What a simulated car truly was, and what was found: a sentence, and the lines of a table.
 
     effect, values    that it had
     off               by which factor its numbers were not those of its file

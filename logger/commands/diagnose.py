@@ -91,5 +91,5 @@ def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
                 f"{' '.join(map(str, args.runs))}")
     if found.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
-                           "ridelog compare shows where what is left sits."])
+                           "ridelog compare shows where the residual is."])
     return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."

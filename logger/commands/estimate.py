@@ -7,12 +7,12 @@ that knew the road's spectrum, the sensor's noise and the car exactly.
   ridelog estimate run --vehicle rav4-2009
   ridelog estimate drive.csv --vehicle mycar.yaml --noise auto --step 0.613 --profile-out road.csv
 
-A distance may go back by up to 1 m, as one corrected by GPS does; it is then laid anew, as the integral of speed_mps
-plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to 100 Hz.
-Repeated samples, uneven times and values in g are refused, with the option that mends them.
+A distance may go back by up to 1 m, as one corrected by GPS does; it is then computed again, as the integral of
+speed_mps plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to
+100 Hz. Repeated samples, uneven times and values in g are refused, with the option that mends them.
 
-The profile holds only the wavelengths that the readings tell: it is smoother than the road, and its own IRI too low. A
-drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI:
+The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its own IRI too low.
+A drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI:
 the limit's R2 is given for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one.
 """
 
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     print(json.dumps(shown.as_json(), allow_nan=False) if args.json else shown.text)
     tell_doubts(args.run, (doubt.words for doubt in checked.doubts))
     if args.profile_out is not None and not files:
-        print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "
+        print(f"No profile in {args.profile_out}: the readings resolve no wavelengths over a stretch longer than the "
               "longest of them", file=sys.stderr if args.json else sys.stdout)
     return EXIT_DONE
 

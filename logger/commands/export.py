@@ -136,7 +136,7 @@ def screen(result: ExportResult) -> list[str]:
 
 class _Board:
     """The note of one stick, and the light; both only where they were asked for, and as far as they can be: that
-    nobody can be told is no reason not to copy."""
+    nobody can be notified is no reason not to copy."""
 
     def __init__(self, note: Path | None, led: Path | None) -> None:
         self._note = note

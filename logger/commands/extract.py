@@ -9,7 +9,7 @@ positions, then by the road as the car felt it; profile.csv lies beside it then.
 
 With --csv, recordings of phones and other loggers: a CSV file, or the folder of one recording with several. Exports of
 phyphox, Sensor Logger, SensorLog, AndroSensor and Physics Toolbox are recognised; name the columns of others. The phone
-may lie at any angle: gravity tells up. Uneven and repeated samples are repaired.
+may lie at any angle: gravity shows which way is up. Uneven and repeated samples are repaired.
 
   ridelog extract --csv phyphox-export/ --out runs
   ridelog extract --csv ride.csv --location gps.csv --out runs
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--columns", metavar="ROLE=COLUMN[:UNIT],...",
                        help="which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, "
                             "mg), gx gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at "
-                            "the end of the column's name, or what gravity and the clock tell")
+                            "the end of the column's name, or what gravity and the clock show")
     group.add_argument("--up", choices=("x", "y", "z", "-x", "-y", "-z"),
                        help="the axis that points up, of a record from which gravity was taken out (write --up=-z)")
     group.add_argument("--sign", choices=("+", "-"),
@@ -142,7 +142,7 @@ def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
 
 
 def lines(source: Path, found: Extracted) -> list[str]:
-    """What a person is told of a recording."""
+    """The lines for a person about a recording."""
     printed = [f"{source}: {note}" for note in found.notes]
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"

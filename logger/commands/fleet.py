@@ -4,7 +4,7 @@
   ridelog fleet summarise county --by section --since 2026-01-01 --out sections.parquet
   ridelog fleet report county --out map/
 
-docs/fleet.md tells the whole way, from the stick in a depot to the map.
+docs/fleet.md describes all of it, from the stick in a depot to the map.
 """
 
 from __future__ import annotations

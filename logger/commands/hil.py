@@ -6,7 +6,7 @@ under the same settings. With ports and --log: play, then compare. With ports al
 another machine. With --log alone: only compare, with a copy of its folder.
 
 The readings of a chip such as the BMA220 are sent as a bridge microcontroller would: as lines, profile `lines`.
-Exit status 1 when the log does not agree, or the bytes were sent too late to tell.
+Exit status 1 when the log does not agree, or the bytes were sent too late to decide.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
 from logger.service import noise_learning, receiver_learning
 from logger.service.config import Config, find_config, load_config
-from logger.service.hil.log_comparison import Agreement, Difference, compare, newest_sidecar, read_sessions
+from logger.service.hil.log_comparison import Difference, LogAgreement, compare, newest_sidecar, read_sessions
 from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
 from logger.service.noise_learning import KnownNoise
 
@@ -68,19 +68,19 @@ def run(args: argparse.Namespace) -> int:
     if sent is not None and expected is not None:
         time.sleep(WRITTEN_S)
     agreement = compare(expected, read_sessions(args.log), config.gps.bridge_s) if expected is not None else None
-    result = Result(_bridged(args), sent, agreement)
+    result = PlayedDrive(_bridged(args), sent, agreement)
     print(json.dumps(result.as_json()) if args.json else result.text())
     return EXIT_DONE if result.ok else EXIT_CHECK_FAILED
 
 
 @dataclass(frozen=True)
-class Result:
+class PlayedDrive:
     """What was sent and what was found; None: not asked for. ``bridged``: title of the chip whose readings
     were sent as lines; empty: the bytes went as they are."""
 
     bridged: str
     sent: Sent | None
-    agreement: Agreement | None
+    agreement: LogAgreement | None
 
     @property
     def in_time(self) -> bool:
@@ -187,7 +187,7 @@ def _sent_json(sent: Sent | None, in_time: bool) -> dict[str, Any] | None:
             "late_p99_ms": most, "late_max_ms": longest, "late_p99_tolerance_ms": LATE_MS, "in_time": in_time}
 
 
-def _agreement_json(agreement: Agreement | None) -> dict[str, Any] | None:
+def _agreement_json(agreement: LogAgreement | None) -> dict[str, Any] | None:
     if agreement is None:
         return None
     fields = asdict(agreement)
@@ -207,7 +207,7 @@ def _number(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _agreement_text(agreement: Agreement) -> list[str]:
+def _agreement_text(agreement: LogAgreement) -> list[str]:
     if agreement.session is None:
         return [f"No row of this drive is in the log: {agreement.expected} were expected.",
                 "  Is the service up, are its ports the other ends of the wires, and is TX on RX?"]
@@ -216,7 +216,7 @@ def _agreement_text(agreement: Agreement) -> list[str]:
              f"expected, {agreement.repeated} twice, {agreement.flags_differ} with other flags."]
     if abs(agreement.moved_before_m) > _MOVED_M:
         lines.append(f"  The service had counted {agreement.moved_before_m:.0f} m before, so its windows begin "
-                     "elsewhere: start it anew for each play.")
+                     "elsewhere: restart it for each play.")
     for words, segments in (("missing", agreement.missing), ("not expected", agreement.surplus)):
         if segments:
             lines.append(f"  {words}: segments {', '.join(map(str, segments[:10]))}{' ...' if segments[10:] else ''}")

@@ -20,15 +20,15 @@ looked for where none is given. run2.NAME is that of one run, each.NAME one for 
   ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
 
 With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of the
-waviness that is said or, with road.waviness free, found. Drives over one road at different speeds tell far more
+waviness that is said or, with road.waviness free, found. Drives over one road at different speeds say far more
 (--same-road).
 
   ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
   ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
 
 Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
-that leave no trace at the sensor, and numbers that can be told only together; masses, springs and dampers share one
-scale, so one of them has to be known.
+that leave no trace at the sensor, and numbers of which only a combination can be estimated; masses, springs and dampers
+share one scale, so one of them has to be known.
 """
 
 from __future__ import annotations
@@ -86,17 +86,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--tries", *TRIES, kind=int, default=0, metavar="N",
                help="so many further starts, spread around")
     parser.add_argument("--noise", choices=NOISE_MODELS, default="auto",
-                        help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
+                        help="model of the residual: white (output error), ar (innovations form), road (roughness that "
                              "the profile does not contain, through the car); auto: the likeliest (default)")
     parser.add_argument("--low-pass", type=float, metavar="HZ",
-                        help="leave out what lies above, for example 20; so does the pass_band_hz of a run.yaml")
+                        help="leave out frequencies above it, for example 20; so does the pass_band_hz of a run.yaml")
     parser.add_argument("--robust", action="store_true", help="let single wild readings count less (Huber's loss)")
     parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
                         help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
     add_anyway(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", action="append",
-                        help="write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of what "
-                             "is left and of numbers that err together; once for each")
+                        help="write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the "
+                             "residual and of correlated numbers; once for each")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
@@ -158,7 +158,7 @@ def _check_given(args: argparse.Namespace) -> None:
     if args.waviness is not None and not (args.unmeasured_road or args.same_road):
         raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
     if args.unmeasured_road and args.same_road:
-        raise BadInput("--unmeasured-road: expected no --same-road beside it: runs have roads of their own, or one")
+        raise BadInput("--unmeasured-road: expected no --same-road with it: runs have roads of their own, or one")
     if args.same_road and len(args.runs) < 2:
         raise BadInput("--same-road: expected two runs or more")
 

@@ -10,6 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
+from logger.commands.numbers import add_number
 from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
 
@@ -19,13 +20,15 @@ WINDOW_M = 100.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("profile", type=Path, metavar="PROFILE", nargs="?", help="CSV or ERD file")
     parser.add_argument("--response", action="store_true",
-                        help="without a profile: what the IRI hears of each wavelength, as a table")
+                        help="without a profile: how strongly the IRI responds to each wavelength, as a table")
     parser.add_argument("--window", type=float, default=WINDOW_M, metavar="M",
                         help="length of a window [m] (default: 100, as road agencies report; a tenth of a mile is "
                              "160.9344, the service's 25 ft are 7.62)")
     parser.add_argument("--resample", type=float, metavar="M",
                         help="for an unevenly spaced profile: lay straight lines between its samples and take a "
                              "sample every M metres; this changes the IRI, and the result says that it was done")
+    add_number(parser, "--localized", 0.01, 1000.0, "m/km", metavar="M_PER_KM",
+               help="list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)")
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
@@ -43,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.window > 0:
         raise BadInput(f"--window {args.window:g}: expected a length above 0 m")
     check_picture(args.out, [args.profile])
-    found = iri(args.profile, args.window, args.resample)
+    found = iri(args.profile, args.window, args.resample, args.localized)
     write_picture(args.out, "International Roughness Index", args.profile.name, found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE

@@ -5,7 +5,7 @@
 
 Before an effect is added it asks: yes, no, or the name of another one. Where no effect explains what is missing it
 offers to learn a law out of the data, as ridelog learn does. DIR gets a vehicle file for each step, the law, and
-story.html, the page that tells all of it.
+story.html, the page of all of it.
 """
 
 from __future__ import annotations

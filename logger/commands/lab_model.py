@@ -68,9 +68,9 @@ def _add_tolerance(parser: argparse.ArgumentParser) -> None:
 def _add_low_pass(parser: argparse.ArgumentParser) -> None:
     """--low-pass, for ``bench_of``."""
     parser.add_argument("--low-pass", type=float, metavar="HZ",
-                        help="leave out what lies above, for example 20, of the record and of the model alike; errors "
-                             "are then of what is left (default: all that the record holds; a record that somebody "
-                             "has low-passed is found, and said)")
+                        help="leave out frequencies above it, for example 20, in the record and in the model; errors "
+                             "are of the rest (default: all that the record holds; a record that somebody has "
+                             "low-passed is recognised, and said)")
 
 
 def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:

@@ -1,7 +1,7 @@
 """Natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
 
 FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response to
-random forces; --input names a column with a force or motion that was measured beside it. Nobody has to pick poles: the
+random forces; --input names a column with a force or motion that was measured with it. Nobody has to pick poles: the
 order and the modes are chosen by rule, and what the record does not support is listed as rejected, with the reason.
 
   ridelog modes push.csv --method era
@@ -120,7 +120,7 @@ def _of_vehicle(args: argparse.Namespace) -> int:
     from logger.api.vehicles import read_vehicle
 
     if args.example is not None:
-        raise BadInput(f"--vehicle {args.vehicle}: expected no --example beside it")
+        raise BadInput(f"--vehicle {args.vehicle}: expected no --example with it")
     _check_alone(args, f"--vehicle {args.vehicle}")
     found = vehicle_modes(read_vehicle(args.vehicle), COMMON_IRI if args.iri is None else args.iri,
                           COMMON_SPEED_MPS if args.speed is None else args.speed)
@@ -129,14 +129,14 @@ def _of_vehicle(args: argparse.Namespace) -> int:
 
 
 def _check_example(args: argparse.Namespace) -> None:
-    """BadInput for anything beside an example but --json."""
+    """BadInput for anything with an example but --json."""
     _check_alone(args, f"--example {args.example}")
 
 
 def _check_alone(args: argparse.Namespace, said: str) -> None:
     """BadInput for a FILE, or options that need one."""
     if args.file is not None:
-        raise BadInput(f"{said}: expected no FILE beside it, found {args.file}")
+        raise BadInput(f"{said}: expected no FILE with it, found {args.file}")
     given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
              "--response": args.response, "--from": args.from_s, "--to": args.to_s, "--segments": args.segments,
              "--diagram": args.diagram, "--out": args.out}

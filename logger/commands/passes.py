@@ -1,13 +1,13 @@
-"""Drives laid over each other by place and direction: the mean of all passes with its standard error, what changed, and
+"""Repeated drives combined by place and direction: the mean of all passes with its standard error, what changed, and
 places that somebody should go and see.
 
   ridelog passes /media/RIDELOG --out means.html --visit places.gpx
   ridelog passes spring/ autumn/ --split 2026-07-01 --out changes.geojson
 
-A drive is laid on those before it as a whole: by its places, its direction, and the receiver's error, which changes
-over minutes. Streets from some 15 m apart are kept apart, lanes of one direction are not. The standard error of a mean
-holds what is common to a drive (the car, its tires, its load) as it shows between drives. What is common to all
-drives, such as a wrong vehicle file, it cannot hold.
+Each drive is matched to those before it as a whole: by its places, its direction, and the receiver's error, which
+changes over minutes. Streets some 15 m apart or more are distinguished, lanes of one direction are not. The standard
+error of a mean includes the errors that all windows of one drive share (the car, its tires, its load), estimated from
+how drives differ. It cannot include what all drives share, such as a wrong vehicle file.
 """
 
 from __future__ import annotations

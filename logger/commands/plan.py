@@ -1,4 +1,4 @@
-"""Before anybody drives: which physical effects runs, or planned drives, could show and tell apart, and which drive
+"""Before anybody drives: which physical effects runs, or planned drives, could show and distinguish, and which drive
 would add most.
 
 Each RUN is a folder as in 'ridelog diagnose'. Planned drives go over all of a profile, one at each speed.

@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive told
-    of the receiver's delay, of which the rows took ``known``."""
+    """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive
+    showed of the receiver's delay, of which the rows took ``known``."""
 
     directory: Path
     files: list[Path]

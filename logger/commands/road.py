@@ -21,7 +21,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
 if TYPE_CHECKING:
-    from logger.roads.elevation_spectrum import Array, Bands
+    from logger.roads.elevation_spectrum import Array, BandedSpectrum
 
 _LINES_AT_ONCE = 100_000
 
@@ -129,7 +129,7 @@ def _classify(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _psd_csv(found: Bands) -> str:
+def _psd_csv(found: BandedSpectrum) -> str:
     from logger.roads.elevation_spectrum import acceleration_psd
 
     columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from logger.api.outputs import check_out
 from logger.api.sections import SYSTEMS
+from logger.commands.numbers import add_number
 from logger.commands.pictures import parted, write_picture
 from logger.errors import EXIT_DONE
 
@@ -34,6 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: {_USUAL})")
     parser.add_argument("--route", metavar="LINE.geojson", type=Path,
                         help="count by the measures of this line, along and against it")
+    add_number(parser, "--localized", 0.01, 1000.0, "m/km", metavar="M_PER_KM",
+               help="list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)")
     parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
                         help="write the sections as .csv .geojson .gpkg .gpx .kml .parquet (in SI units), or a page or "
@@ -54,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         read = [log for log, _ in find_logs_in(args.logs)]
         for path in written:
             check_out(path, (), read)
-    found = sections(args.logs, args.length, args.units, args.route)
+    found = sections(args.logs, args.length, args.units, args.route, args.localized)
     if table is not None:
         write_layer(found.layer(), table)
     of = ", ".join(map(str, args.logs))

@@ -12,7 +12,7 @@ the start of the profile, after a flat road, and is sampled as a recorder does i
 0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run. A rig that is
 driven by time (--excitation) has no speed and no distance; its drive.csv lasts as long as the excitation.csv beside it.
 
-Physical effects are those of the vehicle's file, then those of --effect; --list-effects tells what there is. The speed
+Physical effects are those of the vehicle's file, then those of --effect; --list-effects lists them. The speed
 asked for is the true one: with speed_scale the drive's own columns say something else.
 """
 
@@ -33,7 +33,7 @@ from logger.errors import EXIT_DONE, BadInput
 if TYPE_CHECKING:
     from logger.profiles.excitation import Excitation
     from logger.profiles.track import Track
-    from logger.simulation.virtual_drive import Motion
+    from logger.simulation.virtual_drive import FrontAxleMotion
     from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
@@ -263,7 +263,7 @@ def _rig(args: argparse.Namespace) -> Excitation:
     return read_excitation(args.excitation)
 
 
-def _motion(args: argparse.Namespace, track: Track | Excitation, wheelbase_m: float) -> Motion:
+def _motion(args: argparse.Namespace, track: Track | Excitation, wheelbase_m: float) -> FrontAxleMotion:
     from logger.profiles.excitation import Excitation
     from logger.simulation.virtual_drive import at_one_speed, motion_along, standing
     from logger.store.formats.drive_file import read_speeds

@@ -131,7 +131,7 @@ def _settings_advice(sensor: SensorStatus) -> list[str]:
     if not lost:
         return []
     times = "once" if lost == 1 else f"{lost} times"
-    return [f"accelerometer: it lost its settings {times} since the start and was started anew; its readings of that "
+    return [f"accelerometer: it lost its settings {times} since the start and was restarted; its readings of that "
             "time are left out. Its supply dips: check its 3.3 V and ground wires, and the Pi's own supply."]
 
 

@@ -1,4 +1,4 @@
-"""Reproduce a table or a figure of the reference dissertation, or of other papers, beside its printed values.
+"""Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
 
   ridelog study --list
   ridelog study table-4-4
@@ -7,8 +7,8 @@
   ridelog study all --shelf field --out studies
   ridelog study lira-cd DIR --vehicle mycar.yaml
 
-Each study ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation measured, the
-study simulates under the conditions that its text gives: the records were never published.
+Each printed item ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation
+measured, the study simulates under the conditions that its text gives: the records were never published.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 QUICK_SHARE = 0.1
 SHELF_NAMES = ("dissertation", "field", "roads")
-_WIDTH = 118
+_WIDTH, _NARROWEST = 118, 24
 _BAR = 30
 
 
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     known = studies(args.shelf)
     if args.list:
         if args.name is not None:
-            raise BadInput(f"study --list: expected no NAME beside it, found {args.name}")
+            raise BadInput(f"study --list: expected no NAME with it, found {args.name}")
         for option, value in (("--quick", args.quick), ("--out", args.out)):
             if value:
                 raise BadInput(f"study {option}: expected a NAME with it, not --list")
@@ -112,7 +112,7 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
         if found.result is not None:
             write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", share))
         print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
-              f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
+              f"{found.failure or study.words} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
     write_text(args.out / "index.html", index(known, carried, share))
     failed = [one for one in chosen if carried[one.called].failure]
     if args.json:
@@ -142,14 +142,15 @@ def _list(known: list[Study], wants_json: bool) -> None:
     if not known:
         print("No studies on this shelf.")
         return
-    name, where, word = (max(len(getattr(one, what)) for one in known) for what in ("called", "where", "word"))
+    name, where, words = (max(len(getattr(one, what)) for one in known) for what in ("called", "where", "words"))
     for one in known:
-        print(f"{one.called:{name}}  {one.word:{word}}  {one.where:{where}}  {one.title}")
+        print(f"{one.called:{name}}  {one.words:{words}}  {one.where:{where}}  {one.title}")
 
 
 def _in_short(study: Study) -> dict[str, Any]:
     return {"name": study.called, "where": study.where, "title": study.title, "covers": list(study.covers),
-            "word": str(study.word), "because": study.because}
+            "words": study.words, "items": [{"item": one.name, "word": str(one.word), "because": one.because}
+                                            for one in study.items]}
 
 
 # --- what is shown ---
@@ -160,22 +161,33 @@ def lines(study: Study, result: Result) -> list[str]:
     shown = [f"{study.where}: {study.title}", fill(study.how, _WIDTH)]
     for table in result.all_tables:
         shown += ["", table.title, *_table_lines(table)]
-    word = fill(study.differs(result) or f"{str(study.word).capitalize()}: {study.because}", _WIDTH)
-    return [*shown, "", word, "", fill(result.verdict, _WIDTH)]
+    differs = study.differs(result)
+    words = [f"{', '.join(names)}: {item.word}. {item.because}" for names, item in study.groups]
+    return [*shown, "", *(fill(one, _WIDTH, subsequent_indent="  ") for one in ([differs] if differs else words)), "",
+            fill(result.verdict, _WIDTH)]
 
 
 def _table_lines(table: Table) -> list[str]:
-    """Columns as wide as what is in them; a heading that is wider is broken into lines."""
+    """Columns as wide as what is in them; headings, and words where the line would be too long, are broken."""
     cells = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
     widths = [max(max((len(row[index]) for row in cells), default=0), max(map(len, column.name.split())))
               for index, column in enumerate(table.columns)]
-    heads = [fill(column.name, width, break_long_words=False).split("\n")
-             for column, width in zip(table.columns, widths, strict=True)]
-    deep = max(map(len, heads))
-    rows = [*zip(*([""] * (deep - len(head)) + head for head in heads), strict=True), *cells]
     left = [index in table.words for index in range(len(widths))]
+    while sum(widths) + 2 * len(widths) > _WIDTH and max(widths) > _NARROWEST:
+        widths[widths.index(max(widths))] -= 1
+    heads = _broken([column.name for column in table.columns], widths, lowest=True)
     return ["  ".join(f"{cell:<{width}}" if words else f"{cell:>{width}}"
-                      for cell, width, words in zip(row, widths, left, strict=True)).rstrip() for row in rows]
+                      for cell, width, words in zip(row, widths, left, strict=True)).rstrip()
+            for rows in (heads, *(_broken(row, widths) for row in cells)) for row in rows]
+
+
+def _broken(cells: list[str], widths: list[int], lowest: bool = False) -> list[tuple[str, ...]]:
+    """The lines of a row whose cells are as wide; of heads, which stand ``lowest``, the last ones are full."""
+    parts = [fill(cell, width, break_long_words=False).split("\n") for cell, width in zip(cells, widths, strict=True)]
+    deep = max(map(len, parts))
+    empty = [[""] * (deep - len(part)) for part in parts]
+    return list(zip(*(blank + part if lowest else part + blank for part, blank in zip(parts, empty, strict=True)),
+                    strict=True))
 
 
 def as_json(study: Study, result: Result) -> dict[str, Any]:
@@ -185,7 +197,8 @@ def as_json(study: Study, result: Result) -> dict[str, Any]:
         "how": study.how, "source": study.source, "failure": study.differs(result) or None,
         "tables": [{"title": table.title, "columns": [column.name for column in table.columns],
                     "rows": [[_known(cell) for cell in row] for row in table.rows]} for table in result.all_tables],
-        "verdict": result.verdict, "figures": [_figure(one) for one in result.pictures],
+        "verdict": result.verdict,
+        "figures": [{**_figure(one.chart), "printed": one.printed or None} for one in result.pictures],
     }
 
 
@@ -194,11 +207,11 @@ def _figure(one: Chart) -> dict[str, Any]:
 
     if isinstance(one, Bars):
         return {"title": one.title, "value": one.value_name, "bars": [list(bar) for bar in one.bars]}
-    told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
+    named: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):
-        return {**told, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
+        return {**named, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
                 "values": [[_known(value) for value in row] for row in one.values.tolist()]}
-    return {**told, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
+    return {**named, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
                               for line in one.lines]}
 
 

@@ -19,7 +19,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 import numpy as np
 
 from logger.demo.lab_drives import LONG_AGO
-from logger.demo.motion import LEAD_M, SPACING_M, Road, Stretch, build_road
+from logger.demo.motion import LEAD_M, SPACING_M, Road, RoadStretch, build_road
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DEFAULT, LINES, Drive, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
@@ -46,8 +46,9 @@ LINE, BEYOND = "line.csv", "beyond.csv"
 LINES_M: Mapping[str, tuple[float, float]] = {LINE: (60.0, 560.0), BEYOND: (600.0, 1200.0)}
 """From where to where, as the way goes."""
 _PLACE_EVERY = 200  # rows of a line
-_STREET = (Stretch(220, 300), Stretch(160, 700), Stretch(210, 250), Stretch(150, 80), Stretch(150, 200),
-           Stretch(150, 50), Stretch(130, 300), Stretch(300, 100))
+_STREET = (RoadStretch(220, 300), RoadStretch(160, 700), RoadStretch(210, 250), RoadStretch(150, 80),
+           RoadStretch(150, 200),
+           RoadStretch(150, 50), RoadStretch(130, 300), RoadStretch(300, 100))
 # A console that shakes. The serial sensor is no better than a BMA220 with its steps (0.18 m/s2) and less noise, so that
 # no drive decides alone.
 _NOISE_MPS2 = {DEFAULT: 0.17, LINES: 0.22}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from logger.demo.motion import Bump, Stretch
+from logger.demo.motion import RoadStretch, SpeedBump
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
@@ -21,10 +21,11 @@ PLAN = DrivePlan(
         (259, 5), (264, 9), (295, 8), (302, 13), (330, 14), (340, 0), (345, 0),        # bump, rough lane, home
     ),
     stretches=(
-        Stretch(420, 60), Stretch(250, 140), Stretch(530, 40), Stretch(2070, 12), Stretch(290, 220), Stretch(180, 120),
-        Stretch(270, 800), Stretch(100, 300), Stretch(500, 90),
+        RoadStretch(420, 60), RoadStretch(250, 140), RoadStretch(530, 40), RoadStretch(2070, 12), RoadStretch(290, 220),
+        RoadStretch(180, 120),
+        RoadStretch(270, 800), RoadStretch(100, 300), RoadStretch(500, 90),
     ),
-    bumps=(Bump(3695, 0.08, 1.6),),
+    bumps=(SpeedBump(3695, 0.08, 1.6),),
     reception=Reception(first_fix_s=8, lost=((114, 118), (165, 190)), corrupted_s=30),
     offset_mps2=(0.21, -0.13, 0.16),
     seed=2009,

@@ -40,7 +40,7 @@ _CUTOFF_HZ, _TAPS, _KAISER = 44.0, 401, 5.0
 
 
 @dataclass(frozen=True)
-class Stretch:
+class RoadStretch:
     """A stretch of road of one roughness: length [m] and degree of roughness Gd(n0) [cm3]."""
 
     length_m: float
@@ -48,7 +48,7 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Bump:
+class SpeedBump:
     """A speed bump (Eq 4.41) that begins ``at_m`` from the start of the drive."""
 
     at_m: float
@@ -76,7 +76,7 @@ class Road:
 
 
 @dataclass(frozen=True)
-class Motion:
+class DriveMotion:
     """A drive on a grid of ``STEP_S``; distance is that of the front axle, over which the GPS
     antenna sits, from the start.
 
@@ -94,7 +94,7 @@ class Motion:
     left_mps2: Array
 
 
-def drive_along(speed_knots: Sequence[tuple[float, float]]) -> Motion:
+def drive_along(speed_knots: Sequence[tuple[float, float]]) -> DriveMotion:
     """Motion by (time [s], speed [m/s]) knots with straight lines between them, corners rounded over a second."""
     knots = np.array(speed_knots, dtype=float)
     time = np.arange(0.0, knots[-1, 0], STEP_S)
@@ -111,13 +111,13 @@ def drive_along(speed_knots: Sequence[tuple[float, float]]) -> Motion:
     north, east = np.cumsum(ahead * np.cos(heading)), np.cumsum(ahead * np.sin(heading))
     lat = _START_LAT_DEG + np.degrees(north / _EARTH_RADIUS_M)
     lon = _START_LON_DEG + np.degrees(east / (_EARTH_RADIUS_M * np.cos(np.radians(_START_LAT_DEG))))
-    return Motion(
+    return DriveMotion(
         time, distance, speed, lat, lon, np.degrees(heading) % 360.0,
         forward_mps2=np.gradient(speed, STEP_S), left_mps2=-(speed**2) * curvature,
     )
 
 
-def build_road(stretches: Sequence[Stretch], bumps: Sequence[Bump], length_m: float, seed: int) -> Road:
+def build_road(stretches: Sequence[RoadStretch], bumps: Sequence[SpeedBump], length_m: float, seed: int) -> Road:
     """One random road whose roughness changes from stretch to stretch; the last stretch goes on to the end.
 
     The slope of a single road of Gd(n0) = 1 cm3 is scaled, over ``TURN_M`` from one roughness to the next, so that
@@ -137,7 +137,7 @@ def build_road(stretches: Sequence[Stretch], bumps: Sequence[Bump], length_m: fl
     return Road(elevation)
 
 
-def body_acceleration(vehicle: Vehicle, road: Road, motion: Motion) -> Array:
+def body_acceleration(vehicle: Vehicle, road: Road, motion: DriveMotion) -> Array:
     """Vertical acceleration of the body at its centre of gravity [m/s2] on the grid of the motion, up positive.
 
     The half car is stepped exactly at 1 kHz with the road as it passes under each wheel, at whatever speed, and then
@@ -158,7 +158,7 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: Motion) -> Array:
     return np.convolve(accel, kernel / kernel.sum(), mode="same")
 
 
-def sensed_acceleration(car: Car, road: Road, motion: Motion) -> Array:
+def sensed_acceleration(car: Car, road: Road, motion: DriveMotion) -> Array:
     """The same for a car with effects: what its sensor would record [m/s2], between the recorder's samples as well."""
     track = Track(SPACING_M, road.elevation_m, -LEAD_M)
     samples = recorded(car, Passage(track, _RECORDER_HZ, motion.distance_m[::_FINE]))

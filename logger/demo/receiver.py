@@ -12,7 +12,7 @@ from operator import xor
 import numpy as np
 import numpy.typing as npt
 
-from logger.demo.motion import Motion
+from logger.demo.motion import DriveMotion
 from logger.units import KMH_MPS, KNOT_MPS
 
 Array = npt.NDArray[np.float64]
@@ -47,7 +47,7 @@ class Reception:
 
 
 def transmit(
-    motion: Motion, start_utc: datetime, reception: Reception, baud: int, rng: np.random.Generator
+    motion: DriveMotion, start_utc: datetime, reception: Reception, baud: int, rng: np.random.Generator
 ) -> tuple[bytes, Array]:
     """Everything the receiver sends during a drive, and when each byte has arrived [s from the start of the drive].
 
@@ -78,7 +78,7 @@ class _Seen:
     altitude_m: float
 
 
-def _observed(motion: Motion, epochs: Array, rng: np.random.Generator) -> Callable[[int], _Seen]:
+def _observed(motion: DriveMotion, epochs: Array, rng: np.random.Generator) -> Callable[[int], _Seen]:
     """The motion at the epochs as the receiver sees it."""
     kept = np.exp(-1.0 / POSITION_MEMORY_S)
     kicks = rng.standard_normal((len(epochs), 2)) * POSITION_ERROR_M

@@ -28,10 +28,10 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.events import GPS
 from logger.demo.motion import (
     STEP_S,
-    Bump,
-    Motion,
+    DriveMotion,
     Road,
-    Stretch,
+    RoadStretch,
+    SpeedBump,
     body_acceleration,
     build_road,
     drive_along,
@@ -75,8 +75,8 @@ class DrivePlan:
     """
 
     speed_knots: Sequence[tuple[float, float]]
-    stretches: Sequence[Stretch]
-    bumps: Sequence[Bump] = ()
+    stretches: Sequence[RoadStretch]
+    bumps: Sequence[SpeedBump] = ()
     reception: Reception = field(default_factory=Reception)
     sensor: str = DEFAULT
     rate_hz: int = 100
@@ -103,7 +103,7 @@ class Drive:
     events: list[Event]
     start_us: int
     utc_offset_us: int
-    motion: Motion
+    motion: DriveMotion
     accel_mps2: Array
     road: Road
 
@@ -156,7 +156,7 @@ def record(drive: Drive, path: str | os.PathLike[str]) -> None:
 
 
 def _sampled(
-    plan: DrivePlan, motion: Motion, accel: Array, rng: np.random.Generator
+    plan: DrivePlan, motion: DriveMotion, accel: Array, rng: np.random.Generator
 ) -> tuple[npt.NDArray[np.int64], Array]:
     """When the sensor is read [us, monotonic] and what it feels then: (n, 3) [m/s2]."""
     count = int((motion.time_s[-1]) * plan.rate_hz)

@@ -16,8 +16,8 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Whitener:
-    """Takes out of each sample what those before it tell of it, and gives the rest in units of its deviation.
+class PredictionWhitener:
+    """Takes out of each sample what those before it predict of it, and gives the rest in units of its deviation.
 
     start    (m, m) lower triangle: the first samples, which have fewer before them
     taps     (m + 1,) all others, the newest sample first
@@ -62,7 +62,7 @@ def burg(parts: Sequence[Array], order: int, floor: float) -> Array:
     return reflections
 
 
-def ladder(reflections: Array, power: float) -> Whitener:
+def ladder(reflections: Array, power: float) -> PredictionWhitener:
     """The predictors of every order up to the last one, from reflection coefficients (m,) and the process's power."""
     m = len(reflections)
     start = np.zeros((m, m))
@@ -71,10 +71,10 @@ def ladder(reflections: Array, power: float) -> Whitener:
         start[k, : k + 1] = taps[::-1] / np.sqrt(power)
         taps = np.append(taps, 0.0) + r * np.append(0.0, taps[::-1])
         power *= 1 - r * r
-    return Whitener(start, taps / np.sqrt(power))
+    return PredictionWhitener(start, taps / np.sqrt(power))
 
 
-def levinson(covariance: Array) -> Whitener:
+def levinson(covariance: Array) -> PredictionWhitener:
     """The predictors of a process with these covariances (m + 1,) at lags 0, 1, 2 ... (Levinson and Durbin)."""
     m = len(covariance) - 1
     start, taps, power = np.zeros((m, m)), np.zeros(m + 1), float(covariance[0])
@@ -85,4 +85,4 @@ def levinson(covariance: Array) -> Whitener:
         r = -float(newest_last @ covariance[1 : k + 2]) / power
         taps[1 : k + 2] += r * start[k, : k + 1] * np.sqrt(power)
         power *= 1 - r * r
-    return Whitener(start, taps / np.sqrt(power))
+    return PredictionWhitener(start, taps / np.sqrt(power))

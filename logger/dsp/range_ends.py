@@ -22,7 +22,7 @@ from logger.dsp.stretches import stretches_inside
 Array = npt.NDArray[np.float64]
 
 FALSE_ALARM = 1e-4
-"""Most probability with which an end is told of where there is none."""
+"""Most probability of reporting an end where there is none."""
 JUMP = 6.0  # steps
 _LEAST_SAMPLES = 3
 

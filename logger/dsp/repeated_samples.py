@@ -1,16 +1,18 @@
-"""Samples that were written more often than they were taken, told from a coarse sensor that rightly stays on one code.
+"""Samples that were written more often than they were taken, distinguished from a coarse sensor that rightly stays on
+one code.
 
 Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that no
 car makes stand between the held values, and the ride reads too rough. A sensor with coarse steps repeats values too,
-for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not tell one from the other.
+for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not distinguish one from the
+other.
 
 Solution: where a sensor moves by several steps before and after, a sample at which it hardly moves is a turning point,
 and there a move by one or two steps either way is as likely as none: the density of moves is flat over so few steps.
 So among the stretches of small moves between two large ones (``SMALL`` and ``LARGE`` steps) at most about one in five
 stands still, on all axes at once. In a held record nearly all of them do. That so many more than half of them do has,
-without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23, 1952): repeats are told
-of where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis are left out: there a sensor
-may stand at the end of its range. What never moves by several steps between two samples is not judged.
+without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23, 1952): repeats are
+reported where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis are left out: there a
+sensor may stand at the end of its range. What never moves by several steps between two samples is not judged.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ class Repeats:
     @property
     def complaint(self) -> str:
         """Words for who refuses such a record."""
-        return f"expected every sample to be taken anew, found {self.share:.0%} that repeat the one before"
+        return f"expected every sample to be a new measurement, found {self.share:.0%} that repeat the one before"
 
 
 def resolution(values: Array) -> float:
@@ -87,7 +89,7 @@ def fresh_samples(samples: Array) -> Bools:
 
 
 def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
-    """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance, which
+    """Repeated samples (n, axes), all axes at once; None where there are none beyond chance, which
     gives some with a probability of ``false_alarm`` at most."""
     fresh = fresh_samples(samples)
     share = 1.0 - float(fresh.mean())

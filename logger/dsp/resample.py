@@ -122,7 +122,7 @@ class GridResampler:
         return runs + self._advance(ended=False)
 
     def flush(self) -> list[GridRun]:
-        """The end of the current run, up to its last reading. What is pushed later starts anew."""
+        """The end of the current run, up to its last reading. What is pushed later starts a new run."""
         runs = self._advance(ended=True)
         self._held = _NO_READINGS
         self._made = 0
@@ -260,7 +260,7 @@ class Decimator:
         return ready + self._advance(run.values, np.stack([run.clipped, run.bridged]))
 
     def flush(self) -> list[GridRun]:
-        """The end of the current run. What is pushed later has to start anew."""
+        """The end of the current run. What is pushed later has to start a new run."""
         if self._last is None:
             return []
         rest = self._advance(np.full(self._half, self._last), np.zeros((2, self._half), dtype=np.bool_))

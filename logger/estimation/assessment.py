@@ -18,14 +18,14 @@ from logger.estimation.batch import (
     Windows,
     estimated,
     exact_iri,
-    laid_anew,
     learnt_noise,
     least_errors,
     local_level,
+    monotonic_distance,
     on_grid,
     score,
 )
-from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.road_profile import RoadProfile
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -42,7 +42,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 MIX_IRI = tuple(range(1, 11))
-"""Roads over which an R2 of the limit is told, as many of each [m/km]."""
+"""Roads over which the limit's R2 is computed, as many of each [m/km]."""
 BACK_M = 1.0
 """A distance may go back so far, as one that is corrected by GPS does."""
 SPEED_CLASS_MPS = 5.0
@@ -64,13 +64,13 @@ class Unusable(ValueError):
 class Estimable:
     """A drive ready for the estimator, arrays (n,): samples at ``rate_hz``, distances that do not decrease.
 
-    relaid_m    the farthest that a distance was moved to make them so [m]; 0 where they are the file's
+    moved_m    the farthest that a distance was moved to make them so [m]; 0 where they are the file's
     """
 
     rate_hz: float
     accel_z_mps2: Array
     distance_m: Array
-    relaid_m: float
+    moved_m: float
 
 
 def estimable(
@@ -84,8 +84,8 @@ def estimable(
     _check_speed(rate_hz, speed_mps, distance_m)
     if (np.diff(distance_m) >= 0).all():
         return Estimable(rate_hz, accel_z_mps2, distance_m, 0.0)
-    relaid = laid_anew(distance_m, speed_mps, rate_hz)
-    return Estimable(rate_hz, accel_z_mps2, relaid, float(np.abs(relaid - distance_m).max()))
+    monotonic_m = monotonic_distance(distance_m, speed_mps, rate_hz)
+    return Estimable(rate_hz, accel_z_mps2, monotonic_m, float(np.abs(monotonic_m - distance_m).max()))
 
 
 def _check_way(distance_m: Array, longest_m: float) -> None:
@@ -114,7 +114,7 @@ def _check_speed(rate_hz: float, speed_mps: Array, distance_m: Array) -> None:
 
 @dataclass(frozen=True)
 class Assessment:
-    """All there is to tell of a drive's road.
+    """All results on a drive's road.
 
     exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
     compared                whether there is a profile to compare with
@@ -131,7 +131,7 @@ class Assessment:
     exact_m_per_km: Array
     compared: bool
     least_error_m_per_km: Array
-    limits: Limits
+    limits: ErrorBound
     road: RoadProfile | None
     noise: NoiseBelief | None
     learns_noise: bool = False
@@ -165,7 +165,7 @@ def assess(
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     if track is not None:
         exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
-    limits = Limits(car, gridded, window_m)
+    limits = ErrorBound(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
                       least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise)

@@ -11,7 +11,7 @@ from math import ceil, exp, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.error_bound import Limits
+from logger.estimation.error_bound import ErrorBound
 from logger.estimation.noise_belief import UNKNOWN_LOG_STD, NoiseBelief
 from logger.estimation.road_profile import RoadProfile, road_profile
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -42,7 +42,7 @@ class Windows:
     speed_mps          (n,) mean speed over each [m/s]
     iri_m_per_km       (n,) NaN where it is not known, ``flags`` say why
     iri_std_m_per_km   (n,) its standard error, NaN likewise
-    resolved           (n,) share of the variance of the IRI's slope that the readings tell
+    resolved           (n,) share of the variance of the IRI's slope that the readings resolve
     flags              n sets of words
     """
 
@@ -74,7 +74,7 @@ def on_grid(
     return Sensor(noise_mps2, 0.0), readings, np.interp(place, np.arange(len(distance_m)), distance_m)
 
 
-def laid_anew(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
+def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
     """Distances (n,) [m] by the speed (n,) [m/s], not decreasing, that keep to those given: the integral of the speed
     plus the moving mean over 2 s of what they differ from it."""
     driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed_mps[1:] + speed_mps[:-1]))]) / rate_hz
@@ -114,7 +114,7 @@ def learnt_noise(
     car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
 ) -> NoiseBelief | None:
     """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it; None where the
-    drive tells nothing of it.
+    drive shows nothing of it.
 
     What was found on the way may come from far off, so the drive is gone through again from there.
     """
@@ -203,7 +203,7 @@ def local_level(iri_m_per_km: Array, window_m: float) -> Array:
     return np.where(count > 0, (sums[high] - sums[low]) / np.maximum(count, 1), np.nan)
 
 
-def least_errors(limits: Limits, speed_mps: Array, level_m_per_km: Array) -> Array:
+def least_errors(limits: ErrorBound, speed_mps: Array, level_m_per_km: Array) -> Array:
     """R.m.s. error (n,) of the best possible IRI at these speeds on roads of these levels, both (n,), waviness 2.
 
     NaN where the level is not known; no road is smoother than ``_SMOOTHEST_M_PER_KM``.

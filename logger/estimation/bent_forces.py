@@ -4,8 +4,8 @@ Problem: a linear car is right on the average of a road (``vehicle.linearise``),
 than bump has no linear stand-in at all, and friction pushes the more evenly the harder a stretch shakes. Solution: once
 a block's road is known, so is how the suspensions moved; what the laws answer to that, less what the linear ones do, is
 a force, and what a force does to the reading is linear again. Its share is taken off the readings, and the road is
-found anew. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds off
-the corners that would keep the two from coming to rest.
+solved again. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds
+off the corners that would keep the two from coming to rest.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class BentForces:
         do besides, because the motion is not known exactly [(m/s2)2].
 
         under       (axles, f) rfft of the elevations under the axles [m]
-        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
+        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings resolve of
+                    it
         """
         motions = np.array([np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
                             for gain in (self._travel, self._rate, self._own_rate)])
@@ -79,8 +80,7 @@ class BentForces:
 def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> Array:
     """The mean force (t,) [N] of a corner's laws, less that of their stand-ins, over what its motion may have been:
     travel, rate and the damper's own rate (3, t) within standard errors (3,)."""
-    springs, dampers, beside = _parts(laws, slopes, motion, std)
-    force = np.asarray(_SHARE @ (springs + dampers + beside))
+    force = np.asarray(_SHARE @ sum(_parts(laws, slopes, motion, std)))
     if laws.dry_friction_n:
         share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
         # nearly its mean over a normal distribution, which is an erf
@@ -90,20 +90,21 @@ def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -
 
 def _variance(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> float:
     """The variance [N2] of that force, over what its motion may have been, on the average."""
-    springs, dampers, beside = _parts(laws, slopes, motion, std)
+    *parts, beside = _parts(laws, slopes, motion, std)
     if laws.dry_friction_n:
         beside = beside + laws.dry_friction_n * np.sign(motion[1] + std[1] * _AT[:, None])
-    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (springs, dampers, beside))
+    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (*parts, beside))
 
 
-def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> tuple[Array, Array, Array]:
-    """Forces (p, t) of springs, dampers and what lies beside them, less those of their stand-ins, without dry friction,
-    at the points of a normal distribution."""
+def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> list[Array]:
+    """Forces (p, t) of dampers, of springs if any push by more than the travel, and last of what lies beside them, less
+    those of their stand-ins, without dry friction, at the points of a normal distribution."""
     travel, rate, own_rate = motion[:, None] + std[:, None, None] * _AT[:, None]
-    at = slopes.rest_m + travel
-    springs = sum((law(at) for law in laws.springs), -slopes.spring_n_per_m * travel)
-    dampers = laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate
+    parts = [laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate]
+    if laws.springs or slopes.spring_n_per_m:
+        at = slopes.rest_m + travel
+        parts.append(np.asarray(sum((law(at) for law in laws.springs), -slopes.spring_n_per_m * travel)))
     # travel and rate of one instant are not correlated: what asks for both is asked at the mean travel
     middle = np.broadcast_to(slopes.rest_m + motion[0], rate.shape)
     beside = sum((law(middle, rate) for law in laws.others), -slopes.beside_n_s_per_m * rate)
-    return springs, dampers, beside
+    return [*parts, np.asarray(beside)]

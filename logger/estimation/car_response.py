@@ -38,6 +38,7 @@ class CarResponse:
         self._car = car
         self._off = tuple(off)
         self._powers: dict[int, Array] = {}
+        self._apart: tuple[float, Array] | None = None
         self._changes: dict[int, ComplexArray] = {}
         self.behind_m, self._axle = np.unique(car.structure.behind_m, return_inverse=True)
         self.contact_patch_m = car.structure.contact_patch_m
@@ -51,10 +52,13 @@ class CarResponse:
 
     def power_apart(self, speed_mps: float) -> Array:
         """Sum over the axles of each one's own squared gain, at ``WAVE_NUMBERS_CPM`` [1/s4], where ``power`` is the
-        square of their sum: where both axles' shares cancel, what a wrong model leaves is as large as they are."""
+        square of their sum: where both axles' shares cancel, what a wrong model leaves is as large as they are. The
+        last one is kept."""
+        if self._apart is not None and self._apart[0] == speed_mps:
+            return self._apart[1]
         gain = np.abs(self.by_axle(WAVE_NUMBERS_CPM * speed_mps)) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
-        apart: Array = (gain**2).sum(axis=0)
-        return apart
+        self._apart = speed_mps, (gain**2).sum(axis=0)
+        return self._apart[1]
 
     def power(self, speed_mps: float) -> Array:
         """Squared gain from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.

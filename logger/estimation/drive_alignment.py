@@ -1,4 +1,4 @@
-"""A drive's readings and fixes, as they come, into what they tell of the receiver's delay and the sensor's mounting.
+"""A drive's readings and fixes, as they come, into what they show of the receiver's delay and the sensor's mounting.
 
 Readings are kept for a block of ``BLOCK_S`` only; a block begins with a fix and is done once the readings are
 ``WAIT_S`` past its end, for fixes come late. How readings and fixes are split between calls changes nothing.
@@ -121,7 +121,7 @@ class DriveAlignment:
         self._forget(min(end_s, float(time_s[-1]) - WAIT_S))
 
     def _end_part(self, end_s: float) -> None:
-        """Compare a part with what was before; a sensor that has moved begins anew."""
+        """Compare a part with what was before; after a sensor has moved, start over."""
         forward, std_rad = forward_of(self._part, self._known)
         now = sitting(np.array(self._means), forward, std_rad)
         self._means, self._part = [], Information.none()

@@ -7,8 +7,8 @@ Solution. The Golden Car's slope y on a random road is a Gaussian process. The b
 Wiener filter's mean, which leaves an error independent of it; its best value for the window's IRI is the mean of |y|
 over what it knows. The variance of that value from window to window has a closed form. Two draws y and y' from what is
 known are each as likely as the truth, and E[E(|y(x)| | readings) E(|y(x + l)| | readings)] = E |y(x) y'(x + l)|. They
-are jointly Gaussian, with the covariance of what the readings tell: its spectrum is that of y times the share resolved.
-For two Gaussian variables of variance V and correlation r
+are jointly Gaussian, with the covariance of what the readings resolve: its spectrum is that of y times the share
+resolved. For two Gaussian variables of variance V and correlation r
 
     cov(|a|, |b|) = 2 V / pi (sqrt(1 - r^2) + r asin(r) - 1)
 
@@ -62,7 +62,7 @@ class Limit:
         return 1 - (self.std_m_per_km / self.spread_m_per_km) ** 2
 
 
-class Limits:
+class ErrorBound:
     """The limit for a car with its sensor's place, a sensor on the grid of 100 Hz and a window [m]."""
 
     def __init__(self, car: KnownCar, sensor: Sensor, window_m: float) -> None:
@@ -108,7 +108,7 @@ class Limits:
 
 
 def pooled_r2(limits: Sequence[Limit]) -> float:
-    """R2 over as many windows of each kind, the mean of each kind being known: rough and smooth roads are told apart
+    """R2 over as many windows of each kind, the mean of each kind being known: rough and smooth roads are distinguished
     easily, so it is above that of each."""
     squared_error = np.mean([one.std_m_per_km**2 for one in limits])
     variance = np.mean([one.spread_m_per_km**2 for one in limits]) + np.var([one.iri_m_per_km for one in limits])

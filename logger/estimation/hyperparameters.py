@@ -1,8 +1,8 @@
 """Empirical Bayes: the road's spectrum and the sensor's noise, learnt from the solution of a stretch.
 
 The evidence (marginal likelihood) of a Gaussian model is largest where each wave's estimated power equals the share
-of its prior variance that the readings tell: sum |u|^2 = sum g / (1 + g) (MacKay 1992). Its slope and curvature in the
-level and the waviness are such sums, so one scoring step per stretch follows both. The noise follows from the
+of its prior variance that the readings resolve: sum |u|^2 = sum g / (1 + g) (MacKay 1992). Its slope and curvature in
+the level and the waviness are such sums, so one scoring step per stretch follows both. The noise follows from the
 residuals over the degrees of freedom that the road left them.
 """
 
@@ -49,7 +49,7 @@ def learnt(
     """One scoring step for level and waviness.
 
     power         (k,) of each wave of the white innovations, where 1 is expected of a wave that is fully resolved
-    resolved      (k,) share of each wave that the readings tell where the road was read
+    resolved      (k,) share of each wave that the readings resolve where the road was read
     seen_share    of the distance grid, where the car was read
     before        the spectrum of the stretch before; None: there was none
     """
@@ -90,7 +90,7 @@ def with_noise(belief: Belief, residual_mps2: Array, weight: Array, resolved_wav
 
 
 def noise_slope(residual_mps2: Array, weight: Array, resolved_waves: float) -> tuple[float, float]:
-    """Slope of the log evidence in the log noise variance, and the readings that were free to tell of it (half of them
+    """Slope of the log evidence in the log noise variance, and the readings that were free to show it (half of them
     are its curvature), 0 where there were too few; from the typical second: a pothole that is not explained yet is no
     noise.
 

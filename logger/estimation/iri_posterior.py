@@ -1,9 +1,10 @@
 """From an estimated road to its IRI: what is known of the Golden Car's slope, and the mean of its absolute value.
 
-An estimated road is too smooth: what the readings do not tell is missing in it. The slope of the Golden Car at a place
-is known with a mean and a variance, and the IRI asks for the mean of its absolute value, which the variance adds to
-(folded normal distribution). The error of a window follows from the covariance of those absolute values. For a steady
-speed both are integrals over wave numbers: of the road's spectrum S, gain H and noise N, S N / (|H|^2 S + N) is left.
+An estimated road is too smooth: what the readings do not resolve is missing in it. The slope of the Golden Car at a
+place is known with a mean and a variance, and the IRI asks for the mean of its absolute value, which the variance adds
+to (folded normal distribution). The error of a window follows from the covariance of those absolute values. For a
+steady speed both are integrals over wave numbers: of the road's spectrum S, gain H and noise N, S N / (|H|^2 S + N) is
+left.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from logger.estimation.car_response import (
 )
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
 from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.steady_motion import SteadyMotion
 from logger.roads.iri import PER_KM
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +40,7 @@ def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> floa
 
 
 def resolved_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
-    """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings tell."""
+    """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings resolve."""
     signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
     return signal / (signal + noise_psd)
 
@@ -58,10 +60,12 @@ def vehicle_error_variance(
     return density * rate_hz / (2 * speed_mps)
 
 
-def acceleration_variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> float:
-    """Variance of the acceleration itself once the readings are known [(m/s2)2]."""
-    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
-    return float((signal * noise_psd / (signal + noise_psd)) @ WAVE_NUMBER_STEPS_CPM)
+def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
+                  ) -> SteadyMotion:
+    """What such a road makes of the car, at the frequencies of ``count`` readings (even)."""
+    per_hz = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM) / speed_mps
+    f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+    return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ class SlopeKnowledge:
 
     @property
     def resolved(self) -> float:
-        """Share of the variance that the readings tell."""
+        """Share of the variance that the readings resolve."""
         return 1 - self.left / self.variance
 
 

@@ -2,14 +2,15 @@
 
 Problem. One level for a block of 20 s makes too much of a smooth stretch behind a rough patch, and too little of a
 pothole on a smooth road. Solution. The white innovations v of the road have, at each point, a variance d of their own
-about 1. From the estimate of v, d is the local mean of v^2 over the local share of it that the readings tell (MacKay
-1992), with the weight of ``_COMMON`` more points that say 1: where the readings tell little, d stays at 1, and a
+about 1. From the estimate of v, d is the local mean of v^2 over the local share of it that the readings resolve (MacKay
+1992), with the weight of ``_COMMON`` more points that say 1: where the readings show little, d stays at 1, and a
 Gaussian road keeps it near 1. It is followed by place, from block to block.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +71,7 @@ class LocalRoughness:
         self._known = RelativeVariance(np.exp(log_new), self._log_error(log_new, weight, seen > 0))
 
     def _resolved_by_point(self, gain: Array, count: int) -> Array:
-        """Share of a point's innovation that the readings tell, for each d of the table: the mean over all waves."""
+        """Share of a point's innovation that the readings resolve, for each d of the table: the mean over all waves."""
         strength = np.exp(_LOG_TABLE)[:, None] * gain
         share: Array = (strength / (1 + strength)).sum(axis=1) * 2 / count
         return share
@@ -86,13 +87,18 @@ class LocalRoughness:
 
     def _smoothed(self, row: Array) -> Array:
         """Sum over the neighbours, weighted with a Gaussian of ``_REACH_M``, periodic as the grid is."""
-        lag = np.minimum(np.arange(len(row)), len(row) - np.arange(len(row)))
-        kernel = np.fft.rfft(np.exp(-0.5 * (lag / self._reach) ** 2))
-        return np.maximum(np.fft.irfft(np.fft.rfft(row) * kernel, len(row)), 0.0)
+        return np.maximum(np.fft.irfft(np.fft.rfft(row) * _neighbours(len(row), self._reach), len(row)), 0.0)
+
+
+@lru_cache(maxsize=32)
+def _neighbours(count: int, reach: float) -> npt.NDArray[np.complex128]:
+    """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
+    lag = np.minimum(np.arange(count), count - np.arange(count))
+    return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))
 
 
 def mean_resolved(gain: Array, variance: Array) -> Array:
-    """Share of each wave that the readings tell, mean over points of relative variance d (n,)."""
+    """Share of each wave that the readings resolve, mean over points of relative variance d (n,)."""
     if not len(variance):
         return gain / (1 + gain)
     logs = np.log(variance)

@@ -1,4 +1,5 @@
-"""How a sensor sits in the car, from what it feels while driving: gravity tells up, braking tells forward.
+"""How a sensor sits in the car, from what it feels while driving: gravity shows which way is up, braking shows which
+way is forward.
 
 Problem: a sensor is bolted on tilted, the wrong axis is named in the settings, a bracket comes loose: the roughness is
 wrong and nothing shows it. Solution: the mean of what is felt over minutes of driving is gravity, for acceleration,

@@ -2,8 +2,8 @@
 
 Problem. No data sheet states the noise of a BMA220, and an estimate with a noise half as large as it is makes a smooth
 road rough. Solution. Stretches of a drive each say how probable a noise would have made their readings
-(``noise_evidence``), for all noises of a grid: readings that never leave a step rule out the large ones and tell small
-ones not apart, which no slope and curvature at one noise can say. What was believed before is one more stretch.
+(``noise_evidence``), for all noises of a grid: readings that never leave a step rule out the large ones and distinguish
+small ones not apart, which no slope and curvature at one noise can say. What was believed before is one more stretch.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ UNKNOWN_LOG_STD = 1.0
 _MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 0.0065
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
 _FORGOTTEN_PER_STRETCH = 0.005
-_FORGOTTEN_PER_LOG = 5.0  # what was told about another noise is no longer quite true of this one
+_FORGOTTEN_PER_LOG = 5.0  # what was learnt of another noise is no longer quite true of this one
 _LEAST_SHARE = 0.05
 _EXPECTED_STRETCHES = 4.0  # count as having scattered as they should
 _SPACING, _REACH = 0.1, 35  # of the grid in the log noise: a factor of 33 up and down
@@ -64,7 +64,7 @@ class NoiseBelief:
         return NoiseBelief(self.log_mean - 0.5 * log(share), self.log_std * share)
 
     def without_rounding(self, step_mps2: float) -> NoiseBelief:
-        """Back from ``with_rounding``; a noise much below a step could not be told from its rounding."""
+        """Back from ``with_rounding``; a noise much below a step could not be distinguished from its rounding."""
         share = max(1 - step_mps2**2 / 12 / self.noise_rms_mps2**2, _LEAST_SHARE)
         return NoiseBelief(self.log_mean + 0.5 * log(share), min(self.log_std / share, UNKNOWN_LOG_STD))
 

@@ -9,7 +9,7 @@ probability
 Where the propagation has settled, the slope of its log evidence in a parameter of the likelihood is the sum of the
 slopes of log Z with m and v held (Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.6 and 5.5.2): at
 the noise that the propagation was made with, the sum of log Z has the right slope, and it says what becomes of it far
-from there, where a slope alone would lead astray. As much as the noise moves, the next stretches are solved anew.
+from there, where a slope alone would mislead. The next stretches are solved again with the new noise.
 """
 
 from __future__ import annotations

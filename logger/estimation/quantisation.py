@@ -14,7 +14,6 @@ on one side only.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,27 +21,28 @@ import numpy.typing as npt
 
 from logger.estimation.normal_distribution import within
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.steady_motion import SteadyMotion
 
 Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
-_NEIGHBOURS = 4.0  # samples: an acceleration and those about it go together
-_TRIALS, _EVENING_ROUNDS = 10, 4
+_TRIALS, _EVENING_ROUNDS = 12, 4
+_LEAST_WEIGHT = 1e-9  # among the others, where none tells of another
 _LEAST_OTHERS = 1e-3  # of an even reading's information
 _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
 
 
 @dataclass(frozen=True)
-class Readings:
+class GaussianReadings:
     """As Gaussian readings: values [m/s2] and variances [(m/s2)2], both (t,)."""
 
     value_mps2: Array
     variance: Array
 
 
-def first_guess(reading_mps2: Array, sensor: Sensor) -> Readings:
+def first_guess(reading_mps2: Array, sensor: Sensor) -> GaussianReadings:
     """Rounding as if it were noise."""
-    return Readings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
+    return GaussianReadings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
 
 
 def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array, Array]:
@@ -60,36 +60,46 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
-def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
-    """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
-    variance (t,) of even readings that tell as much [(m/s2)2].
+def cavity(motion: SteadyMotion, variance: Array) -> Array:
+    """Variance (t,) that all other readings leave of each acceleration, where some say much and some little
+    [(m/s2)2]; ``variance`` (t,) is that of the readings.
 
-    left        variance that even readings of a variance leave of each acceleration, their own included
-    variance    (t,) of the readings as they are
-
-    The mean of their precisions would make too much of the precise ones: two of them side by side tell little more than
+    The mean of their precisions would make too much of the precise ones: two of them side by side say little more than
     one. Even readings that stand for those about a place have the variance e for which a reading put among the others
     weighs the same on the mean, 1 / (others + e) = mean of 1 / (others + variance).
     Source: the coherent potential approximation (Soven, Physical Review 156, 1967), with ``variance`` as disorder.
+
+    The mean is over the others alone, each as much as it tells: where C is the covariance of what is left open, the
+    derivative of what is left at t in the precision of the reading at s is -C(t - s)^2.
     """
-    lag = np.minimum(np.arange(len(variance)), len(variance) - np.arange(len(variance)))
-    kernel = np.exp(-0.5 * (lag / _NEIGHBOURS) ** 2)
-    about = np.fft.rfft(kernel / kernel.sum())
+    covariance = motion.covariance_left(1 / float((1 / variance).mean()))
+    kernel = np.maximum((covariance / covariance[0]) ** 2, _LEAST_WEIGHT)
+    kernel[0] = 0.0
+    about = np.fft.rfft(kernel / kernel.sum()).real
 
     def mean(row: Array) -> Array:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
 
     trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    log_left = np.log([left(trial) for trial in trials.tolist()])
+    whole = np.array([1 / motion.remaining_variance(trial) for trial in trials.tolist()])
+    log_others = -np.log(np.maximum(whole - 1 / trials, _LEAST_OTHERS / trials))
     even = 1 / mean(1 / variance)
     for _ in range(_EVENING_ROUNDS):
-        whole = np.exp(-np.interp(np.log(even), np.log(trials), log_left))
-        others = 1 / np.maximum(whole - 1 / even, _LEAST_OTHERS / even)
+        others = np.exp(np.interp(np.log(even), np.log(trials), log_others))
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
-    return others, even
+    return others
 
 
-def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
+def even_variance(motion: SteadyMotion, others: Array, variance: Array) -> float:
+    """Variance of even readings that take as many degrees of freedom as these (n,), whose ``cavity`` is ``others``: of
+    each, the share that it has in what is known of its own acceleration."""
+    taken = float((others / (others + variance)).mean())
+    trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
+    by_trial = [motion.resolved_per_reading(trial) for trial in trials.tolist()]
+    return float(np.exp(np.interp(-taken, -np.array(by_trial), np.log(trials))))
+
+
+def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
     """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
     taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)
     others = 1 / fitted_variance - taken_out
@@ -97,8 +107,9 @@ def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array |
 
 
 def improved(
-    readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float, sensor: Sensor
-) -> Readings:
+    readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
+    sensor: Sensor
+) -> GaussianReadings:
     """One round.
 
     low, high          (t,) bounds of each reading [m/s2]
@@ -114,4 +125,4 @@ def improved(
     value = (mean / variance - expected / spread) / precision
     new = 1 / (1 / precision + noise)
     total = (1 - _KEPT) * new + _KEPT * own
-    return Readings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)
+    return GaussianReadings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

@@ -18,7 +18,7 @@ by repeated weighting). All but d is linear, so a block is
     A(d) = X' P X,  b(d) = X' P z        X(d): rows I(t_k - d); P: inverse covariance of B + e, without the line [2]
 
 at each delay of a grid, and blocks and drives add up: memory is bounded. For a delay the best w stands upright to
-gravity, and leaves the misfit J(d) = c - b' A^-1 b: its lowest point is the delay, its curvature tells the error.
+gravity, and leaves the misfit J(d) = c - b' A^-1 b: its lowest point is the delay, its curvature gives the error.
 The noise is not as assumed, so the error is also taken from what happens when a share of the blocks is left out
 (jackknife [3]); the larger one counts. The strengths of B and e are chosen out of ``STRENGTHS`` by likelihood, as
 blocks come.
@@ -56,7 +56,7 @@ SLOWEST_MPS = 1.0
 """Slower than this receivers hold their speed at zero, and have no sign for a car that backs up: such a fix counts only
 where those before and after it say as well that the car stands."""
 EARLY_BLOCKS = 8
-"""So many are kept, and weighed once more when all of them have told the delay: at first it is a guess."""
+"""So many are kept, and weighed once more when all of them have given the delay: at first it is a guess."""
 THINNED_S = 0.5
 """Fixes that come faster than this are averaged: their noise is not independent."""
 LONGEST_HOLE_S = 0.1
@@ -138,8 +138,8 @@ class Belief:
 
 @dataclass(frozen=True)
 class BlockInformation:
-    """What one block tells: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,); and what
-    it was made of: ``rows`` X (d, k, 3), z (k,), t (k,)."""
+    """Information of one block: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,); and
+    what it was made of: ``rows`` X (d, k, 3), z (k,), t (k,)."""
 
     a: Array
     b: Array
@@ -150,7 +150,7 @@ class BlockInformation:
 
 
 def block_information(known: Information, stretch: Stretch) -> BlockInformation | None:
-    """What a stretch tells, its fixes weighed by what is known. None: the car hardly moves, or the readings have a
+    """Information of a stretch, its fixes weighed by what is known. None: the car hardly moves, or the readings have a
     hole."""
     rows = _rows(stretch)
     return _weighed(known, rows, stretch.accel.mean(axis=0)) if len(rows[1]) >= FEWEST_FIXES else None
@@ -171,14 +171,14 @@ def _weighed(known: Information, rows: Rows, mean: Array) -> BlockInformation:
 
 
 def with_block(known: Information, block: BlockInformation) -> Information:
-    """Add what a block tells."""
+    """Add the information of a block."""
     known = replace(_added(known, block), early=(*known.early, block) if known.blocks < EARLY_BLOCKS else ())
     if known.blocks != EARLY_BLOCKS:
         return known
-    anew = Information.none()
+    again = Information.none()
     for early in known.early:
-        anew = _added(anew, _weighed(known, early.rows, early.mean))
-    return anew
+        again = _added(again, _weighed(known, early.rows, early.mean))
+    return again
 
 
 def _added(known: Information, block: BlockInformation) -> Information:
@@ -201,7 +201,7 @@ def estimate(known: Information) -> DelayEstimate:
     others = [_lowest(a - known.a[g], b - known.b[g], known.gravity) for g in range(GROUPS) if known.c[g] > 0]
     left_out = [other for other in others if other is not None]
     if len(left_out) < len(others):
-        return DelayEstimate(reason="too little braking and accelerating to tell the delay")
+        return DelayEstimate(reason="too little braking and accelerating to estimate the delay")
     share = (len(left_out) - 1) / len(left_out)
     jackknife_s = sqrt(share * sum((other[0] - delay_s) ** 2 for other in left_out))
     unsure = sqrt(1 + 2 / max(len(left_out) - 3, 1))  # as wide as Student's t: the error itself is from few groups

@@ -15,14 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
-from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
+from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, residual_evidence
 from logger.estimation.quantisation import (
-    Readings,
+    GaussianReadings,
     bounds,
     cavity,
+    even_variance,
     first_guess,
     improved,
     unexplained,
@@ -42,9 +43,9 @@ _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 _MOST_DEVIATIONS = 3.0
-_SETTLED_SAMPLES = 1000  # behind those that tell of the noise: their bounds have gone through ten rounds by then
+_SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
 # Solved with no less where the noise is learnt: below, a few rounds do not settle, and what they say of a smaller noise
-# leads astray (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
+# misleads (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
 _LEAST_SHARE_OF_STEP = 0.07
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
@@ -83,12 +84,12 @@ class FollowedRoad:
             self._learner = NoiseLearner(noise.with_rounding(rounding_mps2), usual.with_rounding(rounding_mps2),
                                          self._step_mps2 - rounding_mps2)
             self._take_over()
-        self.start_anew()
+        self.restart()
 
-    def start_anew(self) -> None:
+    def restart(self) -> None:
         """Another drive begins: spectrum and noise are taken along, all that belongs to places is not."""
         self._begun = False
-        self._gaussian: Readings | None = None
+        self._gaussian: GaussianReadings | None = None
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
@@ -138,7 +139,7 @@ class FollowedRoad:
         if self._gaussian is None:
             return
         guess = first_guess(fresh.reading_mps2, self._sensor)
-        self._gaussian = Readings(
+        self._gaussian = GaussianReadings(
             np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
             np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
         )
@@ -151,8 +152,9 @@ class FollowedRoad:
     def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
                ) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
-        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
+        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved, which
+        share rounds and steps."""
+        rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
@@ -182,9 +184,10 @@ class FollowedRoad:
         typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain = solution.gain
         if self._is_coarse:
-            others, even = self._cavity(block, variance)
+            motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
+            others = cavity(motion, variance)
             if moving.any():
-                uneven, typical = typical, 1 / float((1 / even[moving]).mean())
+                uneven, typical = typical, even_variance(motion, others[moving], variance[moving])
                 gain = gain * (uneven / typical)
 
         innovations = np.fft.irfft(solution.waves, block.count)
@@ -207,15 +210,16 @@ class FollowedRoad:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
         return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, typical)
 
-    def _as_gaussian(self, samples: Samples) -> Readings:
+    def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
             noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
-            return Readings(samples.reading_mps2, np.full(len(samples), noise))
+            return GaussianReadings(samples.reading_mps2, np.full(len(samples), noise))
         return first_guess(samples.reading_mps2, self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
-        self, readings: Readings, samples: Samples, read: Bools, solution: Solution, others: Array, usable: Bools | None
-    ) -> Readings:
+        self, readings: GaussianReadings, samples: Samples, read: Bools, solution: Solution, others: Array,
+        usable: Bools | None
+    ) -> GaussianReadings:
         """Another round for the bounds, with the variance (t,) that all other readings leave of each acceleration. The
         noise is learnt of the readings that are ``usable`` (t,), if any."""
         low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
@@ -225,16 +229,6 @@ class FollowedRoad:
             expected = without_own(readings, solution.fitted_mps2, fitted_variance)
             self._learn_from_bounds(*expected, low, high, usable)
         return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
-
-    def _cavity(self, block: Block, variance: Array) -> tuple[Array, Array]:
-        """``cavity`` of a block whose readings have variances (t,)."""
-        speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
-
-        def left(even: float) -> float:
-            noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
-            return acceleration_variance_left(block.car, speed_mps, spectrum, noise_psd)
-
-        return cavity(left, variance)
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""

@@ -54,12 +54,12 @@ class RideKnowledge:
 
     @property
     def resolved(self) -> float:
-        """Share of the variance that the readings tell."""
+        """Share of the variance that the readings resolve."""
         return 1 - self.left / self.variance
 
 
 @dataclass(frozen=True)
-class Place:
+class RidePlace:
     """What is known where a ride was felt.
 
     speed_mps        steady; ``variance`` of a reading there, as the solution took it [(m/s2)2]
@@ -113,7 +113,7 @@ class RidePosterior:
             accel_variance=float(ride.sum()) * step_hz,
         )
 
-    def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: Place) -> RideSums | None:
+    def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: RidePlace) -> RideSums | None:
         """What the figures of the samples ``inside`` (t,) of a block are made of; None where the ride hides between two
         steps.
 
@@ -168,7 +168,7 @@ def _deviation(knows: RideKnowledge, unread: Bools) -> Array:
 
 def _rough_log_std(accel_variance: float, sensor: Sensor) -> float:
     """Share by which a ride may be off because noise and ride blur the steps little: how rough the road is and where
-    gravity lies within a step are then hard to tell apart, and the propagation of bounds is rough."""
+    gravity lies within a step are then hard to distinguish, and the propagation of bounds is rough."""
     noise_steps = sensor.noise_rms_mps2 / sensor.step_mps2
     blur_steps = sqrt(accel_variance + sensor.noise_rms_mps2**2) / sensor.step_mps2
     return _ROUGH_SHARE / (noise_steps * blur_steps**3)

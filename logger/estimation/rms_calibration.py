@@ -51,7 +51,7 @@ _SHARE_OF_LOAD = {"quarter_car": 0.25, "half_car": 0.5, "full_car": 1.0}
 
 
 @dataclass(frozen=True)
-class Settings:
+class CalibrationSettings:
     """What a calibration depends on beside vehicle and recorder.
 
     speeds_mps    steady speeds (10, 20 ... 70 mph as in 6.3) [m/s]
@@ -76,7 +76,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Line:
+class RmsLine:
     """A line through the origin, y = slope x, for points whose scatter grows with the roughness of their road.
 
     standard_error    of the slope, from how the roads differ among themselves
@@ -101,10 +101,10 @@ class SpeedCalibration:
     """
 
     speed_mps: float
-    iri_per_accel_rms: Line
-    window_iri_per_accel_rms: Line
-    accel_rms_per_root_gd: Line
-    a_w_per_iri: Line
+    iri_per_accel_rms: RmsLine
+    window_iri_per_accel_rms: RmsLine
+    accel_rms_per_root_gd: RmsLine
+    a_w_per_iri: RmsLine
 
 
 def loaded(vehicle: Vehicle, passengers: int = 0, sprung_mass_factor: float = 1.0) -> Vehicle:
@@ -118,7 +118,7 @@ def loaded(vehicle: Vehicle, passengers: int = 0, sprung_mass_factor: float = 1.
 
 
 def calibrate(
-    car: KnownCar, recorder_gain: Callable[[Array], Array] | None = None, settings: Settings | None = None
+    car: KnownCar, recorder_gain: Callable[[Array], Array] | None = None, settings: CalibrationSettings | None = None
 ) -> tuple[SpeedCalibration, ...]:
     """Drive the car over random ISO 8608 roads of IRI 1 to 10 m/km; the lines of each speed.
 
@@ -128,7 +128,7 @@ def calibrate(
     on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``.
     A car whose laws are not linear is another one on each level of road; its lines go through the middle of them.
     """
-    settings = settings or Settings()
+    settings = settings or CalibrationSettings()
     roads = _Roads(settings)
     levels = LEVELS_IRI if car.depends_on_motion else LEVELS_IRI[:1]
     responses = [_responses(car, recorder_gain, roads.wave_number, settings.speeds_mps, level) for level in levels]
@@ -150,7 +150,7 @@ def calibrate(
     )
 
 
-def fit(x: Array, y: Array, level: Array) -> Line:
+def fit(x: Array, y: Array, level: Array) -> RmsLine:
     """The line through the origin of points (roads,) or (roads, windows) on roads of a ``level`` (roads,).
 
     Scatter is taken as proportional to the level, so the slope is the ratio of the sums of y and x per level: no bias
@@ -165,7 +165,7 @@ def fit(x: Array, y: Array, level: Array) -> Line:
     standard_error = np.sqrt(roads / (roads - 1) * np.sum(off.sum(axis=1) ** 2)) / x_relative.sum()
     spread = np.percentile(np.abs(off) / (slope * x_relative), _WITHIN)
     r2 = 1 - np.sum((y - slope * x) ** 2) / np.sum((y - y.mean()) ** 2)
-    return Line(slope, float(standard_error), float(spread), float(r2))
+    return RmsLine(slope, float(standard_error), float(spread), float(r2))
 
 
 def _responses(
@@ -192,7 +192,7 @@ class _Roads:
     wave_number    (waves,) of all roads [cycle/m]
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: CalibrationSettings) -> None:
         per_window = round(settings.window_m / _SPACING_M)
         self._windows = round(settings.road_m / settings.window_m)
         self._samples = self._windows * per_window

@@ -1,4 +1,5 @@
-"""The road itself, from the pieces that the estimator gives: joined, and cut to the wavelengths that the readings tell.
+"""The road itself, from the pieces that the estimator gives: joined, and cut to the wavelengths that the readings
+resolve.
 
 Problem. Neighbouring pieces come from different solutions and may stand at different heights by a slow wave that no
 reading tells; joined end to start, their heights would be steps. And an estimate holds waves that are mostly belief.
@@ -64,7 +65,8 @@ class RoadProfile:
 
 
 def road_profile(pieces: Sequence[RoadPiece], speed_mps: Array) -> RoadProfile | None:
-    """The profile that pieces make, in the order they came; None when no wavelength is told over enough of them.
+    """The profile that pieces make, in the order they came; None when the readings resolve no wavelength over enough of
+    them.
 
     speed_mps    (p,) mean speed over each piece [m/s]
     """

@@ -1,4 +1,4 @@
-"""The road under one stretch of a drive, as far as the readings tell it: a least-squares problem, solved by FFT.
+"""The road under one stretch of a drive, as far as the readings resolve it: a least-squares problem, solved by FFT.
 
 Problem. Readings y on a time grid are y = A r + drift + noise. r is the road on a grid of distance, A drives the car
 over it with the speed as it was, so the rear axle meets the road a wheelbase later whatever the speed did, and the
@@ -47,7 +47,7 @@ class Solution:
     road         (k,) rfft of the elevations there [m]
     fitted_mps2  (t,) the readings that this road and the drift explain
     drift_mps2   (t,) the drift alone
-    gain         (k,) information over prior of each wave where D is 1; the readings tell g / (1 + g) of its variance
+    gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
     waves: ComplexArray

@@ -1,7 +1,7 @@
 """Prior spectrum of a road, by two numbers.
 
 A road of ISO 8608 has Gd(n) = Gd(n0) (n / n0)^-w; its increments are white noise when the waviness w is 2. Level
-and waviness are learnt on the way, so they are kept where they can be told apart: the level at a wave number in the
+and waviness are learnt on the way, so they are kept where they can be separated: the level at a wave number in the
 middle of those that shake a car.
 """
 

@@ -2,7 +2,7 @@
 
 A block of 20 s is solved every 2 s (``road_solver``), with what was learnt of road and sensor so far
 (``recursive_road``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
-the body's slow swing, still tell of a road already driven; windows longer than 10 m are made of several stretches.
+the body's slow swing, still depend on a road already driven; windows longer than 10 m are made of several stretches.
 Splitting the readings differently changes nothing.
 """
 
@@ -31,7 +31,7 @@ from logger.estimation.iri_posterior import (
 )
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
-from logger.estimation.ride_posterior import Place, RidePosterior
+from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -48,7 +48,7 @@ HOP_SAMPLES = 200
 LAG_S = 4.0
 FAINT_BELOW = 0.2
 VEHICLE_ERROR = 0.05
-SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
+SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be distinguished from drift
 _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
@@ -66,7 +66,7 @@ class WindowEstimate:
     iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
                         this speed, ``unsettled`` next to the start of the readings or a hole in them
     iri_std_m_per_km    its standard error [m/km], NaN likewise
-    resolved            share of the variance of the IRI's slope that the readings tell, 0 to 1
+    resolved            share of the variance of the IRI's slope that the readings resolve, 0 to 1
     ride                figures of the weighted acceleration without noise and rounding; nan where they are not known
     """
 
@@ -82,8 +82,8 @@ class WindowEstimate:
 class RoadPiece:
     """Estimated elevations (p,) [m] at ``start_m + k spacing_m``; the last point is the next piece's first.
 
-    The elevations of two pieces may differ by a slow wave that the readings do not tell. Waves from ``shortest_m`` to
-    ``longest_m`` are told by the readings for more than half of their variance; both are NaN if none is.
+    The elevations of two pieces may differ by a slow wave that the readings do not resolve. Waves from ``shortest_m``
+    to ``longest_m`` are resolved: the readings explain more than half of their variance; both are NaN if none is.
     """
 
     start_m: float
@@ -128,7 +128,7 @@ class RoadEstimator:
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
     noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
-    ride_response    of the comfort weighting at frequencies (n,) [Hz], and the figures of the ride are told; None: not
+    ride_response    of the comfort weighting at frequencies (n,) [Hz], to compute the figures of the ride; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
     off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
                      that have nothing to do with one another
@@ -166,7 +166,7 @@ class RoadEstimator:
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
-        self._start_anew()
+        self._restart()
 
     def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float) -> _Answers:
         """How the car answers such a road at such a speed; the last few are kept."""
@@ -198,11 +198,11 @@ class RoadEstimator:
         """The car stood for long: what comes now is the same sensor on another day."""
         self._road.next_drive()
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         self._waiting = Samples.unread(0, 0.0, 0.0)
         self._heard = 0
         self._samples: Samples | None = None
-        self._road.start_anew()
+        self._road.restart()
         self._next = 0
         self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
         self._gathered: list[_Piece] = []
@@ -244,7 +244,7 @@ class RoadEstimator:
             after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
-        self._start_anew()
+        self._restart()
         return estimates
 
     def _hop(self, fresh: Samples) -> list[WindowEstimate]:
@@ -298,7 +298,7 @@ class RoadEstimator:
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
                 if weighted is not None:
                     log_std = self.noise.log_std if self.noise is not None else 0.0
-                    place = Place(speed_mps, solved.variance, *level, self._road.sensor, log_std)
+                    place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
@@ -334,7 +334,7 @@ class RoadEstimator:
         return block, solved
 
     def _ride_sums(
-        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place
+        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: RidePlace
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
         assert self._answers.ride is not None

@@ -47,7 +47,7 @@ class Samples:
         return float(self.distance_m[-1] - self.distance_m[0]) / max(len(self) - 1, 1)
 
     def speed_mps(self, begin_m: float, end_m: float) -> float | None:
-        """Mean speed between two places while the car moved; None when it is slower than anything can be told at."""
+        """Mean speed between two places while the car moved; None when it is too slow for an estimate."""
         low, high = np.searchsorted(self.distance_m, [begin_m, end_m])
         steps_m = np.diff(self.distance_m[max(low - 1, 0):high + 1])
         moving = steps_m > SLOWEST_MPS / RATE_HZ

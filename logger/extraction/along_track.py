@@ -1,6 +1,6 @@
 """Speed and distance of a car over a whole drive, by all fixes before and after each instant.
 
-Problem: a receiver tells the speed once or ten times a second, with noise, now and then wildly wrong; a model needs the
+Problem: a receiver gives the speed once or ten times a second, with noise, now and then wildly wrong; a model needs the
 distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its acceleration
 is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch, F. Tung and C.
 Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration wanders, and how large
@@ -47,7 +47,7 @@ class Observations:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TrackMotion:
     """The most likely motion at the times of the fixes (k,); between them it is a polynomial of the fifth order.
 
     state       (k, 3) distance [m], speed [m/s] and acceleration [m/s2]
@@ -84,7 +84,7 @@ class Motion:
         return np.asarray((c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))) / step)
 
 
-def motion_of(speeds: Observations, places: Observations | None = None, like: Motion | None = None) -> Motion:
+def motion_of(speeds: Observations, places: Observations | None = None, like: TrackMotion | None = None) -> TrackMotion:
     """The motion by two fixes or more, in order of time and ``NEAREST_FIXES_S`` apart.
 
     speeds    with no deviations of their own (ones) but where these differ: they are scaled by evidence
@@ -100,7 +100,7 @@ def motion_of(speeds: Observations, places: Observations | None = None, like: Mo
     return _fitted(speeds, places, walk, noise)
 
 
-def place_std_m(motion: Motion, speeds: Observations, places: Observations, seed: int = 0) -> Array:
+def place_std_m(motion: TrackMotion, speeds: Observations, places: Observations, seed: int = 0) -> Array:
     """Standard error of the distance at the times of the fixes (k,) [m]."""
     rng = np.random.default_rng(seed)
     system = _System(speeds.time_s, motion.walk, motion.noise_mps)
@@ -131,7 +131,7 @@ def _strengths(speeds: Observations) -> tuple[float, float]:
     return ratio * noise_mps**2, noise_mps
 
 
-def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: float) -> Motion:
+def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: float) -> TrackMotion:
     """The motion of given strengths."""
     system = _System(speeds.time_s, walk, noise_mps)
     deviation = speeds.deviation * noise_mps
@@ -142,9 +142,9 @@ def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: 
                 (0, replace(places, deviation=places.deviation / np.sqrt(seen)))]
         state = system.solved(rows)[0]
         weights = _without_wild((state[:, 1] - speeds.value) / deviation)
-        at = Motion(speeds.time_s, state, walk, noise_mps)
+        at = TrackMotion(speeds.time_s, state, walk, noise_mps)
         seen = _student((at._curve(places.time_s, 0) - places.value) / places.deviation)
-    return Motion(speeds.time_s, state, walk, noise_mps)
+    return TrackMotion(speeds.time_s, state, walk, noise_mps)
 
 
 def _without_wild(off: Array) -> Array:

@@ -1,8 +1,8 @@
-"""Fixes out of columns beside an accelerometer: which rows are new, and what speed they tell.
+"""Fixes out of columns beside an accelerometer: which rows are new, and what speed they give.
 
 Problem: many programs write the last fix again in every row, and some write places but no speed. Solution: a fix is new
 where something of it changes; while the car stands nothing does, and the old one is repeated at the usual pace, so that
-standing is not taken for a lost fix. Places alone tell the speed from each to the next.
+standing is not taken for a lost fix. Places alone give the speed from each to the next.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def ways_m(lat_deg: Array, lon_deg: Array) -> Array:
 
 def way_over_speed(time_s: Array, lat_deg: Array, lon_deg: Array, speed_mps: Array) -> float | None:
     """How far the places (k,) lie apart, over the way by the speeds (k,), where it is no usual error: a speed in
-    another unit than was said. None: they agree, or the way is too short to tell."""
+    another unit than was said. None: they agree, or the way is too short to decide."""
     middle_mps = 0.5 * (speed_mps[1:] + speed_mps[:-1])
     moving = middle_mps > _MOVING * middle_mps.max()  # a standing car's places wander
     by_speed_m = float((middle_mps * np.diff(time_s))[moving].sum())

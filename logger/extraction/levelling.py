@@ -1,9 +1,9 @@
-"""Which way is up for a recorder that lies anyhow: gravity tells.
+"""Which way is up for a recorder that lies anyhow: gravity shows it.
 
 Problem: a phone sits in its mount at any angle, its program may write g or m/s2, count all axes the other way round,
 leave gravity out, and the phone may slip half way. Solution: over tens of seconds of driving what a recorder feels is
 gravity, for braking, curves and hills come to little; a mean that outliers do not move is taken of the means of short
-blocks. Its size tells the unit, its direction the vertical. An accelerometer at rest feels a push upwards of 1 g; a
+blocks. Its size shows the unit, its direction the vertical. An accelerometer at rest feels a push upwards of 1 g; a
 program that writes the opposite does so for every acceleration, so along the direction in which gravity is felt both
 read the same.
 

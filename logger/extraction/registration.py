@@ -1,8 +1,8 @@
 """A pass over a measured profile, laid on the profile's own distance.
 
-Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself tells. A model
-of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is found
-where what it should have felt and what it felt are most alike; then the two are compared window by window
+Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself shows it. A
+model of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is
+found where what it should have felt and what it felt are most alike; then the two are compared window by window
 (``lab.likelihood.lag``), and where a window was felt is one more observation for the smoother of the motion.
 """
 
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.extraction.along_track import Motion, Observations, motion_of, place_std_m
+from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m
 from logger.lab.likelihood.lag import SLOWEST_MPS, lags, shift_m
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -41,7 +41,7 @@ class Registered:
     by_road        whether the road was recognised; False: places are those of the receiver
     """
 
-    motion: Motion
+    motion: TrackMotion
     place_std_m: float
     by_road: bool
 
@@ -67,8 +67,8 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
     return Registered(motion, float(np.sqrt(np.mean(std_m**2))), by_road is not None)
 
 
-def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,
-             predict: Predict) -> tuple[Motion, Observations] | None:
+def _by_road(motion: TrackMotion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,
+             predict: Predict) -> tuple[TrackMotion, Observations] | None:
     """The motion on the road as it was felt, and where that was; None where the road was not recognised."""
     distance_m = motion.distance_m(time_s)
     farther_m = shift_m(distance_m, accel_mps2, predict(distance_m), (track.start_m, track.end_m), _REACH_M)
@@ -76,7 +76,7 @@ def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Ar
         return None
     state = motion.state.copy()
     state[:, 0] += farther_m
-    motion = Motion(motion.time_s, state, motion.walk, motion.noise_mps)
+    motion = TrackMotion(motion.time_s, state, motion.walk, motion.noise_mps)
     felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
     for _ in range(_ROUNDS):
         if len(felt.time_s) < _FEWEST:
@@ -87,7 +87,7 @@ def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Ar
     return (motion, known) if np.median(np.abs(off_m)) < _AGREE_M else None
 
 
-def _felt(motion: Motion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict
+def _felt(motion: TrackMotion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict
           ) -> Observations:
     """Where those windows of the road were felt in which the car did what the profile asks."""
     distance_m, speed_mps = motion.distance_m(time_s), motion.speed_mps(time_s)

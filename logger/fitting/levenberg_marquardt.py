@@ -1,7 +1,7 @@
 """Levenberg and Marquardt's steps on normal equations.
 
 Problem: fits here have hundreds of numbers of which most are known by a prior, derivatives that take as long as a fit
-may, and bounds. ``scipy.optimize.least_squares`` wants residuals and a Jacobian of them all, anew for each step.
+may, and bounds. ``scipy.optimize.least_squares`` wants residuals and a Jacobian of them all, for each step.
 Solution: a fit gives its cost and its normal equations, however it comes to them. Steps are damped by the diagonal
 (D. W. Marquardt 1963); a number at a bound that it presses against stays there; and derivatives serve on for as long as
 steps gain what they promised, which is for the fit to make use of: a minimum is believed only with fresh ones.
@@ -36,7 +36,7 @@ E = TypeVar("E", bound=Evaluated)
 class Damping:
     """How far steps are damped: shares of the diagonal of the information.
 
-    first      at the beginning, and when derivatives have been taken anew
+    first      at the beginning, and when derivatives have been taken again
     least      that is left far into a fit; small, or nothing would move along with what makes up for it
     largest    beyond which no step is tried
     factor     less after a step that was taken, more after one that was not
@@ -75,7 +75,7 @@ def minimise(
     """The point that a cost is least at, downhill from a start (k,).
 
     evaluate            of a point (k,); its cost may be infinite or NaN where there is none
-    normal_equations    of a point, what was made of it, and whether derivatives are to be taken anew: downhill
+    normal_equations    of a point, what was made of it, and whether derivatives are to be taken again: downhill
                         direction g (k,) and information H (k, k), so that a step s changes the cost by s H s / 2 - g s
     small_gain          in cost: what gains less or promises less is not worth a step
     keep_derivatives    ask for fresh ones only after a step that gained less than it promised; False: always

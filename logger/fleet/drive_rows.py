@@ -89,7 +89,8 @@ def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
     """Means over each pass, at the row in its middle; nothing at the others."""
     count = len(drive)
     known = np.isfinite(rows["iri_m_per_km"]) & np.isfinite(rows["iri_std_m_per_km"])
-    known &= np.array([NOT_COUNTED.isdisjoint((text or "").split("|")) for text in rows["flags"]], dtype=bool)
+    counted = {text: NOT_COUNTED.isdisjoint((text or "").split("|")) for text in set(rows["flags"].tolist())}
+    known &= np.array([counted[text] for text in rows["flags"].tolist()], dtype=bool)
     found = {name: np.full(count, np.nan) for name in ("pass_iri_m_per_km", "pass_iri_std_m_per_km", "pass_a_w_mps2")}
     windows = np.zeros(count, dtype=np.int64)
     row = np.flatnonzero(known)

@@ -80,7 +80,7 @@ def _spark(master: str) -> Iterator[Any]:
     try:
         from pyspark.sql import SparkSession
     except ImportError as error:
-        raise BadInput(f"--engine spark: expected PySpark: pip install 'ibis-framework[pyspark]' ({error})") from None
+        raise BadInput(f"--engine spark: expected the 'spark' extra: pip install 'ridelog[spark]' ({error})") from None
     from py4j.protocol import Py4JError
     from pyspark.errors import PySparkException
 

@@ -1,8 +1,9 @@
 """The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
 
-Two groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and time;
-the biases of cars follow from these alone. ``roads``: the sums of each piece of road over all cars, each car's readings
-divided by its gain. What follows from the sums is arithmetic over as many rows as there are pieces of road.
+Three groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and
+time. ``passes_by_session``: means by session, of a part of the roads, from which the biases of cars follow.
+``roads``: the sums of each piece of road over all cars, each car's readings divided by its gain. What follows from the
+sums is arithmetic over as many rows as there are pieces of road.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, ze
 
 
 def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
-    passes = rows.filter(rows.pass_iri_m_per_km.notnull())
+    # Errors go with the IRI: one that is not above zero is none.
+    passes = rows.filter(rows.pass_iri_m_per_km > 0)
     if since_us is not None:
         passes = passes.filter(passes.utc_us >= since_us)
     return passes if until_us is None else passes.filter(passes.utc_us < until_us)
@@ -44,11 +46,16 @@ def cars(by_car: ir.Table) -> ir.Table:
     return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
 
 
-def for_biases(by_car: ir.Table, one_in: int) -> ir.Table:
-    """What the biases of cars follow from, of one road in so many: by the remainder of the key, first by a prime, as
-    the last bits of a key are a direction."""
-    chosen = by_car if one_in == 1 else by_car.filter((by_car.road % _PRIME) % one_in == 0)
-    return chosen.select("road", "car", "passes", "iri", "years")
+def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int, one_in: int
+                      ) -> ir.Table:
+    """Means over passes by road, car and session, of one road in so many: by the remainder of the key, first by a
+    prime, as the last bits of a key are a direction."""
+    passes = _passes(rows, since_us, until_us)
+    if one_in > 1:
+        passes = passes.filter((passes.road % _PRIME) % one_in == 0)
+    passes = passes.mutate(years=(passes.utc_us - zero_us).cast("float64") / YEAR_US)
+    return passes.group_by(["road", "car", "session"]).aggregate(
+        passes=passes.count(), iri=passes.pass_iri_m_per_km.mean(), years=passes.years.mean())
 
 
 def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:
@@ -65,18 +72,6 @@ def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:
         iri=total(joined.iri / joined.gain), iri_years=total(joined.iri_years / joined.gain),
         iri_square=total(joined.iri_square / (joined.gain * joined.gain)),
         bias_square=total(passes * passes * joined.log_variance), **{name: total(joined[name]) for name in plain})
-
-
-def residuals_by_session(rows: ir.Table, gains: ir.Table, levels: ir.Table, since_us: int | None, until_us: int | None,
-                         zero_us: int) -> ir.Table:
-    """Sums of passes' relative residuals by car and session; ``levels`` has each road's IRI at ``middle`` [years] and
-    its growth a year, as a fraction."""
-    passes = _passes(rows, since_us, until_us).join(gains, "car").join(levels, "road")
-    years = (passes.utc_us - zero_us).cast("float64") / YEAR_US
-    expected = passes.gain * passes.level * (1.0 + passes.growth * (years - passes.middle))
-    passes = passes.mutate(residual=passes.pass_iri_m_per_km / expected - 1.0)
-    return passes.group_by(["car", "session"]).aggregate(
-        passes=passes.count(), residual=passes.residual.sum(), square=(passes.residual * passes.residual).sum())
 
 
 def history(rows: ir.Table, gains: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:

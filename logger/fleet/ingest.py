@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ from logger.store.log.log_name import LogName
 
 BATCH_ROWS = 500_000
 """Rows of a commit, at least: some 300 MB while they are written."""
+
+_TOGETHER_BYTES = 8 << 20
+"""Of logs that are read at once, at least: beyond it the cost of a reading no longer counts."""
 
 _MARKS = ("segment", "crc32", "utc_us")
 _SAME_US = 10_000_000
@@ -76,25 +80,41 @@ def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed,
     committed stays."""
     counts, waiting = Counts(), _Waiting()
     past = _Past(dataset)
-    for session in sessions:
-        found = [read_bytes(log) for log in session.logs]
-        counts.logs += len(found)
-        if all(past.holds(session, digest) for _, digest in found):
-            counts.known_logs += len(found)
-            continue
-        read = [(log, columns_of(*one)) for log, one in zip(session.logs, found, strict=True)]
-        _take(session, read, past, waiting, counts, keyed, trim_m)
-        if waiting.count >= batch_rows:
-            _commit(dataset, waiting, roads, trim_m)
-            waiting = _Waiting()
+    for unread in _read_together(sessions, past, counts):
+        columns = iter(columns_of([log for _, logs in unread for log in logs]))
+        for session, logs in unread:
+            _take(session, list(islice(columns, len(logs))), past, waiting, counts, keyed, trim_m)
+            if waiting.count >= batch_rows:
+                _commit(dataset, waiting, roads, trim_m)
+                waiting = _Waiting()
     if waiting.ledger:
         _commit(dataset, waiting, roads, trim_m)
     return counts
 
 
-def _take(session: Session, read: Sequence[tuple[Path, LogColumns]], past: _Past, waiting: _Waiting, counts: Counts,
+def _read_together(sessions: Sequence[Session], past: _Past, counts: Counts
+                   ) -> Iterator[list[tuple[Session, list[tuple[bytes, str]]]]]:
+    """Sessions that are not known whole, and the bytes of their logs, some megabytes at a time."""
+    together: list[tuple[Session, list[tuple[bytes, str]]]] = []
+    size = 0
+    for session in sessions:
+        found = [read_bytes(log) for log in session.logs]
+        counts.logs += len(found)
+        if past.holds(session, [digest for _, digest in found]):
+            counts.known_logs += len(found)
+            continue
+        together.append((session, found))
+        size += sum(len(data) for data, _ in found)
+        if size >= _TOGETHER_BYTES:
+            yield together
+            together, size = [], 0
+    if together:
+        yield together
+
+
+def _take(session: Session, read: Sequence[LogColumns], past: _Past, waiting: _Waiting, counts: Counts,
           keyed: Keyed, trim_m: float) -> None:
-    filed = filed_rows(_once(joined_columns([one.columns for _, one in read])), keyed, trim_m)
+    filed = filed_rows(_once(joined_columns([one.columns for one in read])), keyed, trim_m)
     rows = filed.columns
     known, contradicted = past.known(session, rows)
     new = ~(known | contradicted)
@@ -106,10 +126,10 @@ def _take(session: Session, read: Sequence[tuple[Path, LogColumns]], past: _Past
     counts.contradictions += int(contradicted.sum())
     waiting.rows.append(rows)
     waiting.count += count
-    past.add(session, read, rows)
+    past.add(session, rows)
 
 
-def _say(session: Session, read: Sequence[tuple[Path, LogColumns]], filed: Filed, added: int, repeated: int,
+def _say(session: Session, read: Sequence[LogColumns], filed: Filed, added: int, repeated: int,
          waiting: _Waiting, counts: Counts) -> None:
     """What a ledger keeps of logs; figures of a session stand at its first log."""
     counts.added += added
@@ -117,7 +137,7 @@ def _say(session: Session, read: Sequence[tuple[Path, LogColumns]], filed: Filed
     counts.undated += filed.undated
     counts.unplaced += filed.unplaced
     counts.trimmed += filed.trimmed
-    for number, (log, one) in enumerate(read):
+    for number, (log, one) in enumerate(zip(session.logs, read, strict=True)):
         counts.damaged_lines += one.damaged_lines
         of_session = {"rows": added, "undated": filed.undated, "unplaced": filed.unplaced, "trimmed": filed.trimmed,
                       "repeated": repeated}
@@ -152,12 +172,14 @@ class _Past:
             self._commits[car, session].add(commit)
         self._now: dict[tuple[int, int], list[npt.NDArray[np.int64]]] = defaultdict(list)
 
-    def holds(self, session: Session, digest: str) -> bool:
-        return (session.car, session.number, digest) in self._logs
+    def holds(self, session: Session, digests: Sequence[str]) -> bool:
+        """Whether all these logs of a session are known; from now on they are."""
+        logs = {(session.car, session.number, digest) for digest in digests}
+        known = logs <= self._logs
+        self._logs |= logs
+        return known
 
-    def add(self, session: Session, read: Sequence[tuple[Path, LogColumns]],
-            rows: Mapping[str, npt.NDArray[Any]]) -> None:
-        self._logs |= {(session.car, session.number, one.sha256) for _, one in read}
+    def add(self, session: Session, rows: Mapping[str, npt.NDArray[Any]]) -> None:
         self._now[session.car, session.number].append(
             np.stack([rows[name] for name in _MARKS], axis=1).astype(np.int64))
 

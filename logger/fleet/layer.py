@@ -7,6 +7,7 @@ from math import cos, degrees, isfinite, radians, sin
 from logger.exchange.geometry import Geometry, cut
 from logger.exchange.layer import Feature, Field, Kind, Layer
 from logger.exchange.windows import iri_title
+from logger.fleet.dataset import DAY_US
 from logger.fleet.road_cells import SEGMENT_M
 from logger.fleet.summary import SECTION_M, RoadTable
 from logger.geodesy import EARTH_RADIUS_M
@@ -29,7 +30,7 @@ def roads_layer(roads: RoadTable) -> Layer:
         row = dict(zip(("key", "cars", *_NUMBERS), values, strict=True))
         known = [value if not isinstance(value, float) or isfinite(value) else None for value in values]
         condition = federal_condition(row["iri_m_per_km"]) if isfinite(row["iri_m_per_km"]) else None
-        last_utc = iso_utc(last_us)
+        last_utc = iso_utc(last_us // DAY_US * DAY_US)  # a time of day would tell whose drive it was
         features.append(Feature(
             roads.by, iri_title(row["iri_m_per_km"]), (*known, condition, last_utc, visit or None),
             _line(row["lat_deg"], row["lon_deg"], row["heading_deg"], _DRAWN_M.get(roads.by, 0.0)),

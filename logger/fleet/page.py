@@ -16,16 +16,20 @@ from logger.fleet.words import error_words
 from logger.printable import counted
 from logger.report.document import data_block, document, grid, heading, hint, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
-from logger.report.summary import IRI_CLASSES, class_limits_m_per_km
-from logger.report.terminal import class_words, distance_words
+from logger.report.terminal import distance_words
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI
 from logger.store.log.log_reader import utc
+from logger.units import INCH_PER_MILE_M_PER_KM
 
 _SHOWN = 20
 _SHARED = ("windows.js", "canvas.js", "map.js")
 _STYLE = """
+.tiles dd{white-space:normal}
 .history{display:block;width:100%;height:150px;margin-top:8px}
 #map{height:min(560px,64vh)}
 """
+_LIMITS_M_PER_KM = tuple(limit * INCH_PER_MILE_M_PER_KM for limit in (GOOD_BELOW_IN_PER_MI, FAIR_TO_IN_PER_MI))
+"""Of colours: those by which a section is rough, so that the map and the list of visits say the same."""
 _MODES = (("m", "Mean IRI"), ("w", "Roughest"), ("t", "Became worse"))
 _HINT = "Tap or click a piece of road for its figures; the nearer the map, the finer they are."
 
@@ -40,7 +44,7 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     level = highest_level(x, y)
     data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
             "deepest": DEEPEST, "roots": names_of(x, y, level), "segment_m": SEGMENT_M,
-            "limits": [class_limits_m_per_km(letter)[0] for letter in list(IRI_CLASSES)[1:]]}
+            "limits": list(_LIMITS_M_PER_KM)}
     return document("A fleet's roads", [
         heading("A fleet's roads", under), _tiles(figures, sections), _map(), _rough(sections), _worse(sections),
         _cars(figures), data_block("data", data),
@@ -73,8 +77,10 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
 def _map() -> Html:
     buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
                                 "true" if name == "m" else "false", words) for name, words in _MODES)
-    legend = concatenated(html('<li><i class="f{}"></i>{}</li>', rank, class_words(letter))
-                          for rank, letter in enumerate(list(IRI_CLASSES)[:5]))
+    good, fair = _LIMITS_M_PER_KM
+    ranges = (f"below {good:.2f}", f"{good:.2f} to {fair:.2f}", f"above {fair:.2f}")
+    legend = concatenated(html('<li><i class="f{}"></i>{}, {} m/km</li>', rank, *words)
+                          for rank, words in enumerate(zip(FEDERAL_WORDS, ranges, strict=True)))
     return section("Map", html(
         '<noscript><p class="warn">The map is drawn by a script, which this browser does not run.</p></noscript>'
         '<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'

@@ -1,6 +1,6 @@
 """Mean and change of each road from sums over its passes, with their errors.
 
-Few passes tell little of their own scatter. Their variance is drawn towards that of all roads by as much as the roads'
+Few passes show little of their own scatter. Their variance is drawn towards that of all roads by as much as the roads'
 variances agree (G. K. Smyth, Linear models and empirical Bayes methods, 2004, sections 3 and 6.2: a scaled inverse
 chi-square prior whose two numbers follow from mean and variance of the logarithms). Changes are significant where the
 share of false ones among them stays below a limit (Y. Benjamini and Y. Hochberg, 1995).
@@ -48,7 +48,7 @@ class RoadFigures:
 
 
 def road_figures(sums: Sums, pass_std: float) -> RoadFigures:
-    """Figures of n roads. ``pass_std``: relative standard deviation of a pass, for where no road tells it; NaN: not
+    """Figures of n roads. ``pass_std``: relative standard deviation of a pass, for where no road shows it; NaN: not
     known either."""
     from scipy.stats import t
 
@@ -88,11 +88,11 @@ def _prior(variance: Array, freedom: Array, otherwise: float) -> tuple[float, fl
     """Degrees of freedom and value of the prior variance (Smyth 2004, section 6.2)."""
     from scipy.special import digamma, polygamma
 
-    told = (freedom > 0) & (variance > 0)
-    if told.sum() < 3:
+    known = (freedom > 0) & (variance > 0)
+    if known.sum() < 3:
         return (np.inf, otherwise) if np.isfinite(otherwise) else (0.0, np.nan)
-    half = freedom[told] / 2
-    level = np.log(variance[told]) - digamma(half) + np.log(half)
+    half = freedom[known] / 2
+    level = np.log(variance[known]) - digamma(half) + np.log(half)
     excess = level.var(ddof=1) - float(polygamma(1, half).mean())
     if excess <= 0:
         return np.inf, float(np.exp(level.mean()))

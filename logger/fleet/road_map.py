@@ -85,7 +85,7 @@ class RoadMap:
         self._tree = cKDTree(on_sphere(pieces.lat_deg.mean(axis=1), pieces.lon_deg.mean(axis=1)))
 
     def keys(self, lat_deg: Array, lon_deg: Array, heading_deg: Array, drive: npt.NDArray[np.intp]) -> Keys:
-        """Keys (n,) of places and directions [degrees], in the order driven; ``drive`` tells drives apart."""
+        """Keys (n,) of places and directions [degrees], in the order driven; ``drive`` distinguishes drives."""
         out = cell_keys(lat_deg, lon_deg, heading_deg)
         if not len(out):
             return out

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.fleet.car_biases import CarBiases, car_biases, shared_by_session, with_sessions
+from logger.fleet.car_biases import CarBiases, car_biases
 from logger.fleet.engine import Engine
 from logger.fleet.expressions import cars as car_sums
-from logger.fleet.expressions import for_biases, passes_by_car, residuals_by_session, roads
+from logger.fleet.expressions import passes_by_car, passes_by_session, roads
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
+from logger.fleet.road_elimination import Passes
 from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
 from logger.fleet.road_map import Pieces
 from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
@@ -24,15 +25,16 @@ Keys = npt.NDArray[np.int64]
 
 FALSE_SHARE = 0.05
 """Of false ones among the changes that are called significant."""
+_POWER = 0.8
 _CERTAIN = 1.645
 """Standard errors from a mean to where it lies with 95 % certainty on one side."""
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 UNCOMFORTABLE_MPS2 = 0.8
 """ISO 2631-1, C.2.3."""
 SECTION_M = MILE_M / 10
-MOST_PAIRS = 2_000_000
-"""Of roads and cars from which biases are estimated, some 300 MB; of more a part of the roads is taken. What the
-passes of a session share then limits a bias, not the number of roads."""
+MOST_PASSES = 1_000_000
+"""From which biases are estimated, some 300 MB; of more those of a part of the roads are taken. What the passes of a
+session share then limits a bias, not the number of roads."""
 _ZERO_US = 1_577_836_800_000_000
 """2020-01-01: years count from here, so that their squares keep their digits."""
 
@@ -108,20 +110,11 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
         cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
         if not len(cars):
             return None
-        sums = engine.arrays(for_biases(kept, -(-int(of_cars["roads"].sum()) // MOST_PAIRS)))
-        first = _biases(sums, cars, None)
-        # Now that each road's own change shows, no car is charged with it.
-        before = engine.arrays(roads(kept, gains_table(cars, first)))
-        biases = replace(_biases(sums, cars, (before["road"], own_growth(before, first))),
-                         growth_per_year=first.growth_per_year)
+        one_in = -(-int(of_cars["passes"].sum()) // MOST_PASSES)
+        sample = engine.arrays(passes_by_session(engine.rows, since_us, until_us, _ZERO_US, one_in))
+        biases = car_biases(as_passes(sample, cars), len(cars))
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
-    levels = levels_table(of_roads, biases)
-    sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
-                                                  _ZERO_US))
-    of_session = np.searchsorted(cars, sessions["car"]), sessions["passes"].astype(np.float64)
-    variance = shared_by_session(*of_session, sessions["residual"], sessions["square"])
-    biases = with_sessions(biases, *of_session, variance)
-    shared = min(variance / biases.pass_std**2, 1.0) if biases.pass_std > 0 else 0.0
+    shared = biases.session_std**2 / biases.pass_std**2 if biases.pass_std > 0 else 0.0
     published = of_roads["cars"] >= least_cars
     windows = int(of_roads["windows"].sum())
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
@@ -130,15 +123,14 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
                         int((~published).sum()))
 
 
-def _biases(sums: Mapping[str, npt.NDArray[Any]], cars: Keys, growth: tuple[Keys, Array] | None) -> CarBiases:
-    """The biases of cars; ``growth``: roads and the growth of each."""
-    keys, road = np.unique(sums["road"], return_inverse=True)
-    growth_of = None
-    if growth is not None:
-        order = np.argsort(growth[0])
-        growth_of = growth[1][order][np.searchsorted(growth[0][order], keys)]
-    return car_biases(road, np.searchsorted(cars, sums["car"]), len(cars), sums["passes"].astype(np.float64),
-                      sums["iri"], sums["years"], growth_of)
+def as_passes(sample: Mapping[str, npt.NDArray[Any]], cars: Keys) -> Passes:
+    """Passes by road, car and session; in a fixed order, so that sums do not depend on the engine."""
+    order = np.lexsort((sample["road"], sample["session"], sample["car"]))
+    road, car, session, count, iri, years = (sample[name][order] for name in (
+        "road", "car", "session", "passes", "iri", "years"))
+    new = np.append(True, (np.diff(car) != 0) | (np.diff(session) != 0))[: len(car)]
+    return Passes(np.unique(road, return_inverse=True)[1], np.cumsum(new) - 1, np.searchsorted(cars, car[new]),
+                  count.astype(np.float64), iri, years)
 
 
 def gains_table(cars: Keys, biases: CarBiases) -> Any:
@@ -147,33 +139,6 @@ def gains_table(cars: Keys, biases: CarBiases) -> Any:
     import pyarrow
 
     return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
-
-
-def own_growth(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Array:
-    """The growth of each road a year, as a fraction: what its passes say, drawn towards that of all roads by as much as
-    roads agree (empirical Bayes; the variance between roads by its moments)."""
-    passes = sums["passes"].astype(np.float64)
-    middle = sums["years"] / passes
-    spread = np.maximum(sums["years_square"] - sums["years"] * middle, 0.0)
-    common = float(np.nan_to_num(biases.growth_per_year))
-    tells = spread > 1e-6 * passes
-    if not tells.any() or not np.isfinite(biases.pass_std):
-        return np.full(len(passes), common)
-    own = np.divide((sums["iri_years"] - sums["iri"] * middle) * passes, spread * sums["iri"],
-                    out=np.full(len(passes), common), where=tells)
-    noise = biases.pass_std**2
-    between = max(float((spread * (own - common) ** 2).sum()) - noise * int(tells.sum()), 0.0) / float(spread.sum())
-    return common + (own - common) * between * spread / (between * spread + noise)
-
-
-def levels_table(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Any:
-    """What passes over each road are compared with: its mean, and its growth."""
-    import ibis
-    import pyarrow
-
-    passes = sums["passes"].astype(np.float64)
-    return ibis.memtable(pyarrow.table({"road": sums["road"], "level": sums["iri"] / passes,
-                                        "middle": sums["years"] / passes, "growth": own_growth(sums, biases)}))
 
 
 def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:
@@ -189,6 +154,20 @@ def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pie
     heading_deg = np.degrees(np.arctan2(sums["east"], sums["north"])) % 360.0
     return _table("segment", sums["road"], sums["lat"] / passes, sums["lon"] / passes, heading_deg, length_m,
                   sums["cars"], passes, sums["years"] / passes, figures, a_w, sums["speed"] / passes, sums["last_us"])
+
+
+def change_found(roads: RoadTable) -> float:
+    """The change a year [m/km] that half of the roads would show as significant with the usual power of 80 % (J. Cohen,
+    Statistical Power Analysis, 1988, section 2.4); NaN: no road has a change."""
+    from scipy.stats import norm
+
+    known = np.isfinite(roads.trend_std_m_per_km_per_year) & (roads.trend_std_m_per_km_per_year > 0)
+    if not known.any():
+        return np.nan
+    called = significant(roads.p_value, FALSE_SHARE)
+    at_p = float(roads.p_value[called].max()) if called.any() else FALSE_SHARE / int(known.sum())
+    needed = float(norm.isf(at_p / 2) + norm.ppf(_POWER))
+    return needed * float(np.median(roads.trend_std_m_per_km_per_year[known]))
 
 
 def piece_of(key: Keys) -> npt.NDArray[np.intp]:

@@ -10,7 +10,7 @@ import numpy as np
 from logger.fleet.ingest import Counts
 from logger.fleet.layer import FIELDS, roads_layer
 from logger.fleet.pseudonyms import shown_car
-from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
+from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable, change_found
 from logger.printable import counted
 from logger.report.quantities import known
 from logger.store.log.log_reader import utc
@@ -44,7 +44,7 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
     return {
         "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
         "growth_per_year": known(biases.growth_per_year), "pass_std": known(biases.pass_std),
-        "session_std": known(biases.pass_std * figures.shared**0.5),
+        "session_std": known(biases.session_std), "change_found_m_per_km_per_year": known(change_found(figures.roads)),
         "cars": [{"car": shown_car(car), "passes": int(passes), "bias": known(gain - 1.0 if estimated else np.nan),
                   "bias_std": known(gain * std if estimated else np.nan), "group": int(group)}
                  for car, passes, gain, std, group, estimated in zip(
@@ -61,9 +61,8 @@ def figures_words(figures: FleetFigures) -> str:
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
     if isfinite(biases.pass_std):
-        of_session = biases.pass_std * figures.shared**0.5
         lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
-                     f"{of_session:.1%} are shared by all passes of a session")
+                     f"{biases.session_std:.1%} are shared by all passes of a session")
     if isfinite(biases.growth_per_year):
         lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
     return "\n".join([*lines, "", *_cars(figures), "", *_roads(roads), "", *_changes(roads)])
@@ -101,9 +100,12 @@ def _roads(roads: RoadTable) -> list[str]:
 def _changes(roads: RoadTable) -> list[str]:
     worse = np.flatnonzero(roads.worse)
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
+    limit = change_found(roads)
+    power = ([f"A change of {limit:.2f} m/km a year would be found on every second {roads.by} with 80 % certainty"]
+            if isfinite(limit) else [])
     if not order:
-        return [f"No {roads.by} has become worse, as far as these drives tell"]
-    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
+        return [f"No {roads.by} has become worse, as far as these drives show", *power]
+    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [
         f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "

@@ -1,11 +1,11 @@
-"""Whether the data can tell the numbers apart at all, in words.
+"""Whether the data can distinguish the numbers at all, in words.
 
 Problem: a fit always ends somewhere. Where the data say nothing of a number, or only of a combination of several, the
 place it ends at is an accident that looks like a result. Solution: the predictions' derivatives, by the relative change
 of each number and in units of the noise, are looked at before anything is believed:
 
 - a number whose derivative is nothing is silent;
-- numbers whose derivatives cancel in some combination can be told only together (a vanishing singular value of the
+- numbers whose derivatives cancel in some combination can be estimated only together (a vanishing singular value of the
   scaled derivatives), whatever the noise;
 - a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak; of some
   numbers, such as a speed that was recorded, a rougher estimate than they came with is worth nothing.
@@ -35,7 +35,7 @@ NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their dist
 # Of a direction is named what has this share of its largest change, or of the largest trace that one alone would leave.
 _PART_OF, _TRACE_OF = 0.1, 0.9
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
-# Rms of what is left over that of what was measured; and how much less of it is clearly less.
+# Rms of the residual over that of the measurement; and how much less of it is clearly less.
 _EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
 
 
@@ -45,7 +45,7 @@ class Finding:
 
     kind         silent, together, weak, unexplained, turned or apart
     direction    relative changes by name that the predictions do not feel, the largest 1; empty where it is no number
-                 that cannot be told
+                 that cannot be estimated
     words        a sentence
     """
 
@@ -55,8 +55,8 @@ class Finding:
 
 
 class NotIdentifiable(CheckFailed):
-    """The data do not tell what was asked. ``findings`` say what, and its text says it in words; ``error_before`` that
-    of the model where every free number starts, None: not known."""
+    """The data do not determine what was asked. ``findings`` say what, and its text says it in words; ``error_before``
+    that of the model where every free number starts, None: not known."""
 
     def __init__(self, findings: Sequence[Finding], error_before: float | None = None) -> None:
         super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))
@@ -64,7 +64,7 @@ class NotIdentifiable(CheckFailed):
 
 
 def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
-    """What no amount of such data could tell.
+    """What no amount of such data could determine.
 
     derivatives    (N, p) of the predictions by the relative change of each number
     size           root of the sum of squares of the predictions
@@ -112,7 +112,7 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         else:
             why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
                 f"{_moves(shares)} drowns in the noise")
-            words = (f"this drive does not tell {_listed(list(shares))} apart: {why} (standard errors "
+            words = (f"this drive does not separate {_listed(list(shares))}: {why} (standard errors "
                      f"{', '.join(errors.values())}). Hold one of them fixed, or add runs that differ.")
         findings.append(Finding(WEAK, shares, words))
         weak &= ~np.isin(names, list(shares))
@@ -143,8 +143,8 @@ def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:
         words = (f"{_listed(list(shares))} share one scale: all of them larger by one factor give the same record. "
                  "Hold one of them fixed at a value that is known.")
     else:
-        words = (f"{_listed(list(shares))} can be told only together: {_moves(shares)} gives the same record. Hold one "
-                 "of them fixed.")
+        words = (f"{_listed(list(shares))} can be estimated only together: {_moves(shares)} gives the same record. "
+                 "Hold one of them fixed.")
     return Finding(TOGETHER, shares, words)
 
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
 from logger.dsp.decimating_low_pass import LowPass
-from logger.dsp.linear_prediction import Whitener, burg, ladder, levinson
+from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Whitening:
     """
 
     name: str
-    whiteners: list[Whitener]
+    whiteners: list[PredictionWhitener]
     parameters: int
     deviance: float
     words: str
@@ -85,12 +85,12 @@ class White:
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
         """As ``Noise``."""
-        shape = Whitener(np.zeros((0, 0)), np.ones(1))
+        shape = PredictionWhitener(np.zeros((0, 0)), np.ones(1))
         if low_pass.cutoff_hz is not None:
             memory = min(int(_FILTER_MEMORY_S * low_pass.kept_hz), min(map(len, residuals)) - 1)
             shape = levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
         deviation = max(_rms([shape(one) for one in residuals]), floor)
-        whitener = Whitener(shape.start / deviation, shape.taps / deviation)
+        whitener = PredictionWhitener(shape.start / deviation, shape.taps / deviation)
         return _whitening("white", [whitener] * len(residuals), residuals, 1,
                           f"white noise of {deviation:.3g} m/s2", {"deviation_mps2": deviation})
 
@@ -171,7 +171,7 @@ def _covariance(spectrum: Array, rate_hz: float) -> Array:
     return np.asarray(np.fft.irfft(spectrum, _GRID) * rate_hz / 2)
 
 
-def _whitening(name: str, whiteners: list[Whitener], residuals: Sequence[Array], parameters: int, words: str,
+def _whitening(name: str, whiteners: list[PredictionWhitener], residuals: Sequence[Array], parameters: int, words: str,
                levels: dict[str, float]) -> Whitening:
     pairs = list(zip(whiteners, residuals, strict=True))
     squares = sum(float((whitener(one) ** 2).sum()) for whitener, one in pairs)

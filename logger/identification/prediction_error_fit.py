@@ -3,11 +3,11 @@
 Problem: find the numbers for which the model's predictions leave the least, say how certain they are, and say so when
 the data cannot tell. Solution, in this order:
 
-1. ask whether the data could tell at all (``identifiability``), before any fit;
+1. ask whether the data could determine the numbers at all (``identifiability``), before any fit;
 2. go downhill, in the logarithm of what can only be positive, within bounds, on residuals as they are (output error),
    from every start that was given; the best goes on; by squares, as far from the end a robust loss has hills of its
    own;
-3. fit a noise model to what is left, weigh by it (innovations form), and repeat 2 from there, until neither moves;
+3. fit a noise model to the residual, weigh by it (innovations form), and repeat 2 from there, until neither moves;
 4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
    whether the model at its best has anything to do with what was measured.
 
@@ -84,7 +84,7 @@ class DifferentiablePredictor(Predictor, Protocol):
 
 
 def least_share(model: Predictor) -> float:
-    """What is left of a measurement is taken for no less than this share of it, as predictions are no better."""
+    """The residual is taken for no less than this share of the measurement, as predictions are no better."""
     return LEAST_SHARE_SIMULATED if isinstance(model, DifferentiablePredictor) and not model.exact else LEAST_SHARE
 
 
@@ -98,7 +98,7 @@ class FitOptions:
     robust         Huber's loss: single wild residuals count less
     starts         further starts, values by name; what they do not name starts as in ``Free``
     most_steps     of one descent
-    refuse         raise NotIdentifiable; otherwise ``Fit.verdict`` tells
+    refuse         raise NotIdentifiable; otherwise ``Fit.verdict`` says it
     """
 
     rate_hz: float = 100.0
@@ -307,7 +307,7 @@ class _FitProblem:
         return np.clip(start + nudge, self.low, self.high)
 
     def structural_findings(self, x: Array) -> list[Finding]:
-        """What no such data could tell at a place."""
+        """What no such data could determine at a place."""
         here = self.linearised(x)
         size = float(np.sqrt(sum((one**2).sum() for one in here.predictions)))
         return structural([one.name for one in self.free], np.concatenate(here.slopes), size,

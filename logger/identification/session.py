@@ -119,8 +119,8 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
 def upright_fit(
     model_of: Callable[[list[Run]], DriveModel], records: list[Run], options: Callable[[DriveModel], FitOptions]
 ) -> Fit:
-    """The fit of the model of records. NotIdentifiable for what they do not tell, or tell only when they are turned
-    over; ValueError as ``fit``."""
+    """The fit of the model of records. NotIdentifiable for what they do not determine, or determine only when they are
+    turned over; ValueError as ``fit``."""
     def fitted(of: list[Run]) -> Fit:
         model = model_of(of)
         return fit(model, model.measured, options(model))

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.drive_model import DriveModel
-from logger.identification.noise_models import ROAD_LEVEL, Whitener
+from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
 from logger.profiles.track import Track
 from logger.roads.iso8608 import displacement_psd
@@ -94,12 +94,12 @@ class _Drive:
     way_m: Array
     white: Array
     slopes: Array
-    whitener: Whitener
+    whitener: PredictionWhitener
     response: Complex
 
 
 def may_have_common(model: DriveModel) -> bool:
-    """Whether there are several drives whose roads are told to be alike."""
+    """Whether there are several drives that are given the same road."""
     roads = [one.track for one in model.records if isinstance(one.track, Track)]
     alike = [one.start_m == roads[0].start_m and np.array_equal(one.elevation_m, roads[0].elevation_m) for one in roads]
     return 1 < len(alike) == len(model.records) and all(alike)

@@ -25,17 +25,7 @@ from logger.vehicle.vehicle import Vehicle
 Array = npt.NDArray[np.float64]
 
 SAYS_LITTLE = 0.8
-"""From this error on a model says next to nothing: it explains a third of the power."""
-EXPLAINS = 0.35
-"""Up to this error a car explains a record: nine tenths of the power."""
-_FAR_SIGMA, _SEVERAL = 6.0, 4
-"""Numbers that are off by so many deviations are far off; of one effect's doing are few."""
-_WIDE, _WIDE_LENGTHS = 0.5, 0.1
-_STRETCH_S, _RUNS = 25.0, 2
-"""So much of so many runs tells: some thirty bounces of the body each."""
-_FINE_HZ = 500.0
-_DRAWS, _BEST, _ROUNDS = 60, 8, 6
-_LEAST_SPREAD = 0.03
+"""From this error on a model explains next to nothing: a third of the power (1 - 0.8 squared)."""
 
 
 @dataclass(frozen=True)
@@ -53,54 +43,60 @@ class AnotherCar:
 
 
 def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                numbers: float) -> AnotherCar | None:
+                numbers: float, explains: float = 0.35, far_sigma: float = 6.0, several: int = 4) -> AnotherCar | None:
     """The other car that a record is of; None: it may well be this one.
 
     predictions    of the model (n,) per run
     numbers        deviation of what the car's numbers are usually off by, as a share
+    explains       up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
+    far_sigma, several    so many numbers off by so many deviations are another car's (a judgement: an effect that is
+                   missing moves few numbers far)
     """
     if normalised_rms_error(runs, predictions) < SAYS_LITTLE:
         return None
-    some = SimulatedRuns([_beginning(one) for one in dict.fromkeys((runs[0], runs[-1]))][:_RUNS], _FINE_HZ)
-    wide = Posterior(some, vehicle, Tolerance(numbers=_WIDE, lengths=_WIDE_LENGTHS), vehicle).without_wall()
+    anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
+    some = SimulatedRuns([_beginning(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
+    wide = Posterior(some, vehicle, anything, vehicle).without_wall()
     error = wide.error(aligned(wide, wide.start(effects)).state)
     if error < SAYS_LITTLE:
         return None
     start = wide.start(effects)
     found = fit(aligned(wide, wide.at(effects, _drawn(wide, effects), start.record, start.size)), rounds=10).state
     found_error = wide.error(found)
-    lengths = wide.prior.deviations < _WIDE
+    lengths = wide.prior.deviations < anything.numbers
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
     far = [index for index in np.argsort(-np.abs(logs)) if not lengths[index]
-           and abs(logs[index]) > _FAR_SIGMA * numbers]
-    if found_error > EXPLAINS or len(far) < _SEVERAL:
+           and abs(logs[index]) > far_sigma * numbers]
+    if found_error > explains or len(far) < several:
         return None
     return AnotherCar(error, found_error,
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
-def _beginning(run: Run) -> Run:
-    """The first part of a run."""
-    count = min(run.count, round((run.skip_s + _STRETCH_S) * run.rate_hz))
+def _beginning(run: Run, lasts_s: float = 25.0) -> Run:
+    """The first part of a run: some thirty bounces of the body are enough to recognise a car by."""
+    count = min(run.count, round((run.skip_s + lasts_s) * run.rate_hz))
     return replace(run, measured_mps2=run.measured_mps2[:count], distance_m=run.distance_m[:count],
                    speed_mps=run.speed_mps[:count], usable=None if run.usable is None else run.usable[:count],
                    more=run.more[:, :count])
 
 
-def _drawn(wide: Posterior, effects: Sequence[Chosen]) -> Array:
+def _drawn(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60, best_of: int = 8,
+           least_spread: float = 0.03) -> Array:
     """Logarithms (p,) of the numbers of a car that explains a record roughly: the best of many that are drawn around
     the best so far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,
-    1999)."""
+    1999). Each round draws so many and goes on around the mean of the best; their spread, relative to the prior's, is
+    kept from collapsing."""
     rng, deviations = np.random.default_rng(1), wide.prior.deviations
     middle, spread = np.zeros_like(deviations), 0.8 * deviations
     best, least = middle, np.inf
-    for _ in range(_ROUNDS):
-        drawn = middle + spread * rng.standard_normal((_DRAWS, len(deviations)))
+    for _ in range(rounds):
+        drawn = middle + spread * rng.standard_normal((draws, len(deviations)))
         errors = np.array([normalised_rms_error(wide.runs.runs, wide.runs.predict(wide.car(effects, one), rough=True))
                            for one in drawn])
         ranks = np.argsort(np.where(np.isfinite(errors), errors, np.inf))
         if errors[ranks[0]] < least:
             best, least = drawn[ranks[0]], float(errors[ranks[0]])
-        middle = drawn[ranks[:_BEST]].mean(axis=0)
-        spread = np.maximum(drawn[ranks[:_BEST]].std(axis=0), _LEAST_SPREAD * deviations)
+        middle = drawn[ranks[:best_of]].mean(axis=0)
+        spread = np.maximum(drawn[ranks[:best_of]].std(axis=0), least_spread * deviations)
     return best

@@ -139,7 +139,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
 
 
 def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTests:
-    """Tests of what is left without what the sensors drift."""
+    """Tests of the residual without the sensors' drift."""
     residuals, where = refitted.residuals, refitted.where
     if removed.drifting:
         residuals = replace(residuals, predictions=removed.cleared(residuals.predictions))

@@ -28,6 +28,7 @@ from logger.lab.likelihood.noise_floor import (
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
@@ -94,6 +95,7 @@ class Diagnosis:
     removed              what is taken out of the error before it is judged
     signals              errors of signals beside the sensor's acceleration, by name
     band                 what of the runs was compared; None: all of it
+    car                  its numbers and laws as fitted
     """
 
     runs: tuple[str, ...]
@@ -114,6 +116,7 @@ class Diagnosis:
     removed: Removed
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     band: ComparedBand | None = None
+    car: FittedCar | None = None
 
     @property
     def left_over(self) -> bool:
@@ -189,6 +192,7 @@ def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_errors,
         undetectable=hidden, shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, stood, state),
+        car=fitted_car(fine, stood, state),
     )
 
 

@@ -1,13 +1,13 @@
 """A grey-box fit to records as they are: rounded to steps, at places that are only about known.
 
-Problem: a prediction-error fit takes every reading for an acceleration with noise, at the place beside it. Of a coarse
-sensor much more is known, the step that it was in; and at places that are some decimetres off a fit takes the loss for
-noise at best, for other numbers of the car at worst, with standard errors that are far too small.
+Problem: a prediction-error fit takes every reading for an acceleration with noise, at the place recorded with it. Of a
+coarse sensor much more is known, the step that it was in; and at places that are some decimetres off a fit takes the
+loss for noise at best, for other numbers of the car at worst, with standard errors that are far too small.
 
 Solution: as the lab's searches do it. Beside the model that was fitted, a rounded reading says by its bounds what it
-says (``likelihood.readings``), and the fit is made anew to that. Where a run says how far off its places are, its
+says (``likelihood.readings``), and the fit is repeated to that. Where a run says how far off its places are, its
 distance error is a curve of numbers with that prior (``likelihood.distance_error``). One step of Gauss and Newton for
-these and the free numbers together moves the run, and the fit is made anew there; both, until nothing moves. The
+these and the free numbers together moves the run, and the fit is repeated there; both, until nothing moves. The
 covariance that comes out is that of the free numbers with the distance errors integrated out (D. J. C. MacKay, Neural
 Computation 4, 1992).
 """
@@ -32,10 +32,6 @@ from logger.runs import Run, normalised_rms
 Array = npt.NDArray[np.float64]
 ModelOf = Callable[[list[Run]], DriveModel]
 
-_ROUNDS = 8
-_AT_REST = 0.1
-"""Of a standard error: numbers that move by less between two fits are found."""
-
 
 @dataclass(frozen=True, eq=False)
 class ReadingsFit:
@@ -48,7 +44,8 @@ class ReadingsFit:
     moved_m: float = 0.0
 
 
-def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions]) -> ReadingsFit:
+def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions],
+                    rounds: int = 8) -> ReadingsFit:
     """The fit of a model to records (``session.upright_fit``), with what they say of their steps and places.
 
     NotIdentifiable and ValueError as ``upright_fit``.
@@ -61,7 +58,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
     found, model = first, model_of(there)
     if not moves and not any(record.facts.step_mps2 for record in records):
         return ReadingsFit(first, model)
-    for turn in range(_ROUNDS):
+    for turn in range(rounds):
         if moves:
             at = _moved(model, found, errors, at).at
         there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
@@ -117,7 +114,7 @@ def _followed(model: DriveModel, errors: Sequence[RecordError | None]) -> list[A
 @dataclass(frozen=True, eq=False)
 class _Moved:
     """Numbers of the distance errors one step of Gauss and Newton farther; by which matrix (p, p) the information of
-    the free numbers falls when these errors are integrated out; and how many numbers the records told of them."""
+    the free numbers falls when these errors are integrated out; and how many numbers of them the records determine."""
 
     at: list[Array | None]
     lost: Array
@@ -168,8 +165,9 @@ def _again(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOp
     return fit(model, model.measured, replace(options(model), starts=()))
 
 
-def _rests(before: Fit, found: Fit) -> bool:
-    return all(abs(found.parameters[name] - before.parameters[name]) <= _AT_REST * error
+def _rests(before: Fit, found: Fit, share: float = 0.1) -> bool:
+    """Whether no number moved by more than this share of its standard error, which nobody would notice."""
+    return all(abs(found.parameters[name] - before.parameters[name]) <= share * error
                for name, error in found.standard_errors.items())
 
 

@@ -17,23 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.whittle import Bands
+from logger.lab.selection.evidence import FALSE_ALARM
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
 _REACH_S = 1.0
-"""A right road is found within this lag: a late clock, or a place that is metres off."""
-_CHANCE = 1e-3
-_LEAST_OF_A_RIGHT_ROAD = 0.5
-"""Correlations of the right road were 0.63 and more in 200 runs of 56 simulated cars with one, two or unlisted effects
-missing, each far stronger than the noise; of wrong roads at most 0.36."""
-_STEP_S = 1.6 * _REACH_S
-"""Between places that are tried: each is tried with the lags around it."""
-_PART_S = 8.0
-"""Of a run whose distances wander: ten bounces of a body, in which a speed that is off by 0.1 m/s moves it by no more
-than a tenth of the wave that bounces it at 6 m/s."""
-_MOST_PLACES = 200
-"""That are tried, the nearest first: some kilometres, in seconds."""
+"""The right road is found within this lag: a late clock, or a place that is metres off."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +47,8 @@ class RoadMatch:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the road is another one: the run could have told, and goes with it no better than by chance, either
-        way up."""
+        """Whether the road is another one: the run could have shown it, and correlates with it no better than by
+        chance, either way up."""
         return max(self.correlation, self.turned) < self.chance < self.expected
 
     @property
@@ -74,7 +64,7 @@ class RoadMatch:
 
 
 def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
-    """Several runs together, their means: what none of them could tell by itself, all may, as the mean of maxima
+    """Several runs together, their means: what none of them could show by itself, all may, as the mean of maxima
     scatters less around its own mean than one of them."""
     upright, turned, gain, chance, mean_chance, expected = map(
         float, np.mean([astuple(one) for one in matches], axis=0))
@@ -97,16 +87,26 @@ def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
     return 0.4 * float(body_hz.min()), 3.0 * float(body_hz.max())
 
 
-def road_match(run: Run, prediction: Array, band_hz: tuple[float, float]) -> RoadMatch:
+def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
+    """The frequencies below the bounce of a body, by its vibrations (b,) [Hz]: it moves with the road there, whether
+    its suspension is free or sticks; around the bounce one that sticks may move it the other way, and far more."""
+    return bounce_band_hz(body_hz)[0], float(body_hz.min())
+
+
+def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0) -> RoadMatch:
     """How well a run goes with a prediction (n,) between two frequencies [Hz]: all of it, or where its distances are
-    off by more and more along the way, its parts, each at a lag of its own."""
+    off by more and more along the way, its parts, each at a lag of its own.
+
+    part_s    ten bounces of a body, in which a speed that is off by 0.1 m/s moves it by no more than a tenth of the
+              wave that bounces it at 6 m/s
+    """
     expected = _expected(run, band_hz)
 
     def of(part: slice) -> RoadMatch:
         return _match(run.measured_mps2[part], prediction[part], run.rate_hz, band_hz, expected)
 
     whole = of(slice(run.first, None))
-    size = round(_PART_S * run.rate_hz)
+    size = round(part_s * run.rate_hz)
     starts = range(run.first, run.count - size + 1, size)
     if not whole.is_refuted or len(starts) < 2:
         return whole
@@ -115,7 +115,7 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float]) -> Roa
 
 
 def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tuple[float, float],
-           expected: float) -> RoadMatch:
+           expected: float, false_alarm: float = FALSE_ALARM) -> RoadMatch:
     measured, model = (_spectrum(one, rate_hz, band_hz) for one in (measured_mps2, model_mps2))
     count = len(measured_mps2)
     power = float(np.sqrt((np.abs(measured) ** 2).sum() * (np.abs(model) ** 2).sum()))
@@ -133,24 +133,25 @@ def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tup
     spread = float(np.sqrt(np.mean(correlation[far] ** 2 * count / (count - lag[far]))))
     # Maxima of so many independent values on either side of no lag, as a band so wide has them.
     values = max(1.0, 4 * _REACH_S * (band_hz[1] - band_hz[0]))
-    chance, mean_chance = (spread * float(np.sqrt(2 * np.log(one))) for one in (values / _CHANCE, values))
+    chance, mean_chance = (spread * float(np.sqrt(2 * np.log(one))) for one in (values / false_alarm, values))
     return RoadMatch(upright, turned, gain, chance, mean_chance, expected)
 
 
 def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz: tuple[float, float],
-                     ends_m: tuple[float, float]) -> Placement | None:
+                     ends_m: tuple[float, float], most_places: int = 200) -> Placement | None:
     """Where along a profile a run fits clearly; None: nowhere.
 
     predict    the prediction (n,) for a run that was farther by this (n,) [m], on the profile or on it read backwards
     ends_m     where the profile begins and ends [m]
+    most_places    that are tried, the nearest first: some kilometres, in seconds
     """
     usual_mps = float(np.median(run.speed_mps[run.first:]))
-    step_m = max(_STEP_S * usual_mps, 1.0)
+    step_m = max(1.6 * _REACH_S * usual_mps, 1.0)  # lags on either side of each place overlap by a fifth
     low_m, high_m = ends_m[0] - float(run.distance_m.min()), ends_m[1] - float(run.distance_m.max())
     places_m = step_m * np.arange(np.floor(min(low_m, 0.0) / step_m), np.ceil(max(high_m, 0.0) / step_m) + 1)
     found = [Placement(float(at), backwards,
                        road_match(run, predict(np.full(run.count, at), backwards), band_hz))
-             for backwards in (False, True) for at in sorted(places_m, key=abs)[:_MOST_PLACES]]
+             for backwards in (False, True) for at in sorted(places_m, key=abs)[:most_places]]
     best = max(found, key=lambda one: one.match.correlation - one.match.chance)
     return best if best.match.is_clear and not best.match.is_upside_down else None
 
@@ -164,13 +165,17 @@ def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> n
     return np.asarray(spectrum)
 
 
-def _expected(run: Run, band_hz: tuple[float, float]) -> float:
+def _expected(run: Run, band_hz: tuple[float, float], without_noise: float = 0.5) -> float:
     """The least correlation of the right road, where the sensor's own noise, as loud as at the highest frequencies, is
-    a share of what was measured."""
+    a share of what was measured.
+
+    without_noise    measured: the right road gave 0.63 and more in 200 runs of 56 simulated cars with one, two or
+                     unlisted effects missing, each far stronger than the noise; wrong roads at most 0.36
+    """
     noise, _ = Bands(run).quiet(run.measured_mps2)
     kept = run.kept_mps2 - run.kept_mps2.mean()
     power = np.abs(np.fft.rfft(kept)) ** 2 / len(kept)
     f_hz = np.fft.rfftfreq(len(kept), 1 / run.rate_hz)
     inside = (f_hz >= band_hz[0]) & (f_hz <= band_hz[1])
     road = max(0.0, 1 - noise / float(power[inside].mean()))
-    return _LEAST_OF_A_RIGHT_ROAD * float(np.sqrt(road))
+    return without_noise * float(np.sqrt(road))

@@ -95,7 +95,7 @@ def find_modes(
     what = "response to unmeasured random forces" if inputs is None else "response beside its measured input"
     how = f"{what}: {METHODS[method]}"
     if chosen == 0:
-        return ModalResult((), (), 0, f"{how}; no model tells more than its parameters cost")
+        return ModalResult((), (), 0, f"{how}; no model explains more than its parameters cost")
     place = plan.orders.index(chosen)
     thinned = plan.orders[place::-(place // _DIAGRAM_ORDERS + 1)][::-1]
     diagram = plan.models(moments, thinned + plan.orders[place + 1:place + 1 + _DIAGRAM_BEYOND])
@@ -169,7 +169,7 @@ def _plan(method: str, data: Array, outputs: int, rate_hz: float, least: int) ->
 
 
 def _memory(data: Array, outputs: int, longest: int) -> int:
-    """How many lags of the past tell something of the present: twice those that a regression takes (Bauer, 2005).
+    """How many lags of the past predict something of the present: twice those that a regression takes (Bauer, 2005).
 
     Fewer would leave the slowest vibrations too damped; with more, chance enters the state.
     """

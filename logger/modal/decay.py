@@ -1,6 +1,6 @@
 """Free decays: which vibrations a record supports, and each with the smallest error that its noise allows.
 
-Problem: a method that reads poles off a decomposition (ERA, SSI, AR) has to be told the order. Too low, and poles are
+Problem: a method that reads poles off a decomposition (ERA, SSI, AR) has to be given the order. Too low, and poles are
 mixed; too high, and noise becomes poles; its damping can be 70 % off at 20 dB without a word about it.
 
 Solution: such a method only proposes poles. What is believed and reported comes from the model itself,
@@ -176,7 +176,7 @@ def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
     """Squared envelopes (m, samples), and the share of its noise (samples,) that the fit left in each sample.
 
     What grows lasts all along. What is over in a few samples, most of whose noise the fit took, is given some more: too
-    few tell nothing of the noise, and heavily damped modes would drown in what is not known of it.
+    few show nothing of the noise, and heavily damped modes would drown in what is not known of it.
     """
     fall = np.clip(poles.real, -rate_hz / _FEWEST_TO_TELL, 0.0)
     envelope = np.exp(2 * np.outer(fall, np.arange(len(fit.residual)) / rate_hz))
@@ -208,7 +208,7 @@ def _louder_meanwhile(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
 
 
 def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
-    """Add proposed poles, the most telling first, as long as they tell more than noise would.
+    """Add proposed poles, those that explain most first, as long as they explain more than noise would.
 
     While modes are missing the residual is no noise, and a few more poles are tried before those that are no stronger
     than it are given up.

@@ -11,7 +11,7 @@ spectrum of a reading at speed v is known but for the car's springs, dampers, ma
 These are fitted, and the modes are those of the car with the numbers found. Pieces of the record have a level g each;
 the speed within a piece is mixed as it was driven (R. Dahlhaus, Ann. Statist. 25, 1997, 1). Each periodogram is
 compared with its own expectation, which leakage is a part of (A. Sykulski et al., Biometrika 106, 2019, 251), by
-Whittle's likelihood. Tapered pieces that overlap tell less than they are many; the likelihood is weighted for that.
+Whittle's likelihood. Tapered pieces that overlap are worth less than their number; the likelihood is weighted for that.
 
 Every number starts at the vehicle's and is believed to lie within a factor of some ``exp(0.5)`` of it, so that what the
 reading does not show keeps a large standard error, and its mode is not reported. Damping cannot come out negative.
@@ -238,7 +238,7 @@ def _shares(pieces: Pieces, spectrum: Array) -> tuple[Array, Array]:
 
 
 def found_modes(fit: CarFit) -> tuple[list[FoundMode], list[Rejected]]:
-    """The modes that the reading tells, with standard errors, and those that it does not."""
+    """The modes that the reading resolves, with standard errors, and those that it does not."""
     base = _modes(fit.vehicle)
     slopes = np.zeros((len(fit.names), *base.shape))
     for number, name in enumerate(fit.names):

@@ -3,8 +3,8 @@
 The transform of one long record is as rough as its noise. Summing those of equal segments smooths it, at the price of
 resolution, and the scatter from segment to segment gives the errors. The sum here is of powers, with a Hann window. A
 peak is a mode when it rises above its surroundings further than the highest of all bins would by chance; its damping is
-told from its width at half power, and only where that is several times the window's own: nearer to it the figure would
-be that of the window, and the ragged top of a spectrum of few segments makes it too small.
+measured by its width at half power, and only where that is several times the window's own: nearer to it the figure
+would be that of the window, and the ragged top of a spectrum of few segments makes it too small.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ class TirePath:
             beyond = along >= self._second
             piece = 2 * piece + beyond
             along = along - self._second * beyond
-        return along * self._spacing_m, self._pieces[:, piece]
+        return along * self._spacing_m, self._pieces.take(piece, axis=1)
 
 
 def _pieces(height: Array, slope: Array, bend: Array, width: Array) -> Array:

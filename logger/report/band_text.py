@@ -11,9 +11,9 @@ def band_words(band: ComparedBand | None) -> list[str]:
     """Which frequencies were compared, and why; nothing where all were."""
     if band is None:
         return []
-    errors = "errors are of what lies below, in the measurement and in the model"
+    errors = "errors compare measurement and model below that"
     if band.low_hz > 0:
-        errors = f"nor below {band.low_hz:.3g} Hz; errors are of what lies between, in the measurement and in the model"
+        errors = f"nor below {band.low_hz:.3g} Hz; errors compare measurement and model in between"
     if band.cutoff_hz is None:
         return [f"Above {band.high_hz:.3g} Hz nothing is compared, as was asked or as run.yaml says; {errors}."]
     which = "Some of the records were" if band.some else "The record was"

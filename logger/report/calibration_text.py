@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
-from logger.estimation.rms_calibration import LEVELS_IRI, Line, Settings, SpeedCalibration
+from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.units import MPH_MPS
 from logger.vehicle.vehicle import Vehicle
 
@@ -33,7 +33,7 @@ class Calibrated:
     """A vehicle's lines: ``plain`` without a load, and those with it."""
 
     vehicle: Vehicle
-    settings: Settings
+    settings: CalibrationSettings
     plain: tuple[SpeedCalibration, ...]
     load: Load | None
 
@@ -61,7 +61,7 @@ def row(speed: SpeedCalibration) -> dict[str, float]:
     """The figures of a speed by name."""
     found = {"speed_mps": speed.speed_mps}
     for name, prefix in _PREFIXES.items():
-        line: Line = getattr(speed, name)
+        line: RmsLine = getattr(speed, name)
         found |= {name: line.slope, f"{prefix}spread": line.spread, f"{prefix}standard_error": line.standard_error,
                   f"{prefix}r2": line.r2}
     return found

@@ -152,7 +152,7 @@ def _which_to_use(result: RideComfort) -> str:
     if not wanted:
         return "a_w is enough: no crest factor above 9, no ratio above 1.5 or 1.75."
     which = "; ".join(f"{axis}: {' and '.join(name.upper() for name in names)}" for axis, names in wanted.items())
-    return f"a_w alone understates it, there are shocks. Report beside it {which}."
+    return f"a_w alone understates it, there are shocks. Report with it {which}."
 
 
 def _spoken(word: str | None) -> str:

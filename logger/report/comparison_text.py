@@ -75,8 +75,8 @@ def conclusion(found: Comparison) -> str:
         return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
                 "Nothing here asks for another effect of the car.")
     if found.removed.drifting or found.removed.distance_error_m > 0:
-        return ("Nothing else is missing: beside what is removed above, the residual asks for no effect of the car. "
-                "Rougher roads or other speeds would test the model harder.")
+        return ("Nothing else is missing: apart from what is removed above, the residual asks for no effect of the "
+                "car. Rougher roads or other speeds would test the model harder.")
     return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
 
 

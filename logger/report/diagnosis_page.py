@@ -6,16 +6,18 @@ from collections.abc import Sequence
 
 from logger.chart_data import Bars, Curves, Line
 from logger.lab.diagnosis import Diagnosis
+from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.report.charts import Steps, chart, steps_figure
 from logger.report.diagnosis_text import JUDGED_ON, looks_like, summary, table, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
-from logger.report.html import EMPTY, Html
+from logger.report.html import EMPTY, Html, concatenated
 from logger.report.lab_page import forces_section, spectra_section
 from logger.report.removed_text import drift_tile, removed_section
 from logger.report.residual_text import error_text
 
 _LEAST_SHARE, _MOST_BARS = 0.01, 12
+_MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
 
 
 def page(found: Diagnosis, vehicle: str) -> Html:
@@ -24,7 +26,8 @@ def page(found: Diagnosis, vehicle: str) -> Html:
     return document(title, [
         heading(title, ", ".join(found.runs)),
         _tiles(found), paragraphs(summary(found)), removed_section(found.removed, found.band), shape_sections(found),
-        section("How the error fell", _steps(found)), section("All candidates", _candidates(found)),
+        section("How the error fell", _steps(found)), car_sections(found),
+        section("All candidates", _candidates(found)),
         section("What these runs cannot tell", bullets(untested(found))),
         section("Where this is from", bullets(sources(found))),
     ])
@@ -86,6 +89,30 @@ def _candidates(found: Diagnosis) -> Html:
     return (chart(bars) + grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
             + hint("Each tried alone on the model of its round, those that are missing first, then the least likely to "
                    f"be chance. The error is on {JUDGED_ON}; the chance holds for all candidates together."))
+
+
+def car_sections(found: Diagnosis) -> Html:
+    """How far the car's numbers moved, as bars, and the forces of its springs and dampers as fitted, as curves."""
+    if found.car is None:
+        return EMPTY
+    bars = Bars("How far each number was refitted", "% of the file's value", tuple(
+        (name, 100 * share) for name, (share, _) in found.car.moved.items()))
+    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "more than it should" if name in found.conflicts else "")
+            for name, (share, tolerance) in found.car.moved.items()]
+    numbers = chart(bars) + grid(("Number", "Refitted by", "Usual", ""), rows, words=(0, 3)) + hint(
+        "A number that has to move far may stand in for an effect that is not among the candidates.")
+    curves = concatenated(map(_force, found.car.curves))
+    said = hint("Over what the model's suspensions reach in these runs, but for 0.1 % of the time. Forces with a "
+                "memory are not in it.") if curves else EMPTY
+    return (section("The car's own numbers", numbers if rows else EMPTY)
+            + section("Its springs and dampers", curves + said))
+
+
+def _force(one: ForceCurve) -> Html:
+    return chart(Curves(
+        f"{one.axle.capitalize()} suspension by its {one.motion}",
+        f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
+        (Line("as fitted", one.at, one.after_n), Line("as the file says", one.at, one.before_n))))
 
 
 def _where(shape: Shape) -> Html:

@@ -28,7 +28,7 @@ def summary(found: Diagnosis) -> list[str]:
     removed = removed_words(found.removed, found.band)
     lines = list(removed)
     for one, group in zip(found.missing, groups(found), strict=True):
-        lines += [_missing(found, one), *([_confusion(found, group)] if len(group) > 1 else [])]
+        lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting or found.removed.distance_error_m > 0)
         lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
@@ -82,7 +82,7 @@ def _missing(found: Diagnosis, one: Chosen) -> str:
     says = "would explain part of what is missing, or imitates something else" if found.unexplained else "is missing"
     if candidate.confused_with:
         group = enumerated([name, *candidate.confused_with], "or")
-        return (f"One of {group} {says}; these runs cannot tell which. The numbers are for {name} "
+        return (f"One of {group} {says}; these runs cannot distinguish them. The numbers are for {name} "
                 f"({one.effect.title}){numbers}. {likely}")
     return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
 
@@ -110,11 +110,11 @@ _STEP_WORDS = {
 }
 
 
-def _confusion(found: Diagnosis, names: list[str]) -> str:
-    """Which drive would tell effects that explain alike."""
+def _confusion(names: list[str], found: Diagnosis) -> str:
+    """Which drive would separate effects that explain alike."""
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
-    return (f"{enumerated(names, 'and')} explain about as much as each other. What shows each best, and so would "
-            f"separate them: {'; '.join(drives)}. Before you drive, ridelog plan says whether a drive would.")
+    return (f"{enumerated(names, 'and')} explain about as much of the residual as each other. Drives that would "
+            f"separate them: {'; '.join(drives)}. ridelog plan says beforehand whether a drive would.")
 
 
 def _on_the_way(found: Diagnosis) -> list[str]:

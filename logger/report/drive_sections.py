@@ -13,6 +13,7 @@ from logger.records import WindowRecord
 from logger.report.placed_rows import placed, trace_of
 from logger.report.summary import counts, expected_square
 from logger.roads.linear_reference import ALONG, on_route
+from logger.roads.localized_roughness import Area, areas
 from logger.roads.road_network import RoadNetwork
 from logger.roads.roughness_words import federal_condition
 from logger.roads.sections import Sections, Windows, even_edges, sections
@@ -111,6 +112,14 @@ def windows_of(records: Sequence[WindowRecord]) -> Windows:
         column(lambda one: one.duration_s), column(lambda one: one.iri_m_per_km if counts(one) else None),
         column(lambda one: one.iri_std_m_per_km),
         column(lambda one: expected_square(one) if counts(one) else None))
+
+
+def localized(drive: DriveSections, limit_m_per_km: float) -> list[Area]:
+    """Areas of localized roughness of a drive, by its own distance or the route's measures. A row that does not count
+    has no value; windows of other lengths than 25 ft slide by their own."""
+    windows = windows_of(drive.records)
+    beyond_m = _REACH * float(np.median(windows.end_m - windows.start_m))
+    return areas(drive.middle_m, windows.iri_m_per_km, limit_m_per_km, windows.iri_std_m_per_km, beyond_m)
 
 
 def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:

@@ -35,7 +35,7 @@ def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str,
         "noise_learnt": (found.noise is not None) if found.learns_noise else None,
         "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
-        "distance_relaid_m": drive.relaid_m, "compared": found.compared,
+        "distance_moved_m": drive.moved_m, "compared": found.compared,
         **figures(found, windows.speed_mps > 0),
         "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
         "shortest_wavelength_m": road.shortest_m if road else None,
@@ -81,9 +81,9 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
         f"{summary['window_m']:.4g} m",
         *_sensor_lines(summary),
     ]
-    if summary["distance_relaid_m"]:
-        shown.append("The distance went back here and there: laid anew by the speed, "
-                     f"{summary['distance_relaid_m']:.2f} m off at most.")
+    if summary["distance_moved_m"]:
+        shown.append("The distance went back here and there: computed again from the speed, "
+                     f"{summary['distance_moved_m']:.2f} m off at most.")
     if hint := _unit_hint(found):
         shown.append(hint)
     if not summary["answered_count"]:
@@ -110,12 +110,12 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
     noise, std = summary["noise_mps2"], summary["noise_std_mps2"]
     rounded = f"rounded to {summary['step_mps2']:g} m/s2 (--step)" if summary["step_mps2"] else "not rounded (--step)"
     if summary["noise_learnt"] is False:
-        return [f"This drive tells nothing of the noise. Taken for granted: {noise:g} m/s2 in a reading, {rounded}"]
+        return [f"This drive shows nothing of the noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
-        return [f"Taken for granted: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
+        return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
     shown = (f"noise of {noise:.3g} +- {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
-             f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot tell it")
-    return [f"Learnt from the drive: {shown}", f"Taken for granted: {rounded}"]
+             f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot resolve it")
+    return [f"Learnt from the drive: {shown}", f"Assumed: {rounded}"]
 
 
 def _unit_hint(found: Assessment) -> str:
@@ -143,8 +143,8 @@ def _range_words(found: Assessment) -> str:
     if road is None:
         return f"none over {RESOLVED_SHARE:.0%} of the way."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); that is "
-            f"what a profile holds{left_out}.")
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); "
+            f"a profile holds these{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[str]:

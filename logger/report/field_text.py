@@ -1,4 +1,4 @@
-"""The IRI of one drive by two vehicle files beside the truth, for a person and for a program."""
+"""The IRI of one drive by two vehicle files against the truth, for a person and for a program."""
 
 from __future__ import annotations
 

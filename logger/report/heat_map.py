@@ -1,4 +1,4 @@
-"""Numbers of pairs as shaded cells, for a page: what remains of one effect beside another."""
+"""Numbers of pairs as shaded cells, for a page: what remains of one effect when another is fitted."""
 
 from __future__ import annotations
 

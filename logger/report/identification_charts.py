@@ -1,4 +1,4 @@
-"""A fit as pictures: what is left in its residuals, and which numbers can be told only together."""
+"""A fit as pictures: its residuals, and which numbers can be estimated only together."""
 
 from __future__ import annotations
 

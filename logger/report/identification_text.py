@@ -32,7 +32,7 @@ def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
 
 
 def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
-    """All of it for a program; null where there is nothing to tell."""
+    """All of it for a program; null where nothing is known."""
     names = list(fit.parameters)
     return {
         "parameters": fit.parameters, "standard_errors": fit.standard_errors,
@@ -53,7 +53,7 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     """What stands between the estimates and their being believed, each in words; nothing when all is well."""
     yield from (finding.words for finding in fit.verdict)
     if not fit.converged:
-        yield "the fit did not come to rest."
+        yield "the fit did not converge."
     if fit.at_bound:
         yield f"{', '.join(fit.at_bound)} ended at a bound, which is where it was stopped and not what was measured."
     if not white.passed:
@@ -89,7 +89,7 @@ def lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield ""
     yield from _table(fit)
     yield ""
-    yield f"What is left is taken for {fit.noise.words}."
+    yield f"The residual is modelled as {fit.noise.words}."
     yield from _correlations(fit)
     yield from _checks(white, free_of_road)
     yield from _limits(fit, sound=not any(doubts(fit, white, free_of_road)))
@@ -103,17 +103,17 @@ def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
                f"does not contain. The standard errors count that; they are up to {common.growth:.2f} times those of "
                "runs over roads of their own.")
     elif may_have_common(model) and common.fit.noise.name != "road":
-        yield (f"If these {runs} runs are over one and the same place, what the road's shape there is off by is the "
-               f"same in all of them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
+        yield (f"If these {runs} runs are over one and the same place, the error of its profile is the same in all of "
+               f"them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
 
 
 def record_words(found: ReadingsFit) -> Iterator[str]:
-    """What of the records was used beside their samples."""
+    """What of the records was used in addition to their samples."""
     if found.rounded:
         yield "Readings are rounded: each says in which step it was, and no more (step_mps2 in run.yaml)."
     if found.moved_m:
-        yield (f"Places are about known (place_std_m in run.yaml): they were moved by up to {found.moved_m:.2g} m, and "
-               "the standard errors allow for what is uncertain of them.")
+        yield (f"Places are uncertain (place_std_m in run.yaml): they were corrected by up to {found.moved_m:.2g} m, "
+               "and the standard errors include that uncertainty.")
 
 
 def record_json(found: ReadingsFit, common: CommonRoughness, records: Sequence[Run]) -> dict[str, Any]:
@@ -159,11 +159,11 @@ def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
                + ("yes, standard errors can be trusted." if white.passed else
                   "no, the noise model is incomplete; the standard errors are a guide only."))
     if not white.degrees and not free_of_road.degrees:
-        yield "Nothing is left that could be tested."
+        yield "There is no residual to test."
     if free_of_road.degrees:
         yield (f"Do residuals follow the road? p = {free_of_road.p_value:.2g} over {free_of_road.degrees} degrees of "
                "freedom: " + ("no." if free_of_road.passed else
-                              "yes, the model misses something of the car, and the estimates lean to make up for it."))
+                              "yes, the model lacks something of the car, and the estimates are biased by that."))
 
 
 def _limits(fit: Fit, sound: bool) -> Iterator[str]:
@@ -171,8 +171,8 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
         yield (f"At a bound: {', '.join(fit.at_bound)}. That is where it was stopped, not what was measured; its "
                "standard error means nothing. Widen --bounds, or ask what the model lacks.")
         if fit.noise.name != "white":
-            yield ("Coloured noise takes what the model misses for noise, most of all in a sweep, which has one "
-                   "frequency at a time: try --noise white.")
+            yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
+                   "at a time: try --noise white.")
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in fit.free if one.by_factors]
@@ -182,7 +182,7 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
         listed = ", ".join(f"{name} ({share:.0%})" for name, share in vague.items())
         yield f"Poorly determined by these runs: {listed}."
     elif sound:
-        yield "These runs tell all that was asked."
+        yield "These runs determine all that was asked."
     if len(fit.parameters) > 1:
         yield _least_known(fit)
 

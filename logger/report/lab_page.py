@@ -64,7 +64,7 @@ def whole_drives(residuals: ModelResiduals) -> Html:
     for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
         time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
         lines = tuple(line(word, time_s, values[index]) for word, values in (
-            ("measured", residuals.measured), ("what is left", residuals.residual)))
+            ("measured", residuals.measured), ("residual", residuals.residual)))
         drawn.append(chart(Curves(names[run.name], "time in the run [s]", "acceleration [m/s2]", lines)))
     return section("The whole drive", concatenated(drawn))
 
@@ -74,12 +74,12 @@ def _worst_place(standing: Standing) -> Html:
     index, part = worst.run, worst.part
     time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
-        ("measured", residuals.measured), ("what is left", residuals.residual), ("model", residuals.model)))
+        ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
     return section("The worst place", chart(Curves(worst.words, "time in the run [s]", "acceleration [m/s2]", lines)))
 
 
 def spectra_section(residuals: ModelResiduals) -> Html:
-    """What was measured, what the model says and what is left, by frequency."""
+    """Spectra of measurement, model and residual."""
     return section("By frequency", concatenated(map(chart, spectra(residuals))))
 
 
@@ -93,7 +93,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
         return Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
             Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
-            for name, one in zip(("measured", "what is left", "model"), density, strict=True)))
+            for name, one in zip(("measured", "residual", "model"), density, strict=True)))
 
     return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 
@@ -107,11 +107,11 @@ def _places(standing: Standing) -> Html:
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
                               np.array([part.residual_mps2 for part in parts])))
-    along = Curves("What is left along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
+    along = Curves("Residual along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
              error_text(part, 2)) for part in worst_places(standing.where, _WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
-        ("Run", "From, to [m]", "Share of what is left", "Left [m/s2]", "Error"), rows))
+        ("Run", "From, to [m]", "Share of the residual", "Residual [m/s2]", "Error"), rows))
 
 
 def forces_section(forces: ForceMap) -> Html:
@@ -123,9 +123,9 @@ def forces_section(forces: ForceMap) -> Html:
             (_titled("By speed of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
             (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
     return section("The missing force", drawn + hint(
-        "The force in each suspension that would leave what is left, with its standard error, beside what a straight "
-        "spring or damper does. Above 0 it pulls body and wheel together; compression is left, extension right. A "
-        "shape that explains little is not one to believe."))
+        "The force in each suspension that would explain the residual, with its standard error, in addition to a "
+        "linear spring or damper. Above 0 it pulls body and wheel together; compression is on the left, extension on "
+        "the right. Do not believe a curve that explains little of the residual."))
 
 
 def _alignment(found: Comparison) -> Html:
@@ -165,7 +165,7 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
                 + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
 
     heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
-             + Html("<th>Share of what is left</th><th></th><th class=n>Error</th>")
+             + Html("<th>Share of the residual</th><th></th><th class=n>Error</th>")
              + (Html("<th class=n>Before the refit</th>") if stands else EMPTY))
     rows = concatenated(html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
     return section(title, html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
@@ -186,7 +186,7 @@ def _numbers(found: Comparison) -> Html:
 
 
 def _titled(title: str, curve: Curve) -> str:
-    return f"{title}: would explain {curve.share:.0%} of what is left"
+    return f"{title}: would explain {curve.share:.0%} of the residual"
 
 
 def _measured(value: float | None, unit: str = "1") -> str:

@@ -30,7 +30,7 @@ def comparison_lines(found: Comparison) -> list[str]:
 
 
 def _tables(found: Comparison) -> list[str]:
-    """Where what is left sits, as the model stands and refitted."""
+    """Where the residual is, before any fit and after the refit."""
     lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
                                                                     f"{'refit':>8}"]
     plain, refitted = found.plain.where, found.refitted.where

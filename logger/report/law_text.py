@@ -69,28 +69,28 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
     if law.beside:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
-        lines.append("Beside it is missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
-                     + ". The law was fitted beside these: they belong in the vehicle as well.")
+        lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
+                     + ". The law was fitted with these: they belong in the vehicle as well.")
     share = max(law.listed, 0.0) / law.with_law
     lines.append(f"The known effects alone explain {share:.0%} of what the model with the law does (2 ln of the "
                  f"evidence {law.listed:.0f} of {law.with_law:.0f}).")
     lines += _nearest(law.nearest, law)
     if law.rivals:
         others = [f"{one.draft.title}: {one.family.shown_by}" for one in law.rivals]
-        lines.append(f"These runs cannot tell it from {' or '.join(one.draft.title for one in law.rivals)}: each "
-                     "explains about as much. What shows each best, and so would separate them: "
+        lines.append(f"These runs cannot distinguish it from {' or '.join(one.draft.title for one in law.rivals)}: "
+                     "each explains about as much of the residual. Drives that would: "
                      + "; ".join([f"{law.draft.title}: {law.family.shown_by}", *others]) + ".")
     return lines
 
 
 def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
     if nearest is None:
-        return ["No known effect of its kind explains any of it."]
+        return ["No known effect of its kind explains any part of it."]
     name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
     numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
     if nearest.as_good:
         return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
-                f"runs do not tell the two apart (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
+                f"runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
                 f"ridelog add-effect {name}."]
     return [f"The known effect that comes nearest is {name}{numbers}: in its place it explains {nearest.share:.0%} of "
             f"what it does (2 ln of the evidence {gap:.0f} less)."]

@@ -83,7 +83,7 @@ def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
 def with_error(value: float, std: float) -> str:
     """A value with as many decimals as its error allows."""
     if not isfinite(value):
-        return "not told"
+        return "not known"
     if not isfinite(std) or std <= 0:
         return f"{value:.4g}"
     decimals = min(9, max(0, 1 - floor(log10(std))))

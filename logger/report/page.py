@@ -30,11 +30,12 @@ from logger.report.document import (
 )
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.maps import Way
+from logger.report.places_passed import places_passed
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
     DriveSummary,
-    Place,
+    RoughWindow,
     Share,
     summarise,
 )
@@ -67,7 +68,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
     "stationary": "the car stood inside the window; that time is not in the averages",
-    "time_unset": "the GPS had not told the time yet",
+    "time_unset": "the GPS had not given the time yet",
     "partial": "cut short by the end of a drive or of the recording",
     "unsettled": "too near to a start, an end or a hole in the readings",
     "hidden": "the ride is below the sensor's own noise: no value, but it counts in means as what it can be",
@@ -93,14 +94,14 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
         heading(*title) if title else _head(summary, files),
         _tiles(summary),
         *first,
-        track_views(records, summary, _sources(base_name, host)),
+        track_views(records, summary, _sources(base_name, host), [date_words(summarise(one)) for one in drives]),
         _shares_section(summary),
         _places_section(records, summary.roughest),
         _drives_section(drives) if len(drives) > 1 else EMPTY,
         _notes_section(summary, files),
         _settings_section(files),
         windows_table(records),
-        data_block("data", track_data(drives, base) | {
+        data_block("data", track_data(drives, base, places_passed(drives)) | {
             "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
@@ -156,7 +157,7 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
              rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
 
 
-def _places_section(records: Sequence[WindowRecord], places: Sequence[Place]) -> Html:
+def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
     rows = [(html('<button type="button" data-window="{}">{}</button>', index, str(number)), str(place.drive),
              _instant(place.utc_us), _geo(place), distance_words(place.along_m), iri_words(place),
              _number(place.speed_mps, 0, 3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
@@ -172,14 +173,14 @@ def _places_section(records: Sequence[WindowRecord], places: Sequence[Place]) ->
         "visit a place before judging it. Its number shows it on the map and in the curves."))
 
 
-def _numbers(records: Sequence[WindowRecord], places: Sequence[Place]) -> list[int]:
+def _numbers(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> list[int]:
     """Which rows the places are."""
     rows = {(along, record.iri_m_per_km): index
             for index, (along, record) in enumerate(zip(along_m(records), records, strict=True))}
     return [rows[place.along_m, place.iri_m_per_km] for place in places]
 
 
-def _geo(place: Place) -> Html | str:
+def _geo(place: RoughWindow) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
     return map_links(place.lat_deg, place.lon_deg, place_words(place))

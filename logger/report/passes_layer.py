@@ -8,7 +8,7 @@ from itertools import pairwise
 from logger.exchange.geometry import cut, half_way
 from logger.exchange.layer import Feature, Field, Kind, Layer
 from logger.exchange.windows import iri_title
-from logger.report.laid_drives import LaidDrives, chains
+from logger.report.combined_drives import CombinedDrives, chains
 from logger.report.passes_text import cell_values, compass, visit_values
 from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import way_and_cell
@@ -26,12 +26,12 @@ def _fields(names: tuple[str, ...]) -> tuple[Field, ...]:
     return tuple(Field(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
 
 
-def cells_layer(found: LaidDrives) -> Layer:
+def cells_layer(found: CombinedDrives) -> Layer:
     """The cells way by way: each a line half-way to its neighbours."""
     return Layer("passes", _fields(_CELL), tuple(_cells(found)))
 
 
-def _cells(found: LaidDrives) -> Iterator[Feature]:
+def _cells(found: CombinedDrives) -> Iterator[Feature]:
     ways, _ = way_and_cell(found.iri.key)
     for chain in chains(found):
         places = [(float(found.lon_deg[cell]), float(found.lat_deg[cell])) for cell in chain]
@@ -44,12 +44,12 @@ def _cells(found: LaidDrives) -> Iterator[Feature]:
                           iri_class(values["iri_m_per_km"]))
 
 
-def visits_layer(found: LaidDrives) -> Layer:
+def visits_layer(found: CombinedDrives) -> Layer:
     """The places to visit, the most urgent first."""
     return Layer("visits", _fields(_VISIT), tuple(_visits(found)), points=True)
 
 
-def _visits(found: LaidDrives) -> Iterator[Feature]:
+def _visits(found: CombinedDrives) -> Iterator[Feature]:
     for number, one in enumerate(found.visits, start=1):
         values = visit_values(found, one)
         place = (values["lon_deg"], values["lat_deg"])

@@ -9,9 +9,9 @@ import numpy as np
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
 from logger.records import WindowRecord
+from logger.report.combined_drives import CombinedDrives, chains
 from logger.report.document import grid, hint, map_links, paragraphs, section
 from logger.report.html import Html
-from logger.report.laid_drives import LaidDrives, chains
 from logger.report.page import page
 from logger.report.passes_text import compass, lines, visit_values
 from logger.report.terminal import comfort_words
@@ -22,23 +22,23 @@ from logger.units import US_PER_S
 _GAP_M = 1.0
 
 
-def passes_page(found: LaidDrives) -> Html:
+def passes_page(found: CombinedDrives) -> Html:
     """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
     title = f"Road roughness, mean of {counted(found.drives, 'drive')}", _days(found)
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, first=(
-        section("Drives laid over each other", paragraphs(lines(found)[:4]) + hint(
+        section("Repeated drives combined", paragraphs(lines(found)[:4]) + hint(
             "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
             "last drive, its speed their mean.")), section("Places to visit", _visits(found))))
 
 
-def _days(found: LaidDrives) -> str:
+def _days(found: CombinedDrives) -> str:
     if not np.isfinite(found.iri.first_s).any():
         return "dates not known"
     first, last = (utc(round(one * US_PER_S)) for one in (np.nanmin(found.iri.first_s), np.nanmax(found.iri.last_s)))
     return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
 
 
-def _visits(found: LaidDrives) -> Html:
+def _visits(found: CombinedDrives) -> Html:
     if not found.visits:
         return paragraphs(["No place lies above a limit with enough confidence."])
     rows = []
@@ -55,7 +55,7 @@ def _visits(found: LaidDrives) -> Html:
                  "Perception", "Sure", "Drives"), rows, words=(0, 1, 2, 3, 7))
 
 
-def _rows(found: LaidDrives) -> Iterator[WindowRecord]:
+def _rows(found: CombinedDrives) -> Iterator[WindowRecord]:
     """Cells as rows of a log, for the views that show those."""
     length_m, at_m, segment = found.length_m, 0.0, 0
     for chain in chains(found):

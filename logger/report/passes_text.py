@@ -10,7 +10,7 @@ import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
-from logger.report.laid_drives import LaidDrives
+from logger.report.combined_drives import CombinedDrives
 from logger.report.quantities import known
 from logger.report.terminal import comfort_words
 from logger.roads.places_to_visit import Place
@@ -22,15 +22,15 @@ SIGNIFICANT = 0.05
 MOST_VISITS, MOST_CHANGES = 20, 20
 
 
-def lines(found: LaidDrives) -> list[str]:
+def lines(found: CombinedDrives) -> list[str]:
     """For a person."""
     cells = len(found.iri.key)
     if not cells:
-        return ["No row has a place and an IRI with its standard error, so there is nothing to lay over each other."]
+        return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
     return [*_summary(found), *_visits(found), *_changes(found)]
 
 
-def _summary(found: LaidDrives) -> Iterator[str]:
+def _summary(found: CombinedDrives) -> Iterator[str]:
     drives, cells = found.iri.drives, len(found.iri.key)
     several = int((drives > 1).sum())
     yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
@@ -43,37 +43,37 @@ def _summary(found: LaidDrives) -> Iterator[str]:
         yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
                f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
     else:
-        yield ("No cell was passed by two drives: what is common to a drive (the car, its tires, its load) is not "
-               "known, and not in the standard errors")
+        yield ("No cell was passed by two drives: what all windows of one drive share (the car, its tires, its load) "
+               "is not known, and not in the standard errors")
 
 
-def _visits(found: LaidDrives) -> Iterator[str]:
+def _visits(found: CombinedDrives) -> Iterator[str]:
     yield ""
     if not found.visits:
         yield "No place lies above a limit with enough confidence: nothing to visit."
         return
     yield f"Places to visit: {len(found.visits)}"
-    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w':>5}  "
+    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w m/s2':>8}  "
            f"{'perception':25} {'sure':>4} drives")
     for number, one in enumerate(found.visits[:MOST_VISITS], start=1):
         values = visit_values(found, one)
         iri = f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}"
         a_w = values["a_w_mps2"]
         yield (f"{number:3} {values['lat_deg']:10.5f},{values['lon_deg']:10.5f} {compass(values['heading_deg']):7} "
-               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>5}  "
+               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>8}  "
                f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:4.0%} "
                f"{one.drives:6}")
     if len(found.visits) > MOST_VISITS:
         yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
 
 
-def _changes(found: LaidDrives) -> Iterator[str]:
+def _changes(found: CombinedDrives) -> Iterator[str]:
     change = found.change
     if change is None:
         return
     yield ""
     if not len(change.key):
-        yield "No cell was passed in both periods: no change can be told."
+        yield "No cell was passed in both periods: no change can be measured."
         return
     sure = change.false_share <= SIGNIFICANT
     worse = int((sure & (change.change_m_per_km > 0)).sum())
@@ -97,7 +97,7 @@ def compass(heading_deg: float) -> str:
 # --- for programs ---
 
 
-def as_json(found: LaidDrives) -> dict[str, Any]:
+def as_json(found: CombinedDrives) -> dict[str, Any]:
     """The figures; null where nothing is known."""
     return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
             "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
@@ -105,7 +105,7 @@ def as_json(found: LaidDrives) -> dict[str, Any]:
             "visits": [visit_values(found, one) for one in found.visits]}
 
 
-def cell_values(found: LaidDrives, index: int) -> dict[str, Any]:
+def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
     """A cell by the names of its columns."""
     key = found.iri.key[index]
     change, trend = found.change, found.trend
@@ -128,7 +128,7 @@ def cell_values(found: LaidDrives, index: int) -> dict[str, Any]:
     return values
 
 
-def visit_values(found: LaidDrives, one: Place) -> dict[str, Any]:
+def visit_values(found: CombinedDrives, one: Place) -> dict[str, Any]:
     """A place to visit by the names of its columns: where its worst cell is, and the figures of that."""
     values = cell_values(found, one.worst)
     a_w = values["a_w_mps2"]

@@ -1,4 +1,4 @@
-"""The page of a plan: which effects drives could show and tell apart, and which drive would add most."""
+"""The page of a plan: which effects drives could show and distinguish, and which drive would add most."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def page(found: Plan, vehicle: str) -> Html:
                ("Groups that cannot be separated", f"{len(found.groups)}", ""),
                ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2")]),
         paragraphs(summary(found)),
-        section("What remains of one effect beside another", figure(found) + hint(meaning())),
+        section("What remains of one effect when another is fitted", figure(found) + hint(meaning())),
         section("Each effect", grid(HEADS, rows(found), words=(0, 3, 4))),
         section("What a next drive would add", _next(found)),
         section("Where this is from", bullets([
@@ -41,7 +41,8 @@ def figure(found: Plan) -> Html:
     order = np.argsort(-found.now.detectability, kind="stable")
     return heat_map("Standard deviations that remain of the effect of a row when that of a column is fitted in its "
                     "place; framed: by how much it stands out",
-                    [found.names[one] for one in order], found.now.beside[np.ix_(order, order)], ISOLABLE_SIGMA, _FULL)
+                    [found.names[one] for one in order], found.now.pairwise[np.ix_(order, order)],
+                    ISOLABLE_SIGMA, _FULL)
 
 
 def _next(found: Plan) -> Html:

@@ -13,7 +13,7 @@ from logger.report.text_layout import columns, paragraphs
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
 HEADS = ("Effect", "Stands out by", "Separated by", "Most like", "")
-GAIN_HINT = "Effects more: how many more could be named, by what is expected."
+GAIN_HINT = "Effects more: how many more could be named, in expectation."
 SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
                "gyroscope to 0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
@@ -27,7 +27,7 @@ def summary(found: Plan) -> list[str]:
     count = len(found.drives)
     chances = found.now.chances
     named = int((chances > 0.5).sum())
-    from_where = ("as the runs have it" if found.measured else "as it was given or is usual")
+    from_where = ("as in the runs" if found.measured else "as given or usual")
     lines = [f"{count} drive{'s' * (count != 1)}, {seconds:.0f} s; noise {found.noise.variance**0.5:.3g} m/s2 r.m.s., "
              f"{from_where}. Of {len(found.names)} effects at their usual strength, each by itself, "
              f"ridelog diagnose would name {named}."]
@@ -66,7 +66,7 @@ def number(deviations: float) -> str:
 def meaning() -> str:
     """What the numbers are."""
     return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is seen from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
+            f"effect is detected from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
             "remain when that one is fitted in its place.")
 
 
@@ -120,7 +120,7 @@ def as_json(found: Plan) -> dict[str, Any]:
         "noise_mps2": found.noise.variance**0.5, "noise_measured": found.measured,
         "effects": {one.effect.name: dict(one.values) for one in found.effects},
         "detectability": dict(zip(names, map(float, now.detectability), strict=True)),
-        "isolability": {name: {other: float(now.beside[row, column]) for column, other in enumerate(names)
+        "isolability": {name: {other: float(now.pairwise[row, column]) for column, other in enumerate(names)
                                if column != row} for row, name in enumerate(names)},
         "groups": [list(one) for one in found.groups], "left_out": dict(found.obstacles),
         "next": [{"do": do_words(one.option), "gains": dict(one.gains), "more_named": one.more_named}

@@ -36,17 +36,15 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
     of what is no more than usual."""
     lines = band_words(band)
     if found.filter_share > 0 and lines:
-        lines[0] += (f" What lies outside makes {percent(found.filter_share)} of what model and measurement differ by "
-                     "at all frequencies.")
+        lines[0] += (f" Outside of that lies {percent(found.filter_share)} of the power of their difference.")
     if found.distance_error_m > 0:
         lines.append(f"The distances of these runs are off by more than usual: up to {found.distance_error_m:.2g} m. "
-                     f"That makes {percent(found.distance_share)} of the residual's power as the model stands; the "
-                     "fits take it into account.")
+                     f"That makes {percent(found.distance_share)} of the residual's power before any fit; the fits "
+                     "take it into account.")
     if found.drifting:
-        lines.append(f"The sensor drifts ({drift_words(found)}): it is no part of the car, and makes "
-                     f"{percent(found.drift_share)} of the residual's power as the model stands. Below "
-                     f"{LOWEST_HZ:g} Hz nothing is judged; without the drift the error of the refitted model is "
-                     f"{found.error:.3f}.")
+        lines.append(f"The sensor drifts ({drift_words(found)}). That has nothing to do with the car, and makes "
+                     f"{percent(found.drift_share)} of the residual's power before any fit. Below {LOWEST_HZ:g} Hz "
+                     f"nothing is judged; without the drift the error of the refitted model is {found.error:.3f}.")
     return lines
 
 

@@ -42,11 +42,12 @@ def line_sentence(line: SpatialLine) -> str:
     every_m = 1 / line.at_per_m
     if line.steady:
         return (f"It repeats every {every_m:.2f} m of the way or {line.at_per_m * line.speed_mps:.1f} times a second: "
-                f"at a steady speed that is the same (clearest in {line.run}). A drive at another speed would tell.")
+                f"at a steady speed that is the same (clearest in {line.run}). A drive at another speed would show "
+                "which.")
     radius_m = 1 / (2 * np.pi * line.at_per_m)
-    wheel = (f" A wheel of {radius_m:.2f} m radius turns so often: look at its balance and roundness."
+    wheel = (f" A wheel of {radius_m:.2f} m radius turns at that rate: look at its balance and roundness."
              if _WHEEL_RADII_M[0] < radius_m < _WHEEL_RADII_M[1] else "")
-    return f"It repeats every {every_m:.2f} m of the way, whatever the speed (clearest in {line.run}).{wheel}"
+    return f"It repeats every {every_m:.2f} m of the way, at any speed (clearest in {line.run}).{wheel}"
 
 
 def error_text(part: Part, digits: int) -> str:
@@ -103,21 +104,21 @@ def _shift(test: ResidualTest, time_s: float, length_m: float, is_time: bool | N
     if not np.isfinite(length_m):  # a rig has no speed
         words = f"{as_time} all along"
     elif is_time is None:
-        words = f"about {as_time} or {as_length}; drives at other speeds would tell which"
+        words = f"about {as_time} or {as_length}; drives at other speeds would show which"
     else:
-        words = f"{as_time if is_time else f'{as_length} of road'}, whatever the speed"
-    return f"The measurement comes {'behind' if time_s > 0 else 'ahead of'} the model by {words}."
+        words = f"{as_time if is_time else f'{as_length} of road'}, at any speed"
+    return f"The measurement {'lags' if time_s > 0 else 'leads'} the model by {words}."
 
 
 def _drift(test: ResidualTest, in_all_m: float) -> str:
-    more = " Whatever else is found may come from that alone." if in_all_m > _MUCH_DRIFT_M else ""
+    more = " All other findings may come from that alone." if in_all_m > _MUCH_DRIFT_M else ""
     return (f"The model runs {'ahead' if test.value > 0 else 'behind'} by {abs(test.value) * 100:.2g} m in each 100 m "
-            f"of the way, {in_all_m:.2g} m in the longest run: the recorded speed is off by a factor.{more}")
+            f"of the way, {in_all_m:.2g} m in the longest run: the recorded speed has a scale error.{more}")
 
 
 def _proportion(test: ResidualTest, weak: float, strong: float, band: str) -> str:
-    return (f"The car does not answer in proportion to the road: {_AROUND[band]} the measurement is {weak:.2f} of the "
-            f"model where that moves little and {strong:.2f} where it moves much.")
+    return (f"The response is not proportional to the road: {_AROUND[band]} the measurement is {weak:.2f} of the model "
+            f"at small motion and {strong:.2f} at large motion.")
 
 
 # --- the residual and the suspensions ---

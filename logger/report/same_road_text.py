@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from logger.lab.unknown_road.diagnosis import Found
+from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.report.quantities import chance, finite, numbers_of
 from logger.report.text_layout import columns, enumerated, paragraphs
 
 
-def summary(found: Found) -> list[str]:
+def summary(found: UnknownRoadDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = []
     for one in found.missing:
@@ -20,7 +20,7 @@ def summary(found: Found) -> list[str]:
                      f"looks like this, all candidates together: {chance(candidate.p_value)}.")
         if candidate.confused_with:
             names = enumerated([one.effect.name, *candidate.confused_with], "and")
-            lines.append(f"{names} explain about as much as each other: these drives cannot tell which it is.")
+            lines.append(f"{names} explain about as much as each other: these drives cannot distinguish them.")
     if not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
@@ -33,20 +33,20 @@ def summary(found: Found) -> list[str]:
     return lines
 
 
-def _steps(found: Found) -> list[tuple[str, float]]:
+def _steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
     """Models on the way, each with its error."""
     words = ["the vehicle as its file says", "its numbers refitted within their tolerance",
              *(f"with {one.effect.name}" for one in found.missing)]
     return list(zip(words, found.errors, strict=True))
 
 
-def cannot_tell(found: Found) -> list[str]:
+def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     """What these drives cannot tell, in sentences."""
     lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
              "noise." for one, other in found.doubtful]
     if found.taken_by_road:
-        lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
-                     "measured would do the same.")
+        lines.append(f"{', '.join(found.taken_by_road)}: a road of another shape, which nobody measured, would look "
+                     "the same.")
     lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
               for why in dict.fromkeys(found.untried.values())]
     lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
@@ -55,7 +55,7 @@ def cannot_tell(found: Found) -> list[str]:
     return [*lines, *(f"The car's numbers: {one.words}" for one in found.together)]
 
 
-def same_road_lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
+def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
     """What a person reads; ``most`` so many candidates, None: all."""
     rows = [("Effect", "Error", "Chance", "Numbers")]
     rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
@@ -67,7 +67,7 @@ def same_road_lines(found: Found, runs: Sequence[str], most: int | None) -> list
             *columns(by_run), "", "What these drives cannot tell:", paragraphs(cannot_tell(found), "- ")]
 
 
-def as_json(found: Found) -> dict[str, Any]:
+def as_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
     """The diagnosis as one JSON object."""
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     values = {one.effect.name: dict(one.values) for one in found.missing}

@@ -12,7 +12,8 @@ import numpy as np
 from logger.chart_data import Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
-from logger.report.drive_sections import DriveSections
+from logger.report.drive_sections import DriveSections, localized
+from logger.report.localized_text import area_lines, area_values
 from logger.report.quantities import known
 from logger.roads.iso8608 import iri_class
 from logger.roads.roughness_words import FEDERAL_WORDS
@@ -37,8 +38,9 @@ _SYSTEMS = {
 }
 
 
-def lines(drives: Sequence[DriveSections], length_m: float, system: str) -> list[str]:
-    """For a person."""
+def lines(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
+          ) -> list[str]:
+    """For a person; with a limit the areas of localized roughness under each drive."""
     if not drives:
         return ["No row has a distance, or lies on the route: there are no sections."]
     units = _SYSTEMS[system]
@@ -47,6 +49,8 @@ def lines(drives: Sequence[DriveSections], length_m: float, system: str) -> list
             f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
     for one in drives:
         said += ["", _title(one), head, *_rows(one, units)]
+        if localized_m_per_km is not None:
+            said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km)]
     return [*said, "",
             "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313. Class: ISO 8608.",
             "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
@@ -106,11 +110,14 @@ def _length_words(length_m: float) -> str:
 # --- for programs ---
 
 
-def as_json(drives: Sequence[DriveSections], length_m: float) -> dict[str, Any]:
-    """Drives with their sections; null where nothing is known."""
+def as_json(drives: Sequence[DriveSections], length_m: float, localized_m_per_km: float | None = None
+            ) -> dict[str, Any]:
+    """Drives with their sections, and areas of localized roughness above a limit; null where nothing is known."""
     return {"length_m": length_m, "drives": [
         {"log": one.log, "drive": one.number, "direction": one.direction or None,
-         "sections": list(section_values(one))} for one in drives]}
+         "sections": list(section_values(one)),
+         **({} if localized_m_per_km is None else {
+             "localized": [area_values(area) for area in localized(one, localized_m_per_km)]})} for one in drives]}
 
 
 def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:

@@ -22,9 +22,9 @@ def ending(story: Story) -> list[str]:
     with_what = [bias(story.added, story.moved)] if story.added else []
     lines = []
     if story.added:
-        lines.append(f"{' and '.join(story.added)} took the error from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
-                     "before and after with the car's numbers and the distances refitted within their tolerance. "
-                     f"As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
+        lines.append(f"{' and '.join(story.added)} reduced the error from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
+                     "both with the car's numbers and the distances refitted within their tolerance. With the last "
+                     f"file as it is, and the distances as recorded, the error is {story.last.plain.error:.3f}.")
     lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:
         lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
@@ -41,7 +41,7 @@ def ending(story: Story) -> list[str]:
         lines.append("Something is missing still that no effect and no law out of the data explains: an effect of your "
                      "own may do it.")
     else:
-        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can tell.")
+        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
     return [*lines, *with_what]
 
 

@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from logger.report.charts import chart
-from logger.report.document import document, grid, heading, paragraphs, section, tiles
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
-from logger.studies.study import DISSERTATION, Result, Study, Table, Word
+from logger.studies.checks import Word, word_of
+from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Table
 
 _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
-_STYLE = "td:first-child{white-space:normal;min-width:9em}"
+_STYLE = "td:first-child{white-space:normal;min-width:9em}figure+.hint{margin-bottom:2em}"
+_UNBROKEN = ("of", "word", "true for")
+"""Columns of short words, which break between items only."""
 _INDEX_STYLE = _STYLE + (
     "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(3),td:nth-child(5){white-space:nowrap}"
     "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
@@ -30,15 +33,35 @@ def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -
     contents    the name of a page beside it that lists all
     share       of its draws and grid points that was computed
     """
-    quick = _quick(share)
-    word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
+    quick, differs = _quick(share), study.differs(result)
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of {study.source}"),
-        paragraphs([*quick, word, result.verdict]), *map(_table, result.all_tables),
-        section("Pictures", concatenated(map(chart, result.pictures))),
+        paragraphs([*quick, *([differs] if differs else []), result.verdict]), _items(study, result),
+        *map(_table, result.all_tables),
+        section("Pictures", concatenated(map(_picture, result.pictures))) if result.pictures else EMPTY,
         section("How it was made", paragraphs([
             study.how, f"ridelog study {study.called}{' DIR' * bool(study.data)}{' --quick' * bool(quick)}"])),
         html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
+
+
+def _items(study: Study, result: Result) -> Html:
+    """Each printed item with the word that its checks come to."""
+    lines = []
+    for names, item in study.groups:
+        checks = max(len(study.checks_of(name, result)) for name in names)
+        counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
+        lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
+    return section("How ours stands beside the print", bullets(lines))
+
+
+def _picture(picture: Picture) -> Html:
+    drawn = chart(picture.chart)
+    return html("{}{}", drawn, hint(f"Printed: {picture.printed}.")) if picture.printed else drawn
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Names that break at their commas only."""
+    return ", ".join(name.replace(" ", _FIRM) for name in names)
 
 
 def _quick(share: float) -> list[str]:
@@ -48,34 +71,42 @@ def _quick(share: float) -> list[str]:
 def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float = 1.0) -> Html:
     """The table of contents of studies whose pages lie beside it, with the word of each; ``carried`` by the studies'
     names, without those that were not run; ``share`` of their draws and grid points that was computed."""
-    words = {one.called: _word(one, carried.get(one.called)) for one in known}
-    counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
+    words = [word for one in known for names, item in one.groups
+             for word in [_word(item, carried.get(one.called))] * len(names)]
+    counts = [(word, str(words.count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
-        heading("Studies: printed results, made again", "Each with one word for how ours stands beside the print."),
+        heading("Studies: printed results, made again",
+                "Each printed item has one word for how ours compares with it."),
         paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
-        *(_contents(title, part, words, carried) for title, part in zip(titles, parts, strict=True) if part)],
+        *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)
 
 
-def _contents(title: str, part: Sequence[Study], words: Mapping[str, str], carried: Mapping[str, Carried]) -> Html:
-    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers) if one.source == DISSERTATION else one.source,
-             _link(one, carried.get(one.called)), words[one.called], _because(one, carried.get(one.called)),
-             f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in part]
+def _contents(title: str, part: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
+    rows = [row for one in part for row in _rows(one, carried.get(one.called))]
     return section(title, grid(("printed", "study", "word", "because", "time"), rows, range(4)))
 
 
-def _word(study: Study, found: Carried | None) -> str:
+def _rows(study: Study, found: Carried | None) -> list[tuple[str, Html, str, str, str]]:
+    """A row for each word and reason of a study; its time stands in the first."""
+    seconds = f"{found.seconds:.1f} s" if found is not None else "-"
+    by_source = "" if study.source == DISSERTATION else f" ({study.source})"
+    return [(_joined(names) + by_source, _link(study, found), _word(item, found), _because(study, item, found),
+             "" if place else seconds) for place, (names, item) in enumerate(study.groups)]
+
+
+def _word(item: Item, found: Carried | None) -> str:
     if found is None:
         return _NOT_RUN
-    return _FAILED if found.failure else str(study.word)
+    return _FAILED if found.failure else str(item.word)
 
 
-def _because(study: Study, found: Carried | None) -> str:
+def _because(study: Study, item: Item, found: Carried | None) -> str:
     if found is None:
         return f"Needs {study.data}: ridelog study {study.called} DIR."
-    return found.failure or study.because
+    return found.failure or item.because
 
 
 def _link(study: Study, found: Carried | None) -> Html:
@@ -85,5 +116,6 @@ def _link(study: Study, found: Carried | None) -> Html:
 
 
 def _table(table: Table) -> Html:
-    rows = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
+    rows = [[_joined(column.text(cell).split(", ")) if column.name in _UNBROKEN else column.text(cell)
+             for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
     return section(table.title, grid([column.name for column in table.columns], rows, table.words))

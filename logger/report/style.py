@@ -1,6 +1,6 @@
 """The style sheet of the page: one column of text and pictures, for light and dark screens and for paper.
 
-The eight class colours run from blue over yellow and red to purple, fall in lightness from the third on, and are told
+The eight class colours run from blue over yellow and red to purple, fall in lightness from the third on, and are
 apart with any common colour vision; a casing around them carries the light ones on white and the dark ones on black.
 """
 

@@ -45,7 +45,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Place:
+class RoughWindow:
     """A rough window. ``along_m`` is where its middle lies on the way through all rows [m], ``drive`` counts the drives
     of these rows from 1 on."""
 
@@ -87,7 +87,7 @@ class DriveSummary:
     a_w_mps2: float | None
     iri_classes: tuple[Share, ...]
     comfort: tuple[Share, ...]
-    roughest: tuple[Place, ...]
+    roughest: tuple[RoughWindow, ...]
     flags: Mapping[str, int]
 
 
@@ -178,15 +178,15 @@ def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: 
     return tuple([*shares, Share("", rest, rest / total)] if rest > 0 else shares)
 
 
-def _roughest(records: Sequence[WindowRecord]) -> tuple[Place, ...]:
+def _roughest(records: Sequence[WindowRecord]) -> tuple[RoughWindow, ...]:
     numbered = [(number, record) for number, drive in enumerate(split_drives(records), start=1) for record in drive]
     candidates = [
-        Place(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
+        RoughWindow(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
               record.iri_std_m_per_km, record.a_w_mps2, record.comfort, record.flags)
         for (drive, record), along in zip(numbered, along_m(records), strict=True)
         if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)
     ]
-    found: list[Place] = []
+    found: list[RoughWindow] = []
     for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
         if all(_apart_m(place, other) >= APART_M for other in found):
             found.append(place)
@@ -195,6 +195,6 @@ def _roughest(records: Sequence[WindowRecord]) -> tuple[Place, ...]:
     return tuple(found)
 
 
-def _apart_m(one: Place, other: Place) -> float:
+def _apart_m(one: RoughWindow, other: RoughWindow) -> float:
     ground_m = apart_m(one, other)
     return abs(one.along_m - other.along_m) if ground_m is None else ground_m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from logger.report.summary import IRI_CLASSES, DriveSummary, Place, Share, class_limits_m_per_km
+from logger.report.summary import IRI_CLASSES, DriveSummary, RoughWindow, Share, class_limits_m_per_km
 from logger.store.log.log_reader import utc
 
 _BAR_CELLS = 30
@@ -78,14 +78,14 @@ def comfort_words(name: str) -> str:
     return name.replace("_", " ") or "no value"
 
 
-def place_words(place: Place) -> str:
+def place_words(place: RoughWindow) -> str:
     """Coordinates as maps take them: ``46.51234, 6.61234``."""
     if place.lat_deg is None or place.lon_deg is None:
         return "position not known"
     return f"{place.lat_deg:.5f}, {place.lon_deg:.5f}"
 
 
-def iri_words(place: Place) -> str:
+def iri_words(place: RoughWindow) -> str:
     """The IRI of a place with its standard error: ``14.2 ± 2.1``."""
     error = "" if place.iri_std_m_per_km is None else f" ± {place.iri_std_m_per_km:.1f}"
     return f"{place.iri_m_per_km:.1f}{error}"
@@ -113,7 +113,7 @@ def _bar(share: float, drawn: bool) -> str:
     return ("█" * full + (_EIGHTHS[rest] if rest else "")).ljust(_BAR_CELLS)
 
 
-def _places(places: Sequence[Place]) -> list[str]:
+def _places(places: Sequence[RoughWindow]) -> list[str]:
     if not places:
         return ["  none with a value"]
     return [f"  {number}. IRI {iri_words(place):>11} m/km  at {place_words(place):>20}  "
@@ -121,7 +121,7 @@ def _places(places: Sequence[Place]) -> list[str]:
             for number, place in enumerate(places, start=1)]
 
 
-def _speed(place: Place) -> str:
+def _speed(place: RoughWindow) -> str:
     return "" if place.speed_mps is None else f", {place.speed_mps * 3.6:.0f} km/h"
 
 

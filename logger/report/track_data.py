@@ -21,6 +21,7 @@ from logger.chart_data import Array
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.records import WindowRecord
 from logger.report.maps import Way
+from logger.report.places_passed import PlacesPassed
 from logger.report.summary import COMFORT_NAMES, IRI_CLASSES, class_limits_m_per_km, counts, expected_square
 from logger.store.log.log_reader import joined, length_m
 
@@ -52,8 +53,13 @@ _PLAIN: Sequence[tuple[str, float, int, Callable[[WindowRecord], float | None]]]
 )
 
 
-def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[Way] = ()) -> dict[str, Any]:
-    """All that the script draws, as JSON can hold it; ``base``: roads that are drawn beneath."""
+def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[Way] = (), passed: PlacesPassed | None = None
+               ) -> dict[str, Any]:
+    """All that the script draws, as JSON can hold it.
+
+    base      roads that are drawn beneath
+    passed    places that several drives passed
+    """
     records = list(chain.from_iterable(drives))
     origin_deg = next((record.lon_deg for record in records if record.lon_deg is not None), 0.0)
     flags = list(dict.fromkeys(record.flags for record in records))
@@ -69,9 +75,14 @@ def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[Way] = (
         ("flags", 1, 0, _floats(numbers[record.flags] for record in records)),
         ("begins", 1, 0, _begins(drives)),
     ]
+    if passed is not None:
+        columns.append(("place", 1, 2, passed.place))
     return {
         "windows": packed(columns),
         "drives": [{"windows": len(drive), "start_s": _start_s(drive)} for drive in drives],
+        "passed": None if passed is None else packed([
+            ("drives", 1, 0, passed.drives.astype(np.float64)), ("iri_m_per_km", 1e2, 0, passed.iri_m_per_km),
+            ("iri_std_m_per_km", 1e2, 0, passed.iri_std_m_per_km)]),
         "flags": flags,
         "base": packed(_base_columns(base, origin_deg, _floats(record.lat_deg for record in records),
                                      columns[len(_PLAIN)][3])),

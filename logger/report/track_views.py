@@ -14,13 +14,17 @@ _MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
 _TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that stands in no mean"))
 
 
-def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str) -> Html:
-    """The map and the curves, which the script draws, and what it says of them."""
+def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
+    """The map and the curves, which the script draws, and what it says of them.
+
+    sources    whose pictures and roads the map shows
+    drives     when each was
+    """
     placed = any(record.lat_deg is not None and record.lon_deg is not None for record in records)
     if not placed and not summary.distance_m > 0:
         return section("Along the way", Html('<p class="empty">No row has a position or a distance: there is neither '
                                              "map nor curve.</p>"))
-    parts = [_map_view(summary, sources) if placed else
+    parts = [_map_view(summary, sources, drives) if placed else
              Html('<p class="empty">No row has a position, so there is no map.</p>')]
     parts += [_curves_view()] if summary.distance_m > 0 else []
     return html('<section id="views" data-mode="iri"><h2>Along the way</h2><noscript><p class="warn">The map, the '
@@ -28,20 +32,32 @@ def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources:
                 "</noscript>{}{}</section>", concatenated(parts), _READOUT)
 
 
-def _map_view(summary: DriveSummary, sources: str) -> Html:
+def _choice(drives: Sequence[str]) -> Html:
+    """All drives, or one of them."""
+    if len(drives) < 2:
+        return EMPTY
+    options = concatenated(html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)
+                           for number, when in enumerate(drives))
+    return html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select>'
+                "</label>", options)
+
+
+def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
     buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
                                 "true" if name == "iri" else "false", words) for name, words in _MODES)
     trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
-    return html('<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
+    repeated = hint("Where several drives came by, the colour is that of their mean.") if len(drives) > 1 else EMPTY
+    return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
+                "{}</div>{}</div>"
                 '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. '
                 "Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
                 'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
                 '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
                 '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
                 '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
-                '{}{}<ul class="legend by-trust">{}</ul>{}', buttons,
+                '{}{}<ul class="legend by-trust">{}</ul>{}{}', buttons, _choice(drives),
                 _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
-                _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust,
+                _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust, repeated,
                 hint(sources) if sources else EMPTY)
 
 
@@ -67,8 +83,11 @@ _READOUT = Html(
 
 
 def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
-    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(share.name, names), words_of(share.name))
-                     for share in shares)
+    shown = {share.name for share in shares}
+    ranks = [number for number, one in enumerate(names) if one in shown]
+    shown |= set(names[min(ranks): max(ranks)]) if ranks else set()  # a mean of windows may lie between their classes
+    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(one, names), words_of(one))
+                           for one in sorted(shown, key=lambda one: names.index(one) if one in names else len(names)))
     return html('<ul class="legend {}">{}</ul>', name, entries)
 
 

@@ -35,7 +35,7 @@ def lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     """What a person reads."""
     yield (f"Converged in {fit.iterations} steps." if fit.converged else
            f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start) or free less.")
-    yield (f"Left unexplained by the most probable road, rms over that of the readings: {fit.error_before:.4f} before, "
+    yield (f"Residual over the most probable road, rms over that of the readings: {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
     yield ""
     width = max(map(len, [*fit.parameters, *fit.roads]))
@@ -68,10 +68,9 @@ def _limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     vague = {name: fit.standard_errors[name] / abs(fit.parameters[name]) for name in sizes}
     if rough := [f"{name} ({share:.0%})" for name, share in vague.items() if share > _DOUBTFUL]:
         yield (f"Poorly determined without the road's profile: {', '.join(rough)}. Several drives over one road at "
-               "different speeds (--same-road) tell more.")
-    yield ("The road is taken for one of ISO 8608 with this waviness; where it has bumps and holes, or its spectrum "
-           "bends, the estimates lean to make up for it. Masses, springs and dampers are known only against those "
-           "that were held fixed.")
+               "different speeds (--same-road) determine them better.")
+    yield ("The road is assumed to be one of ISO 8608 with this waviness; bumps, holes or a spectrum of another shape "
+           "bias the estimates. Masses, springs and dampers are known only relative to those that were held fixed.")
 
 
 def _correlation(fit: RoadFit) -> np.ndarray:

@@ -19,7 +19,7 @@ metre on at a spacing of 0.25 m), and waves longer than two thirds of a segment,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -62,7 +62,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True)
-class Bands:
+class BandedSpectrum:
     """A spectrum averaged in bands: edges (b + 1,) [cycle/m], values (b,), degrees of freedom (b,) of each value."""
 
     edges_cpm: Array
@@ -81,6 +81,7 @@ class Roughness:
 
     classes                    every class that lies within two standard errors of the degree of roughness
     lowest_cpm, highest_cpm    between which wave numbers the line was laid [cycle/m]
+    bands                      through which it was laid
     """
 
     gd_n0_cm3: float
@@ -91,6 +92,7 @@ class Roughness:
     classes: tuple[str, ...]
     lowest_cpm: float
     highest_cpm: float
+    bands: BandedSpectrum = field(repr=False, compare=False)
 
 
 def acceleration_psd(wave_number_cpm: npt.ArrayLike, displacement_psd_m3: npt.ArrayLike) -> Array:
@@ -141,7 +143,7 @@ def band_edges(lowest_cpm: float, highest_cpm: float) -> Array:
     return edges[(edges >= lowest_cpm) & (edges <= highest_cpm)]
 
 
-def smooth(of: Spectrum, edges_cpm: Array) -> Bands:
+def smooth(of: Spectrum, edges_cpm: Array) -> BandedSpectrum:
     """Averages between neighbouring edges (Eq 2.4 to 2.6).
 
     Each value of the spectrum stands for the step of wave number around it, and a band takes the part of a step that
@@ -154,7 +156,7 @@ def smooth(of: Spectrum, edges_cpm: Array) -> Bands:
     below = np.concatenate([[0.0], np.cumsum(of.psd_m3) * of.step_cpm])
     width_cpm = np.diff(edges_cpm)
     psd_m3 = np.diff(np.interp(edges_cpm, borders, below)) / width_cpm
-    return Bands(edges_cpm, psd_m3, 2 * of.chance_m * (width_cpm + _STEPS_PER_WINDOW * of.step_cpm))
+    return BandedSpectrum(edges_cpm, psd_m3, 2 * of.chance_m * (width_cpm + _STEPS_PER_WINDOW * of.step_cpm))
 
 
 def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float | None = None) -> Roughness:
@@ -164,13 +166,13 @@ def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float 
     widest_step_m    for a profile that was resampled: the widest distance it had between samples [m]; waves shorter
                      than four of those are left out
 
-    ValueError for a profile below 100 m, which is too short to tell; with samples more than 300 mm apart; not finite;
+    ValueError for a profile below 100 m, which is too short; with samples more than 300 mm apart; not finite;
     or without any roughness.
     """
     elevation = np.asarray(elevation_m, dtype=float)
     length_m = (elevation.size - 1) * spacing_m
     if length_m < SHORTEST_M * (1 - 1e-9):
-        raise ValueError(f"too short to tell its class: expected at least {SHORTEST_M:g} m, found {length_m:.4g} m")
+        raise ValueError(f"too short to classify: expected at least {SHORTEST_M:g} m, found {length_m:.4g} m")
     if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
         raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
     measured_m = max(spacing_m, widest_step_m or 0.0)
@@ -216,4 +218,5 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
         classes=tuple(letters[letters.index(ends[0]):letters.index(ends[1]) + 1]),
         lowest_cpm=float(bands.edges_cpm[0]),
         highest_cpm=float(bands.edges_cpm[-1]),
+        bands=bands,
     )

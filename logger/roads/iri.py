@@ -60,7 +60,7 @@ def iri(elevation_m: npt.ArrayLike, spacing_m: float) -> float:
 def window_iri(slope: Array, spacing_m: float, edges_m: npt.ArrayLike) -> Array:
     """IRI between neighbouring edges [m/km].
 
-    slope      what ``rectified_slope`` gave for the whole profile, so that no window starts the car anew
+    slope      what ``rectified_slope`` gave for the whole profile, so that no window starts the car from rest
     edges_m    (w + 1,) increasing distances from the profile's first sample [m]; returns (w,)
 
     ValueError if an edge lies outside the profile, or edges do not increase.

@@ -1,36 +1,26 @@
 """Which way each window of a drive lies on, decided by the whole drive.
 
-Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not tell a street
-from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error against
-the network is a state: two components, a first-order Gauss-Markov process each. Every chain of ways that a drive may
-have followed carries its own estimate of it (a Kalman filter of the distances aside), and the most likely chain is
-kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through noise and sparseness", ACM GIS 2009, with the error
-that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely within
-seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street before
-hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
+Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not distinguish a
+street from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error
+against the network is a state: two components, a first-order Gauss-Markov process each. Every chain of ways that a
+drive may have followed carries its own estimate of it (a Kalman filter of the distances aside), and the most likely
+chain is kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through noise and sparseness", ACM GIS 2009, with
+the error that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely
+within seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street
+before hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import erfc, exp, log, pi, sqrt
+from math import erfc, exp, inf, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.road_network import (
-    MOST_TURN_DEG,
-    SEARCH_M,
-    Array,
-    Candidates,
-    Ints,
-    RoadNetwork,
-    Trace,
-    directions,
-    on_sphere,
-)
+from logger.roads.road_network import SEARCH_M, Array, Candidates, Ints, RoadNetwork, Trace
 
 NO_WAY = -1
 DOUBTFUL = -2
@@ -43,9 +33,10 @@ _LEAST = 1e-6  # a likelihood that anything has: the model may be wrong
 _CHANGE = log(0.1)  # to leave a street that goes on beside
 _WORST = 25.0  # how much less likely than the best a chain may be and still be followed
 _MOST_CHAINS = 16
-_GAP_M = 50.0  # between windows: what lay beside before says nothing after
+_MOST_EACH = 3  # of them to one street, by different errors of the receiver
+_SURE = 0.8  # as of places to visit: a street that is less likely than this is not to be believed
+GAP_M = 50.0  # between windows: what lay beside before says nothing after
 _STREET_M, _STRAIGHT = 5.0, 0.9  # aside, and cosine: so near the next way continues the one before
-_APART_M = 100.0  # from which distance on a drive that comes back drives again
 
 
 @dataclass(frozen=True)
@@ -97,6 +88,7 @@ class _Chain(NamedTuple):
     error            of the receiver against that
     beside_m         how far left of the candidate an unknown street lies, with its variance
     parent           number of the chain of the window before that it goes on
+    rivals           numbers of others that came to the same, and how much less likely they are
     """
 
     score: float
@@ -106,6 +98,7 @@ class _Chain(NamedTuple):
     error: _State
     beside_m: tuple[float, float]
     parent: int
+    rivals: tuple[tuple[int, float], ...] = ()
 
 
 def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start: _State | None = None
@@ -120,7 +113,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     if not len(found.window):
         spread = 2 * receiver.std_m**2
         return _nowhere(count), (0.0, 0.0, spread, 0.0, spread)
-    path, states = _best_chain(network, trace, receiver, start, found)
+    path, states, belief = _best_chain(network, trace, receiver, start, found)
     on = path >= 0
     point = np.where(on, found.point[np.maximum(path, 0)], NO_WAY)
     smooth = _smoothed(trace, receiver, states)
@@ -131,7 +124,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     end_e, end_n, end_ee, end_en, end_nn = states[-1].tolist()
     way = np.where(on, network.way[at], NO_WAY)
     aside_m = rel_n * u_east[at] - rel_e * u_north[at]
-    doubtful = on & _too_far(way, aside_m, receiver)
+    doubtful = on & _too_far(way, aside_m, receiver) | (belief < _SURE)
     on &= ~doubtful
     way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
     return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
@@ -152,8 +145,9 @@ def _nowhere(count: int) -> Matched:
 
 
 def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _State | None, found: Candidates
-                ) -> tuple[Ints, Array]:
-    """Candidate of each window (n,), NO_WAY for none, and the filtered errors (n, 5) along that chain."""
+                ) -> tuple[Ints, Array, Array]:
+    """Candidate of each window (n,), NO_WAY for none, the filtered errors (n, 5) along that chain, and how likely each
+    window is to lie on its street (n,)."""
     count = len(trace.t_s)
     lists = _Lists.of(network, found, count)
     spread = 2 * receiver.std_m**2
@@ -163,24 +157,72 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
     before = range(0)
     for window, (step_s, step_m) in enumerate(zip(steps_s.tolist(), steps_m.tolist(), strict=True)):
         here = range(lists.begins[window], lists.begins[window + 1])
-        if step_m > _GAP_M:
+        if step_m > GAP_M:
             before = range(0)
             chains = [chain._replace(candidate=NO_WAY, known=False) for chain in chains]
         ahead = [(number, chain._replace(error=_drifted(chain.error, step_s, receiver, spread)))
                  for number, chain in enumerate(chains)]
         drift = _drift_m2(step_s, receiver)
-        new = [max((_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead),
-                   key=_score) for one in here]
-        new += [max((_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead),
-                    key=_score) for one in here]
+        new = [found for one in here for found in _told_apart(
+            [_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead])]
+        new += [found for one in here for found in _told_apart(
+            [_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead])]
         if not here:
-            new = [chain._replace(candidate=NO_WAY, known=False, parent=number) for number, chain in ahead]
+            new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=())
+                   for number, chain in ahead]
         best = max(map(_score, new))
         likely = (chain for chain in new if chain.score > best - _WORST)
         chains = sorted(likely, key=_score, reverse=True)[:_MOST_CHAINS]
         history.append(chains)
         before = here
-    return _traced_back(history)
+    path, states = _traced_back(history)
+    return path, states, _belief(history, lists)
+
+
+def _told_apart(chains: Sequence[_Chain]) -> list[_Chain]:
+    """Of chains that came to one street: the best, and those that say another error, as what comes next may speak for
+    them (multiple hypotheses; Reid, "An algorithm for tracking multiple targets", IEEE Trans. Automatic Control 24,
+    1979). One that is left out is a rival of the one that it is like."""
+    ranked = sorted(chains, key=_score, reverse=True)
+    kept: list[_Chain] = []
+    rivals: list[list[tuple[int, float]]] = []
+    for chain in ranked:
+        if chain.score < ranked[0].score - _WORST:
+            break
+        like = next((number for number, other in enumerate(kept) if _alike(chain.error, other.error)), None)
+        if like is None and len(kept) < _MOST_EACH:
+            kept.append(chain)
+            rivals.append([])
+        else:
+            rivals[like or 0].append((chain.parent, kept[like or 0].score - chain.score))
+    return [chain._replace(rivals=tuple(found)) for chain, found in zip(kept, rivals, strict=True)]
+
+
+def _alike(one: _State, other: _State) -> bool:
+    """Whether two errors are the same but for a standard deviation of the second."""
+    east, north = one[0] - other[0], one[1] - other[1]
+    _, _, ee, en, nn = other
+    return east * east * nn - 2 * east * north * en + north * north * ee < ee * nn - en * en
+
+
+def _belief(history: Sequence[Sequence[_Chain]], lists: _Lists) -> Array:
+    """How likely it is (n,) that a window lies on the street of the best chain, beside the best chain over each other
+    street: what speaks against a choice often comes later (a Viterbi algorithm with soft decisions; Hagenauer & Hoeher,
+    IEEE Globecom 1989). Each chain's total is that of the best way on from it."""
+    found = np.ones(len(history))
+    totals, best = [chain.score for chain in history[-1]], 0
+    for window in range(len(history) - 1, -1, -1):
+        chains, mine = history[window], history[window][best]
+        weights = [exp(max(total - totals[best], -_WORST)) for total in totals]
+        same = sum(weight for weight, chain in zip(weights, chains, strict=True) if lists.agree(chain, mine))
+        found[window] = same / sum(weights)
+        if window:
+            before = [-inf] * len(history[window - 1])
+            for total, chain in zip(totals, chains, strict=True):
+                for parent, less in ((chain.parent, 0.0), *chain.rivals):
+                    before[parent] = max(before[parent], total - less)
+            totals, best = before, mine.parent
+    return found
 
 
 def _score(chain: _Chain) -> float:
@@ -190,7 +232,7 @@ def _score(chain: _Chain) -> float:
 def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range,
         receiver: Receiver) -> _Chain:
     """A chain that goes on, or begins, on a known street."""
-    score, last, known, reference, (error_e, error_n, ee, en, nn), _, _ = chain
+    score, last, known, reference, (error_e, error_n, ee, en, nn), *_ = chain
     point = lists.point[one]
     if not (known and lists.same(last, one)):
         # A street begins: to go over to the one beside is less likely than to turn into it.
@@ -217,7 +259,7 @@ def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before
 def _beside(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, drift: float,
             receiver: Receiver) -> _Chain:
     """A chain that goes on, or begins, on an unknown street beside a known one: so far aside as it was, or anywhere."""
-    score, last, known, reference, error, beside, _ = chain
+    score, last, known, reference, error, beside, *_ = chain
     fast, aside_m = receiver.aside_m**2, lists.aside_m[one]
     begins = known or last == NO_WAY
     if begins:
@@ -272,7 +314,7 @@ def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Ints, Array]:
 
 
 def _smoothed(trace: Trace, receiver: Receiver, states: Array) -> Array:
-    """Errors to the east and north (n, 2) as the whole drive tells them."""
+    """Errors to the east and north (n, 2) as the whole drive gives them."""
     keeps = np.exp(-np.diff(trace.t_s).clip(0.0) / receiver.correlation_s)
     covariance = states[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     drifted = keeps[:, None, None]**2 * covariance[:-1] + (
@@ -304,6 +346,12 @@ class _Lists:
         """Whether a candidate's street is among those of a neighbouring window too, perhaps as another way."""
         return one != NO_WAY and any(self.same(one, other) for other in among)
 
+    def agree(self, one: _Chain, other: _Chain) -> bool:
+        """Whether two chains lie on one street, or both on an unknown one."""
+        if one.known != other.known or not one.known:
+            return one.known == other.known
+        return one.candidate == other.candidate or self.same(one.candidate, other.candidate)
+
     def same(self, one: int, other: int) -> bool:
         """Whether candidates of neighbouring windows are of one street: the same way, or one that continues it."""
         if self.way[one] == self.way[other] and abs(self.along_m[one] - self.along_m[other]) > 2 * SEARCH_M:
@@ -322,61 +370,3 @@ class _Lists:
             found.point.tolist(), (network.along_m[found.point] + found.east_m * e + found.north_m * n).tolist(),
             (found.north_m * e - found.east_m * n).tolist(), (-n).tolist(), e.tolist(), network.way, network.founder,
             network.passes)
-
-
-# --- many drives ---
-
-
-def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUAL) -> list[Matched]:
-    """Lay drives over each other, one after the other: where no way is known a drive makes one, and ``network`` grows.
-
-    A drive that passes a place again is laid over itself.
-    """
-    found = []
-    for founder, trace in enumerate(traces, start=network.traces):
-        parts: list[Matched] = []
-        state: _State | None = None
-        for start, end in _laps(trace):
-            lap = trace.part(start, end)
-            matched, state = match(network, lap, receiver, state)
-            parts.append(_learned(network, lap, matched, founder))
-        found.append(_joined(parts))
-        network.traces = founder + 1
-    return found
-
-
-def _learned(network: RoadNetwork, lap: Trace, matched: Matched, founder: int) -> Matched:
-    """What was matched moves its ways; what was not becomes ways of its own."""
-    on = np.flatnonzero(matched.way >= 0)
-    network.move(matched.point[on], matched.aside_m[on])
-    way, along_m, point = matched.way.copy(), matched.along_m.copy(), matched.point.copy()
-    off = matched.way == NO_WAY
-    breaks = np.flatnonzero((off[1:] != off[:-1]) | (np.diff(lap.distance_m) > _GAP_M)) + 1
-    for start, end in zip([0, *breaks], [*breaks, len(off)], strict=True):
-        if end > start and off[start]:
-            way[start:end], along_m[start:end], point[start:end] = network.add(lap, start, end, founder)
-    return Matched(way, along_m, point, np.where(off, 0.0, matched.aside_m))
-
-
-def _laps(trace: Trace) -> list[tuple[int, int]]:
-    """Parts of a trace of which none comes back to where it has been, in its direction."""
-    from scipy.spatial import cKDTree
-
-    points = on_sphere(trace.lat_deg, trace.lon_deg)
-    heading = directions(points, trace.distance_m)
-    pairs = cKDTree(points).query_pairs(SEARCH_M, output_type="ndarray") if len(points) else np.zeros((0, 2), np.intp)
-    early, late = pairs.min(axis=1), pairs.max(axis=1)
-    alike = np.einsum("ij,ij->i", heading[early], heading[late]) > np.cos(np.radians(MOST_TURN_DEG))
-    again = alike & (trace.distance_m[late] - trace.distance_m[early] > _APART_M)
-    last = np.full(len(points), -1)
-    np.maximum.at(last, late[again], early[again])
-    cuts = [0]
-    for window in np.flatnonzero(last >= 0).tolist():
-        if last[window] >= cuts[-1]:
-            cuts.append(window)
-    return [(start, end) for start, end in zip(cuts, [*cuts[1:], len(points)], strict=True) if end > start]
-
-
-def _joined(parts: Sequence[Matched]) -> Matched:
-    return Matched(*(np.concatenate([getattr(one, name) for one in parts] or [np.zeros(0)])
-                     for name in ("way", "along_m", "point", "aside_m")))

@@ -111,11 +111,6 @@ class RoadNetwork:
     traces: int = 0
     _tree: Any = None
 
-    def lat_lon_deg(self) -> tuple[Array, Array]:
-        """Places of the points (k,) [degrees]."""
-        x, y, z = self.point.T
-        return np.degrees(np.arctan2(z, np.hypot(x, y))), np.degrees(np.arctan2(y, x))
-
     def candidates(self, trace: Trace) -> Candidates:
         """Which ways the windows of a trace may lie on."""
         points = on_sphere(trace.lat_deg, trace.lon_deg)

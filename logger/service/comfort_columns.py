@@ -2,8 +2,8 @@
 
 Where the estimated road under a window says what the car did, the figures are those of that ride: the model of the car
 is in the prior, the readings are bounds. Where there is none (no speed, the ends of a drive, a sensor whose noise blurs
-its steps), the power of the noise is taken off the readings, which needs no model. Where neither can tell, nothing is
-told but the word that a bound allows.
+its steps), the power of the noise is taken off the readings, which needs no model. Where neither is possible, the only
+figure is the word that a bound allows.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ComfortColumns:
             return NO_COMFORT
         noise_mps2, log_std = (noise.noise_rms_mps2, noise.log_std) if noise else (self._noise_mps2, 0.0)
         if not self._is_coarse:
-            # What a drive tells of a fine sensor's noise holds what the car's model is wrong by: that is ride.
+            # What a drive shows of a fine sensor's noise holds what the car's model is wrong by: that is ride.
             noise_mps2 = min(noise_mps2, self._noise_mps2)
         ride = estimate.ride if estimate is not None else NO_FIGURES
         if not isfinite(ride.a_w.value):

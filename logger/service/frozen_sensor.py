@@ -3,11 +3,11 @@
 Problem: a chip that has frozen goes on giving the reading it had, and a road of no roughness at all is what comes out.
 But with steps of 0.6 m/s2 a car that is parked gives one and the same reading for hours too, and nothing is wrong.
 
-Solution: the receiver tells which of the two it is. Only time counts through which every fix said that the car moved,
+Solution: the receiver shows which of the two it is. Only time counts through which every fix said that the car moved,
 and not one axis of one reading changed. After ``FROZEN_S`` of it the sensor is frozen until a reading changes, with a
 fix or without, and its windows are flagged and left without figures: from where it began, as far as they have not been
 written yet. Before that nothing is said. A sensor without any noise, at an even speed on a perfect road, can be silent
-for half a minute too; what it says then is too little to tell a road by.
+for half a minute too; what it says then is too little to judge a road by.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Windows wait here for their roughness.
 
 Problem. Comfort is known when a window ends; the road under it is known some seconds later, once the rear axle and the
-slow swing of the body have told of it. Rows must leave in order all the same. Solution: windows stand in a queue, the
+slow swing of the body have passed it. Rows must leave in order all the same. Solution: windows stand in a queue, the
 readings go to the estimator, and the head of the queue leaves as soon as its estimate has come or can come no more.
 """
 

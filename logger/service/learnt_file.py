@@ -64,7 +64,7 @@ class LearntFile:
         except FileNotFoundError:
             return None
         except (OSError, ValueError, TypeError, RecursionError) as error:
-            log.warning("%s: what was learnt of %s cannot be read, it is learnt anew (%s)", self._path, self._what,
+            log.warning("%s: what was learnt of %s cannot be read, it is learnt again (%s)", self._path, self._what,
                         error)
             return None
 

@@ -2,7 +2,7 @@
 
 Each source has a thread of its own (``logger.service.listener``) that puts what it got into a queue. The main loop
 empties the queue twice a second, brings the events into order of time, as far as no source holds earlier ones back,
-records them if asked to, feeds the core, and tells systemd and the status file how things stand. A pipeline that hangs
+records them if asked to, feeds the core, and reports to systemd and the status file. A pipeline that hangs
 stops feeding the watchdog.
 What was written is synced at every second round: a row is on the disk half a second after it was made, or later where
 ``sync_s`` allows it.

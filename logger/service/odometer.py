@@ -6,7 +6,7 @@ bridged: what lies in it has no distance. Below a threshold speed the car counts
 of a receiver at rest does not make distance.
 
 The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and
-`legs` tells such stretches apart.
+`legs` distinguishes such stretches.
 """
 
 from __future__ import annotations

@@ -34,7 +34,8 @@ from logger.units import US_PER_S
 
 FIX_DELAY_US = 3_000_000
 LONGEST_LAG_US = 9_000_000
-"""A row is made at most so long after its window, once the motion in it is settled: the road behind tells of it."""
+"""A row is made at most so long after its window, once the motion in it is settled: the road behind is part of its
+estimate."""
 
 SHORT_WINDOW_SHARE = 0.5
 # Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.
@@ -153,7 +154,7 @@ class Pipeline:
     def finish(self) -> list[WindowRecord]:
         """The end of the stream: what waits is released, the window being filled is closed where it stands.
 
-        The last second or two, for which the fix that would have told the motion can come no more, are left out.
+        The last second or two, for which the fix that would have given the motion can come no more, are left out.
         """
         self._pending += self._chain.flush()
         end_us = int(self._pending[-1].t_us[-1]) if self._pending else 0

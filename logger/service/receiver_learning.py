@@ -118,7 +118,7 @@ def _belief_words(belief: Belief) -> str:
 
 
 def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict[str, Any]:
-    """What one drive told, for a program: SI units in the names; None where it is not known."""
+    """What one drive showed of the delay, for a program: SI units in the names; None where it is not known."""
     found = alignment.estimate()
     axis = Axis.from_word(config.vertical_axis)
     turned_deg = heading_deg(found.forward, axis.column, axis.sign) if found.forward is not None else None

@@ -30,7 +30,7 @@ from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.service.systemd_notify import Notifier, watchdog_interval_s
 from logger.store.formats.vehicle_file import read_on_board
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.folder_lock import FolderLock
 
 LONGEST_BEAT_S = 2.0
@@ -53,7 +53,7 @@ def _serve(config: Config, stop: Stop) -> None:
     receiver_delay = at_start(config.gps, learnt)
     facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
     header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
-    limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
+    limits = QuotaLimits(config.log.quota_bytes, config.log.keep_free_bytes)
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
                       pairing=config.pairing)
     decoder = wiring.gps_decoder(config)

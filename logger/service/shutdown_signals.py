@@ -25,7 +25,7 @@ class Stop:
     def set(self) -> None:
         """Ask for it."""
         self._asked = True
-        with contextlib.suppress(BlockingIOError):  # a full pipe has been told often enough
+        with contextlib.suppress(BlockingIOError):  # a full pipe holds the request already
             os.write(self._writer, b"!")
 
     def is_set(self) -> bool:

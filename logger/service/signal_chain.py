@@ -3,7 +3,7 @@
 One vertical axis is taken, put on a uniform grid, decimated where the sensor was read faster, freed of gravity
 by a high-pass, low-passed if the settings ask for it, and weighted for comfort. Holes are never hidden: samples
 that the sensor did not deliver are `present = False`. Over a short hole the filters run on along a straight
-line, so that one loose contact does not cost seconds of road; after a long one they start anew and their output
+line, so that one loose contact does not cost seconds of road; after a long one they start from rest and their output
 is not `settled` until they have forgotten the start.
 """
 
@@ -134,7 +134,7 @@ class SignalChain:
         return out
 
     def flush(self) -> list[GridSamples]:
-        """What is still inside, up to the last sample; the filters start anew with the next one."""
+        """What is still inside, up to the last sample; the filters start from rest with the next one."""
         out = self._thinned(self._resampler.flush())
         out += self._filtered(self._decimator.flush())
         out += self._overdue()
@@ -156,11 +156,11 @@ class SignalChain:
         out = []
         for run in runs:
             if run.new_start:
-                out += self._start_anew(run)
+                out += self._restart(run)
             out += self._samples(run)
         return out
 
-    def _start_anew(self, run: GridRun) -> list[GridSamples]:
+    def _restart(self, run: GridRun) -> list[GridSamples]:
         """Before the first run and between two: what is missing, and the state of the filters."""
         hole_us = run.t0_us - self._next_us if self._next_us is not None else 0
         if self._next_us is not None and self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:

@@ -1,8 +1,8 @@
 """A receiver whose speed and places say different things.
 
-Problem: the road's roughness is read by the speed, and a receiver may tell a wrong one: none at all while it holds its
+Problem: the road's roughness is read by the speed, and a receiver may give a wrong one: none at all while it holds its
 speed back at low signal, twice the true one in another unit, that of a simulator. Nothing in a fix shows it. Solution:
-the places tell the speed too. A stretch of fixes is cut into steps of ``STEP_M``; the way by the speed is held against
+the places give the speed too. A stretch of fixes is cut into steps of ``STEP_M``; the way by the speed is held against
 the sum of the steps by the places.
 
 How far they may differ follows from the errors of receivers that are well. Those of places last, so that along a road
@@ -49,7 +49,7 @@ _SPANS_KEPT = 64
 
 
 class SpeedCheck:
-    """Follows fixes in order of time, and tells which stretches are doubtful."""
+    """Follows fixes in order of time, and says which stretches are doubtful."""
 
     def __init__(self) -> None:
         self._first: TimedFix | None = None

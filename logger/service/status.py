@@ -5,7 +5,7 @@ that merely exists may be that of a service that died.
 
 Solution. The service fills a frozen ``ServiceStatus`` now and then and puts it, whole, into a small JSON file in
 memory (renamed into place, so a reader never sees half of one). It carries the process and the monotonic time of
-its making, by which ``trouble`` tells a living service from a dead, hung or never started one.
+its making, by which ``trouble`` distinguishes a living service from a dead, hung or never started one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SensorStatus:
     driver, place   what it is and where: ``bma220`` at ``/dev/i2c-1``
     state           ok: readings come; absent: it was never there; retrying: it was there, failed, and is tried
                     again; silent: it is open and says nothing; doubtful: it speaks, but what it says cannot be
-                    read or cannot be true (``last_error`` tells what)
+                    read or cannot be true (``last_error`` says what)
     since_s         how long it has been in that state [s]
     last_error      text of the last fault, also after it recovered; None: there was none
     readings        samples or fixes so far
@@ -101,7 +101,7 @@ class ServiceStatus:
     last_window     the newest row; None before the first
     notices         what the settings allow and somebody should know all the same
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
-    receiver_delay  how late fixes come, and how that is known; empty: not told; receiver_delay_s and
+    receiver_delay  how late fixes come, and how that is known; empty: not known; receiver_delay_s and
                     receiver_delay_std_s: as numbers, with the standard error [s]
     sensor_noise    of the accelerometer, and how that is known, likewise; sensor_noise_mps2 and
                     sensor_noise_std_mps2: as numbers where it was learnt [m/s2]
@@ -179,7 +179,7 @@ def _sensor(fields: Mapping[str, Any]) -> SensorStatus:
 
 
 def process_exists(pid: int) -> bool:
-    """Tell whether a process of this number runs, whoever owns it."""
+    """Whether a process of this number runs, of any owner."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

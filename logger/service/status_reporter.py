@@ -1,4 +1,4 @@
-"""What the running service tells about itself: a snapshot for the status file, a line for systemd."""
+"""What the running service reports of itself: a snapshot for the status file, a line for systemd."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class StatusReporter:
         self._failed = False
         self._without_gravity = 0
         self._gravity_advice: str | None = None
-        self._progress = {"accelerometer": Progress(), "gps": Progress()}
+        self._progress = {"accelerometer": ReadingProgress(), "gps": ReadingProgress()}
         self._started_anew_us = self._began_us
 
     def write(self, now_us: int) -> None:
@@ -155,12 +155,12 @@ class StatusReporter:
             log.warning("accelerometer: %s", self._gravity_advice)
 
     def _look_at_stillness(self, now_us: int) -> None:
-        """Start an accelerometer anew that drives and says nothing new; not more than once a minute."""
+        """Restart an accelerometer that drives and gives nothing new; not more than once a minute."""
         frozen_s = self._pipeline.stillness.frozen_s
         if frozen_s and now_us - self._started_anew_us >= HEALTH_LINE_US:
             self._started_anew_us = now_us
-            log.warning("accelerometer: %s; starting it anew", _frozen(frozen_s))
-            self._sensors["accelerometer"].start_anew(_frozen(frozen_s))
+            log.warning("accelerometer: %s; restarting it", _frozen(frozen_s))
+            self._sensors["accelerometer"].restart(_frozen(frozen_s))
 
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""
@@ -200,7 +200,7 @@ class StatusReporter:
         )
 
 
-class Progress:
+class ReadingProgress:
     """Do the bytes that arrive become readings? ``look`` gives what is wrong, or None."""
 
     def __init__(self) -> None:
@@ -220,7 +220,7 @@ class Progress:
 
 def _frozen(seconds: float) -> str:
     return (f"the car drives, and the readings have not changed at all for {seconds:.0f} s: the sensor has frozen; "
-            "check its wires, and its mounting if it is started anew and it stays so")
+            "check its wires, and its mounting if a restart changes nothing")
 
 
 def _free_bytes(directory: str) -> int | None:

@@ -1,7 +1,7 @@
 """All that the service writes to the disk: rows, raw bytes if asked to, and the room for both.
 
-Nothing in here raises what the disk says; it is told by ``status`` and tried again. So the main loop goes on, and with
-it the sensors, the status file and the watchdog.
+Nothing in here raises what the disk says; ``status`` reports it and it is tried again. So the main loop goes on, and
+with it the sensors, the status file and the watchdog.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from drivers.dump import DumpHeader, Event
 from logger.service.status import StorageStatus
 from logger.store.export.export_marks import exported_names
 from logger.store.export.pairing import NOT_PAIRED, Pairing
-from logger.store.log.disk_quota import DiskQuota, Limits
+from logger.store.log.disk_quota import DiskQuota, QuotaLimits
 from logger.store.log.dump_recording import Recording, repair_recordings
 from logger.store.log.log_writer import SegmentLog, next_session, repair
 from logger.store.log.outage_buffer import BufferedLog
@@ -41,7 +41,7 @@ class Storage:
     """
 
     def __init__(self, directory: Path, facts: dict[str, Any], max_file_bytes: int, header: DumpHeader | None,
-                 limits: Limits, now_us: Callable[[], int], files: FileSystem | None = None,
+                 limits: QuotaLimits, now_us: Callable[[], int], files: FileSystem | None = None,
                  pairing: Pairing = NOT_PAIRED) -> None:
         self._directory = directory
         self._facts = facts

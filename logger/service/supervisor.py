@@ -27,9 +27,9 @@ class Supervisor:
     """One source and its state: ``absent`` (never seen), ``ok``, ``silent`` (open, says nothing) or ``retrying``.
 
     A single failed read (a NACK, a time-out) costs one sample and the device is asked again at the next poll; after
-    some in a row, and a third of a second of nothing else, it is closed and started anew. Starting takes many
+    some in a row, and a third of a second of nothing else, it is closed and restarted. Starting takes many
     transfers, and on a bus that refuses every third one it is better not to have to. A device that has lost its
-    settings is started anew at once; one that loses them again before it has given a reading is waited for as after
+    settings is restarted at once; one that loses them again before it has given a reading is waited for as after
     any other fault.
 
     restarts, faults, settings_lost     how often each happened
@@ -111,7 +111,7 @@ class Supervisor:
         """What the device holds back, as far as it vouches for it."""
         return self._source.flush()
 
-    def start_anew(self, doubt: str) -> None:
+    def restart(self, doubt: str) -> None:
         """Ask for the device to be closed and opened at its next turn, though it answers. Any thread may."""
         self._doubt = doubt
 

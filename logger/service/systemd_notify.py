@@ -29,7 +29,7 @@ class Notifier:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
             self._socket.setblocking(False)
         elif name:
-            logger.warning("NOTIFY_SOCKET is %r: expected a path, or a name after @; systemd is told nothing", name)
+            logger.warning("NOTIFY_SOCKET is %r: expected a path, or a name after @; systemd is not notified", name)
 
     def ready(self) -> None:
         """The service is up: it samples, or retries what is absent."""
@@ -59,7 +59,7 @@ class Notifier:
         try:
             self._socket.sendto(state.encode(), self._address)
         except OSError as error:
-            logger.debug("systemd was not told %s: %s", state, error)
+            logger.debug("systemd was not notified of %s: %s", state, error)
 
 
 def watchdog_interval_s(environment: Mapping[str, str] = os.environ, pid: int | None = None) -> float | None:

@@ -1,6 +1,6 @@
 """Monotonic time to UTC, from GPS fixes alone.
 
-A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver tells the UTC of
+A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of
 a fix, but the sentence arrives late, by an amount that wobbles. Arrival minus fix time therefore scatters above
 a floor; the floor over the last minutes is the clock difference plus the shortest latency, and the shortest
 latency is a setting (only a pulse-per-second wire could measure it).
@@ -50,7 +50,7 @@ class Timebase:
         self.time_jumps = 0
 
     def place(self, fix: Fix) -> TimedFix:
-        """When, on the monotonic axis, the fix was true. A fix that tells no time is placed by its arrival."""
+        """When, on the monotonic axis, the fix was true. A fix without a time is placed by its arrival."""
         if fix.time_of_day_us is None:
             return TimedFix(fix.t_us - self._latency_us, fix)
         lag_us = self._lag_us(fix.t_us, fix.time_of_day_us)

@@ -63,7 +63,7 @@ class Instrument:
 def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> Instrument:
     """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be.
 
-    known    what earlier drives told of its noise, where it is to be learnt; None: nothing
+    known    what earlier drives showed of its noise, where it is to be learnt; None: nothing
     """
     kind, settings = config.kind, config.settings
     readings = kind.readings(settings)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from logger.profiles.track import WheelTracks
 from logger.runs import Run, Signal
-from logger.vehicle.compose import MOST_MPS2, Car, Response, respond
+from logger.vehicle.compose import MOST_MPS2, Car, Response, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.observe import recorded_signals
@@ -59,11 +59,13 @@ class SimulatedRuns:
         ((1 + s) n,).
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
-        rough      step a car that rubs no finer than others: what a change does is told well enough by that
-        tracks     roads in place of the runs' own; runs are laid out anew for each such object
+        rough      step a car that rubs no finer than others: what a change does shows well enough by that
+        tracks     roads in place of the runs' own; runs are laid out again for each such object
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._laid_out(car, moved_m, rough, tracks)
+            for step_s in {one.step_s for one in passages if car.bends_laws}:
+                stepper_of(car, step_s)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
             partial(_recorded, car), passages, [run.signals for run in self.runs])
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]

@@ -51,7 +51,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class FrontAxleMotion:
     """Where the front tires are, at the recorder's instants: arrays (n,) [s, m/s, m]."""
 
     time_s: Array
@@ -137,7 +137,7 @@ def at_one_speed(track: Track, wheelbase_m: float, speed_mps: float) -> tuple[Ar
     return np.array([0.0, length_m / speed_mps + AFTER_S]), np.full(2, speed_mps)
 
 
-def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: float) -> Motion:
+def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: float) -> FrontAxleMotion:
     """The motion at a recorder's instants when the speed is a straight line between knots (k,), (k,).
 
     ValueError for a drive of less than two samples, or one that is too long to be simulated.
@@ -152,10 +152,10 @@ def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: floa
     last = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
     speed_mps = np.interp(time_s, knots_s, knots_mps)
     driven = at_knots[last] + 0.5 * (time_s - knots_s[last]) * (knots_mps[last] + speed_mps)
-    return Motion(time_s, speed_mps, start_m + driven)
+    return FrontAxleMotion(time_s, speed_mps, start_m + driven)
 
 
-def standing(excitation: Excitation, rate_hz: float) -> Motion:
+def standing(excitation: Excitation, rate_hz: float) -> FrontAxleMotion:
     """The motion, none, at a recorder's instants on a rig as long as it is driven.
 
     ValueError as ``motion_along``.
@@ -169,7 +169,8 @@ def standing(excitation: Excitation, rate_hz: float) -> Motion:
 
 
 def response(
-    structure: Structure, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion, rate_hz: float
+    structure: Structure, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion,
+    rate_hz: float
 ) -> dict[str, Array]:
     """The outputs (n,) of a car without effects, which came to the start on a flat road as fast as it goes there."""
     pace_m = float(motion.distance_m[1] - motion.distance_m[0])
@@ -183,8 +184,8 @@ def response(
 
 
 def response_with_effects(
-    car: Car, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion, rate_hz: float
-) -> tuple[dict[str, Array], Motion]:
+    car: Car, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion, rate_hz: float
+) -> tuple[dict[str, Array], FrontAxleMotion]:
     """The outputs (n,) of a car with effects, that of ``SENSOR`` behind the sensor's own, and the motion as it is
     recorded.
 
@@ -196,7 +197,7 @@ def response_with_effects(
         columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
     distance_m = recorded_distance(car, motion.distance_m)
     stretch = (car.driven(distance_m + _SHORT_M) - car.driven(distance_m - _SHORT_M)) / (2 * _SHORT_M)
-    return columns, Motion(motion.time_s, motion.speed_mps / stretch, distance_m)
+    return columns, FrontAxleMotion(motion.time_s, motion.speed_mps / stretch, distance_m)
 
 
 def _accelerations(car: Car, passage: Passage) -> Array:
@@ -216,7 +217,7 @@ def _accelerations(car: Car, passage: Passage) -> Array:
 
 
 def recorded_drive(
-    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion,
+    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion,
     rate_hz: float, errors: SensorErrors,
 ) -> dict[str, Array]:
     """The columns (n,) of a drive's file, by name: those of the outputs last, but for that of ``SENSOR``.

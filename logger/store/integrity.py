@@ -35,7 +35,7 @@ from logger.units import US_PER_S
 DUMP_ENDINGS = (".dump", ".dump.gz")
 OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
 SILENCE_US = US_PER_S
-"""An accelerometer that says nothing for longer has left a gap in a dump: told, and no damage of the file."""
+"""An accelerometer that says nothing for longer has left a gap in a dump: reported, and no damage of the file."""
 
 SHOWN_PROBLEMS = 20
 """Most problems that are kept in words for one file; all are counted."""
@@ -268,7 +268,7 @@ def _compare_with_sidecar(sidecar: dict[str, Any], findings: _Findings) -> None:
         findings.wrong("sidecar: expected the number of rows of a finished log")
     elif not findings.good <= rows <= findings.good + findings.corrupt + findings.torn:
         findings.gaps += 1
-        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of, found {findings.good}")
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar lists, found {findings.good}")
 
 
 def _compare_neighbours(logs: dict[Path, _Findings]) -> None:

@@ -1,4 +1,4 @@
-"""Many studies at once, on all cores; one that fails is told of, and the others still run.
+"""Many studies at once, on all cores; one that fails is reported, and the others still run.
 
 Each process has one study at a time and one thread of linear algebra, so that the cores are neither idle nor fought
 over.
@@ -47,7 +47,7 @@ def carry_out_all(chosen: Sequence[Study], share: float) -> Iterator[tuple[Study
             by_future = {pool.submit(carry_out, one.called, share): one for one in chosen}
             for future in as_completed(by_future):
                 error = future.exception()
-                yield by_future[future], Carried(None, _told(error), 0.0) if error else future.result()
+                yield by_future[future], Carried(None, _said(error), 0.0) if error else future.result()
     finally:
         for name, value in kept.items():
             if value is None:
@@ -61,6 +61,6 @@ def _ends_when_interrupted() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _told(error: BaseException) -> str:
-    """What a person is told: of an error of ours its sentence, of any other its kind, too."""
+def _said(error: BaseException) -> str:
+    """What a person reads: of an error of ours its sentence, of any other its kind, too."""
     return str(error) if isinstance(error, RidelogError) else f"{type(error).__name__}: {error}"

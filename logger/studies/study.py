@@ -1,7 +1,8 @@
 """What a study is: a table or a figure that was printed, made again and set beside what is printed there.
 
 Every file of a shelf's folder is one, offered as ``STUDY``. A study holds the printed values, so that what is ours is
-never seen without them, says in a word and a sentence how they agree, and why where they do not. The records that the
+never seen without them, and says of each printed item in a word and a sentence how they agree, and why where they do
+not. The word that it states has to come out of its checks (``logger.studies.checks``). The records that the
 dissertation measured were never published: where it measured, a study simulates under the conditions that the text
 gives, and says so.
 """
@@ -10,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,6 +20,7 @@ import numpy.typing as npt
 from logger.chart_data import Chart
 from logger.errors import BadInput
 from logger.plugins import catalogue
+from logger.studies.checks import Check, Statement, Value, Word, word_of
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
@@ -31,15 +32,6 @@ SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studi
 """Folders of studies: of the reference dissertation, of other papers that a reader knows, and of public records of
 roads."""
 DISSERTATION = "N. Blum, dissertation, University of Maryland, 2015"
-
-
-class Word(StrEnum):
-    """How a study's result stands beside the print."""
-
-    AGREES = "agrees"
-    MISPRINT = "misprint"
-    BETTER = "better"
-    NOT_REPRODUCIBLE = "not reproducible"
 
 
 def _silent(_done: int, _of: int) -> None:
@@ -71,7 +63,7 @@ class Effort:
         return [items[place] for place in kept]
 
     def each(self, items: Sequence[T]) -> Iterator[T]:
-        """The items, one after the other, told to ``progress``."""
+        """The items, one after the other; ``progress`` is called with each."""
         for done, item in enumerate(items):
             self.progress(done, len(items))
             yield item
@@ -108,57 +100,83 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Value:
-    """A printed value beside ours, and how far apart they may lie.
+class Picture:
+    """A chart of ours, and what the printed figure shows beside it; empty: nothing is printed."""
 
-    name         what it is, with its unit in brackets
-    tolerance    of the difference, in the value's unit
-    word         AGREES, NOT_REPRODUCIBLE: ours lies within the tolerance of the print. MISPRINT: ours lies farther off
-                 than that. BETTER: the value is an error (a scatter, a bias), and ours is smaller than the print by at
-                 least the tolerance
-    """
-
-    name: str
-    printed: float
-    ours: float
-    tolerance: float
-    word: Word = Word.AGREES
-
-    @property
-    def difference(self) -> float:
-        """Ours less the printed; what is below the last bits of the print is nothing."""
-        difference = self.ours - self.printed
-        return 0.0 if abs(difference) < 1e-12 * abs(self.printed) else difference
-
-    @property
-    def holds(self) -> bool:
-        """Whether ours stands beside the print as ``word`` says."""
-        if self.word is Word.BETTER:
-            return abs(self.ours) <= abs(self.printed) - self.tolerance
-        return (abs(self.ours - self.printed) <= self.tolerance) != (self.word is Word.MISPRINT)
+    chart: Chart
+    printed: str = ""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures; the printed
-    values that can be checked."""
+    """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures; what of the
+    print can be checked."""
 
     tables: tuple[Table, ...]
     verdict: str
-    pictures: tuple[Chart, ...] = ()
-    values: tuple[Value, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    values: tuple[Check, ...] = ()
 
     @property
     def all_tables(self) -> tuple[Table, ...]:
-        """The checked values first, where there are any."""
-        return (_checked(self.values), *self.tables) if self.values else self.tables
+        """The checks first, where there are any: numbers, statements, and the print beside itself."""
+        numbers = [one for one in self.values if isinstance(one, Value)]
+        shown = (("Printed and ours", [one for one in numbers if not one.of_print]),
+                 ("The print beside its own figures", [one for one in numbers if one.of_print]))
+        tables = [_of_numbers(title, some) for title, some in shown if some]
+        if statements := [one for one in self.values if isinstance(one, Statement)]:
+            tables.insert(min(1, len(tables)), _of_statements(statements))
+        return (*tables, *self.tables)
 
 
-def _checked(values: Sequence[Value]) -> Table:
-    rows = tuple((one.name, one.printed, one.ours, one.difference, one.tolerance,
-                  str(one.word) if one.holds else f"expected: {one.word}") for one in values)
-    return Table("Printed and ours", (Column("value"), Column("printed", ".6g"), Column("ours", ".6g"), Column(
+def _of_numbers(title: str, values: Sequence[Value]) -> Table:
+    ours = "from the print" if values[0].of_print else "ours"
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (one.name, *_items(one, values), one.printed, one.ours, one.difference, one.tolerance, _stands(one))
+        for one in values)
+    return Table(title, (Column("value"), *_of(values), Column("printed", ".6g"), Column(ours, ".6g"), Column(
         "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
+
+
+def _of_statements(statements: Sequence[Statement]) -> Table:
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (one.printed, *_items(one, statements), one.name, one.ours, one.bounds, _stands(one)) for one in statements)
+    return Table("Printed in words, and ours", (Column("printed"), *_of(statements), Column("figure"), Column(
+        "ours", ".4g"), Column("true for"), Column("word")), rows)
+
+
+def _of(checks: Sequence[Check]) -> tuple[Column, ...]:
+    return (Column("of"),) if any(one.of for one in checks) else ()
+
+
+def _items(check: Check, checks: Sequence[Check]) -> tuple[str, ...]:
+    return (", ".join(check.of),) if any(one.of for one in checks) else ()
+
+
+def _stands(check: Check) -> str:
+    if not check.holds:
+        return f"expected: {check.word}"
+    consistent = check.of_print and check.word is not Word.MISPRINT
+    return "consistent" if consistent else str(check.word)
+
+
+@dataclass(frozen=True)
+class Item:
+    """A printed table or figure, or a statement of a section, and how ours stands beside it.
+
+    name       "Table 4.4", "Fig 4.26", "Eq 2.16", "7.2 full car"
+    word       what its checks have to come to
+    because    the reason for the word, one sentence
+    """
+
+    name: str
+    word: Word
+    because: str
+
+
+def alike(names: Iterable[str], word: Word, because: str) -> tuple[Item, ...]:
+    """Items of one word for one reason."""
+    return tuple(Item(name, word, because) for name in names)
 
 
 @dataclass(frozen=True)
@@ -170,9 +188,7 @@ class Study:
     where      its place in what was printed
     how        under which conditions it is made again here, and what is simulated that was measured there
     run        make it
-    covers     the printed items that it holds, each "Table 4.4", "Fig 4.26" or "7.2 full car"
-    word       how ours stands beside the print
-    because    the reason for the word, one sentence
+    items      the printed items that it holds, each with its word
     source     who printed it
     data       what a person has to download before it can run; empty: nothing
     """
@@ -182,16 +198,40 @@ class Study:
     where: str
     how: str
     run: Callable[[Effort], Result]
-    covers: tuple[str, ...]
-    word: Word
-    because: str
+    items: tuple[Item, ...]
     source: str = DISSERTATION
     data: str = ""
 
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """Names of its items."""
+        return tuple(one.name for one in self.items)
+
+    @property
+    def groups(self) -> tuple[tuple[tuple[str, ...], Item], ...]:
+        """Names of the items that have one word for one reason, each with the first of them."""
+        first = {(one.word, one.because): one for one in reversed(self.items)}
+        kinds = dict.fromkeys((one.word, one.because) for one in self.items)
+        return tuple((tuple(one.name for one in self.items if (one.word, one.because) == kind), first[kind])
+                     for kind in kinds)
+
+    @property
+    def words(self) -> str:
+        """The words of its items, each once."""
+        return ", ".join(dict.fromkeys(str(one.word) for one in self.items))
+
+    def checks_of(self, item: str, result: Result) -> tuple[Check, ...]:
+        """What a result checks of one of the items."""
+        return tuple(one for one in result.values if item in (one.of or self.covers))
+
     def differs(self, result: Result) -> str:
-        """A sentence that names the values which do not stand beside the print as they should; empty: all do."""
-        wrong = [f"{one.name} ({one.ours:.5g}, printed {one.printed:.5g}, tolerance {one.tolerance:.2g}, expected: "
-                 f"{one.word})" for one in result.values if not one.holds]
+        """A sentence that names the checks which do not hold, and the items whose checks come to another word; empty:
+        all is as stated."""
+        wrong = [one.wrong for one in result.values if not one.holds]
+        for item in self.items:
+            found = word_of(self.checks_of(item.name, result))
+            if found is not item.word:
+                wrong.append(f"{item.name} (by its checks: {found}, expected: {item.word})")
         return f"Not as this study states: {'; '.join(wrong)}." if wrong else ""
 
     @property

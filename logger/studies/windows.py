@@ -93,6 +93,15 @@ def whole_road_by_rms(record: Run, vehicle: Vehicle | None = None) -> float:
     return _factor(vehicle or rav4(), float(record.speed_mps[0])) * float(np.sqrt(np.mean(record.measured_mps2**2)))
 
 
+def mean_window_by_rms(record: Run, edges_m: Array, low_pass_hz: float) -> float:
+    """IRI of windows between edges (w + 1,) by the dissertation's relation, the record low-passed: their mean [m/km].
+
+    Windows of one road differ, and the mean of roots is below the root of the mean: less than ``whole_road_by_rms``.
+    """
+    sensed = in_band(record.measured_mps2, RATE_HZ, 0.0, low_pass_hz)
+    return _factor(rav4(), float(record.speed_mps[0])) * float(_rms(sensed, record.distance_m, edges_m).mean())
+
+
 def rms_error(estimate: Array, exact: Array) -> float:
     """R.m.s. difference of two rows of windows."""
     return float(np.sqrt(np.mean((estimate - exact) ** 2)))

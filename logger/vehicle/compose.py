@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.passage import Passage
 from logger.vehicle.state_space import driven_outputs, straight_step
-from logger.vehicle.stepping import Motion, force_input, march
+from logger.vehicle.stepping import Motion, Stepper, force_input
 from logger.vehicle.structure import Structure, body_point
 from logger.vehicle.vehicle import Axle, Vehicle
 
@@ -181,7 +182,7 @@ def bounded(records: Sequence[Array]) -> bool:
 def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws:
-        return march(car.structure, car.laws, *passage.under_wheels(car.structure), passage.step_s, passage.way)
+        return stepper_of(car, passage.step_s).march(*passage.under_wheels(car.structure), passage.way)
     states = in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 
@@ -212,13 +213,24 @@ def _linear(car: Car, passage: Passage) -> Array:
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car from rest."""
     elevation, mean = passage.under_wheels(structure)
-    a, b = structure.state_space()
     around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
-    transition, at_start, at_end = straight_step(a, b, passage.step_s)
-    gain = np.hstack([at_start + at_end, at_end - at_start])
+    transition, gain = _linear_step(structure, passage.step_s)
     rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]),
                            np.zeros(len(structure.mass))])
     return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]), rest)
+
+
+@lru_cache(maxsize=16)
+def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
+    """The transition of the state over a step, and what the road's mean and rise do to it."""
+    transition, at_start, at_end = straight_step(*structure.state_space(), step_s)
+    return transition, np.hstack([at_start + at_end, at_end - at_start])
+
+
+@lru_cache(maxsize=4)
+def stepper_of(car: Car, step_s: float) -> Stepper:
+    """What steps a car, which passes all of its runs one after the other or at once."""
+    return Stepper.of(car.structure, car.laws, step_s)
 
 
 def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:

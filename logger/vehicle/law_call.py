@@ -5,7 +5,7 @@ is compiled once and kept on disk, before anybody wrote that law. Solution: each
 machine code with one and the same signature; the loop knows it by its address. Without numba the address is a number
 in a list, and the law runs as it stands.
 
-A law's functions are told apart by their code, so they get all that they need as ``p`` and hold nothing else.
+A law's functions are distinguished by their code, so they get all that they need as ``p`` and hold nothing else.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def functions_of(law: MotionLaw) -> list[Any]:
     return functions
 
 
-def numbers_of(law: MotionLaw) -> list[float]:
+def numbers_in_order(law: MotionLaw) -> list[float]:
     """Its numbers in the order in which the loop hands them on."""
     return [value for _, value in sorted(vars(law.p).items())]
 
@@ -101,17 +101,17 @@ def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
     all_seen: Any = Seen
 
     @compiled
-    def told(given: Any, felt: Any) -> Any:
+    def arguments(given: Any, felt: Any) -> Any:
         p = numbers(*of_array(numba.carray(given, (count,)), count))
         felt = numba.carray(felt, (FELT,))
         return p, all_seen(*of_array(felt[:first], first), of_array(felt[first : first + memory], memory))
 
     def force_alone(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = told(given, felt)
+        p, seen = arguments(given, felt)
         answers[0] = own_force(p, seen)
 
     def force_and_rates(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = told(given, felt)
+        p, seen = arguments(given, felt)
         answers[0] = own_force(p, seen)
         found = own_rates(p, seen)
         for index in range(memory):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,11 @@ class Coordinates:
 
 def names(vehicle: Vehicle) -> list[str]:
     """Every name that this vehicle's model has a use for; the joint ones last."""
+    return list(_names(vehicle))
+
+
+@lru_cache(maxsize=64)
+def _names(vehicle: Vehicle) -> tuple[str, ...]:
     body = [name for name in _BODY if getattr(vehicle, name) is not None]
     axle = [name for name in _AXLE if _used(vehicle, name)]
     single = [*body, *(f"front.{name}" for name in axle)]
@@ -116,7 +122,7 @@ def names(vehicle: Vehicle) -> list[str]:
     if vehicle.rear is not None:
         single += [f"rear.{name}" for name in axle]
         joint = [f"{BOTH}.{name}" for name in axle]
-    return single + [f"{SENSOR}.{name}" for name in _PLACE.get(vehicle.model, ())] + joint
+    return (*single, *(f"{SENSOR}.{name}" for name in _PLACE.get(vehicle.model, ())), *joint)
 
 
 def sized(vehicle: Vehicle) -> tuple[str, ...]:
@@ -140,17 +146,17 @@ def read(vehicle: Vehicle, name: str) -> float:
 
 def changed(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
     """The same vehicle with other numbers. ValueError as ``read``."""
+    parts: dict[str, dict[str, float]] = {}
     for name, value in values.items():
         _check(vehicle, name)
         part, _, leaf = name.rpartition(".")
-        whole: dict[str, Any] = {leaf: value}
-        if part == SENSOR:
-            whole = {SENSOR: replace(vehicle.sensor, **whole)}
-        elif part:
-            axles = AXLES if part == BOTH else (part,)
-            whole = {axle: replace(_axle(vehicle, axle), **whole) for axle in axles}
-        vehicle = replace(vehicle, **whole)
-    return vehicle
+        for one in AXLES if part == BOTH else (part,):
+            parts.setdefault(one, {})[leaf] = value
+    whole: dict[str, Any] = {**parts.pop("", {})}
+    for part, some in parts.items():
+        of: Any = vehicle.sensor if part == SENSOR else _axle(vehicle, part)
+        whole[part] = replace(of, **some)
+    return replace(vehicle, **whole)
 
 
 def free(
@@ -190,5 +196,5 @@ def _axle(vehicle: Vehicle, name: str) -> Axle:
 
 
 def _check(vehicle: Vehicle, name: str) -> None:
-    if name not in (known := names(vehicle)):
+    if name not in (known := _names(vehicle)):
         raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}")

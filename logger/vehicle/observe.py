@@ -1,6 +1,6 @@
 """What a recorder would keep of a car with effects, at places where its own sensor does not sit.
 
-Problem: a wheel's accelerometer, a travel sensor, a gyroscope each tell something else of the same motion, and a fit
+Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a fit
 asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and the
 transforms of them are kept as those of the sensor alone are: sensors are tried on them without moving the car again.
 """

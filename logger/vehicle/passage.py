@@ -11,6 +11,7 @@ as well, since many a sensor is tried on one body.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -63,18 +64,9 @@ class Passage:
         self._coarse = smooth_length(coarse)
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
         self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
-        taps = recorder_taps(self.steps)
-        centred = np.zeros(self._coarse * self.steps)
-        half = len(taps) // 2
-        centred[: half + 1], centred[-half:] = taps[half:], taps[:half]
-        self._recorder = np.fft.rfft(centred)[: len(f_hz)].real / self.steps
+        self._recorder = _recorder(self._coarse, self.steps)
         self._known: dict[tuple[float, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
-
-    @property
-    def fine_count(self) -> int:
-        """Instants that a car is stepped through, one more than the steps."""
-        return len(self._way.time_s)
 
     @property
     def time_s(self) -> Array:
@@ -136,6 +128,17 @@ class Passage:
     def sampled(self, fine: Array) -> Array:
         """Fine instants (M, ...) at the samples (N, ...), as they are."""
         return fine[self._lead * self.steps :: self.steps][: self.count]
+
+
+@lru_cache(maxsize=32)
+def _recorder(count: int, steps: int) -> Array:
+    """The gain of the recorder's filter, which chooses one of so many steps, at the frequencies of ``count`` samples
+    (count / 2,)."""
+    taps = recorder_taps(steps)
+    centred = np.zeros(count * steps)
+    half = len(taps) // 2
+    centred[: half + 1], centred[-half:] = taps[half:], taps[:half]
+    return np.asarray(np.fft.rfft(centred)[: count // 2].real / steps)
 
 
 def finer(distance: Array, steps: int) -> Array:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 _BLOCK = 16
+_STEPS = np.arange(_BLOCK)
 
 
 def matrix_exponential(a: Array) -> Array:
@@ -82,19 +83,17 @@ def driven_outputs(transition: Array, gain: Array, observe: Array, inputs: Array
     padded = np.zeros((blocks * _BLOCK, m))
     padded[:count] = inputs
     rows = padded.reshape(blocks, _BLOCK * m)
-    to_end = np.empty((_BLOCK, m, n))
-    seen = np.empty((n, _BLOCK, p))
-    through = np.zeros((_BLOCK, m, _BLOCK, p))
-    power = np.eye(n)
-    for steps in range(_BLOCK):  # power is F^steps
-        to_end[_BLOCK - 1 - steps] = (power @ gain).T
-        seen[:, steps] = (observe @ power).T
-        answer = (observe @ power @ gain).T
-        for early in range(_BLOCK - 1 - steps):
-            through[early, :, early + steps + 1] = answer
-        power = power @ transition
+    powers = np.empty((_BLOCK + 1, n, n))
+    powers[0] = np.eye(n)
+    for steps in range(_BLOCK):
+        powers[steps + 1] = powers[steps] @ transition
+    driven = powers[:-1] @ gain  # what an input does to the state so many steps after the next one
+    to_end = driven[::-1].swapaxes(1, 2)
+    seen = (observe @ powers[:-1]).transpose(2, 0, 1)
+    answers = np.concatenate([observe @ driven, np.zeros((_BLOCK, p, m))])  # an input that is still to come: nothing
+    through = answers[(_STEPS - _STEPS[:, None] - 1) % (2 * _BLOCK)].transpose(0, 3, 1, 2)
     states = np.empty((blocks, n))
     states[0] = start
-    states[1:] = recursion(power, rows[:-1] @ to_end.reshape(-1, n), start)
+    states[1:] = recursion(powers[-1], rows[:-1] @ to_end.reshape(-1, n), start)
     result = states @ seen.reshape(n, -1) + rows @ through.reshape(_BLOCK * m, -1)
     return result.reshape(-1, p)[: count + 1]

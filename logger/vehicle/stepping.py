@@ -74,31 +74,63 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
 
     ValueError for a law by all that moves that cannot be compiled.
     """
-    from logger.vehicle.stepping_loop import LANES, steps  # loads the compiler, if there is one
+    return Stepper.of(structure, laws, step_s).march(elevation, mean, way)
 
-    n, w = len(structure.mass), len(structure.wheels)
-    a, b = structure.state_space()
-    transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
-    road = [at_start[:, :w] + at_end[:, :w], at_end[:, :w] - at_start[:, :w]]
-    rubbing = _rubbing(laws, 2 * n)
-    held = (at_start[:, w:] + at_end[:, w:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
-    seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
-    if any(one.body_friction_n for one in laws):
-        seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
-    state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros(((-len(seen) - 2 * n) % LANES, 2 * n))])
-    known, forces = (
-        np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
-        for some in ([transition, at_start[:, w:], *road], [at_end[:, w:], held])
-    )
-    around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
-    rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
-    rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
-            for i, one in enumerate(rubbing)]
-    return Motion(*steps(
-        known, forces, step_s, *_tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
-        np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3),
-        _asked(structure, laws, way or Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * step_s)),
-        state_and_seen @ rest, 2 * n, around, elevation))
+
+@dataclass(frozen=True, eq=False)
+class Stepper:
+    """A car with its laws in steps of one length: all that is the same on every road.
+
+    state_and_seen    (R, 2 n) the motion that the loop carries on, out of the state
+    others            as ``stepping_loop.steps`` has them
+    """
+
+    structure: Structure
+    laws: tuple[CornerLaws, ...]
+    step_s: float
+    state_and_seen: Array
+    by_known: Array
+    by_force: Array
+    tabulated: tuple[Array, Array, Array]
+    rubs: Array
+    rubs_at: npt.NDArray[np.int64]
+
+    @staticmethod
+    def of(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> Stepper:
+        """As ``march``."""
+        from logger.vehicle.stepping_loop import LANES  # loads the compiler, if there is one
+
+        n, w = len(structure.mass), len(structure.wheels)
+        a, b = structure.state_space()
+        transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
+        road = [at_start[:, :w] + at_end[:, :w], at_end[:, :w] - at_start[:, :w]]
+        rubbing = _rubbing(laws, 2 * n)
+        held = (at_start[:, w:] + at_end[:, w:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
+        seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
+        if any(one.body_friction_n for one in laws):
+            seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
+        state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros(((-len(seen) - 2 * n) % LANES, 2 * n))])
+        known, forces = (
+            np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
+            for some in ([transition, at_start[:, w:], *road], [at_end[:, w:], held])
+        )
+        rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
+                for i, one in enumerate(rubbing)]
+        return Stepper(
+            structure, tuple(laws), step_s, state_and_seen, known, forces, _tabulated(structure, laws, step_s),
+            np.array(rubs).reshape(-1, 3), np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
+
+    def march(self, elevation: Array, mean: Array, way: Way | None = None) -> Motion:
+        """The motion on a road, as ``stepping.march``."""
+        from logger.vehicle.stepping_loop import steps
+
+        structure, n = self.structure, len(self.structure.mass)
+        around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
+        rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
+        stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
+        return Motion(*steps(
+            self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
+            _asked(structure, self.laws, way or stands), self.state_and_seen @ rest, 2 * n, around, elevation))
 
 
 @dataclass(frozen=True)
@@ -145,13 +177,13 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     """Laws by all that moves as the loop reads them; None where there are none."""
     if not any(one.motions for one in laws):
         return None
-    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_of
+    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_in_order
 
     whole, numbers, memories = [], [0.0], []
     for i, corner in enumerate(laws):
         for one in corner.motions:
             whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
-            numbers += numbers_of(one)
+            numbers += numbers_in_order(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
     places = way.distance_m[:, None] - structure.behind_m
     return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),

@@ -80,9 +80,15 @@ def _sum(result: Array, first: int, start: Array, by: Array, count: int, rows: A
     """Let the result, from ``first`` on, be the start and ``count`` rows, each times its number in ``by``."""
     for r in range(first, len(result)):
         result[r] = start[r]
-    for c in range(count):
+    whole = count // LANES * LANES
+    for c in range(0, whole, LANES):  # one by one, each would wait for the one before it to be stored
+        p, q, s, u = by[c], by[c + 1], by[c + 2], by[c + 3]
+        if p != 0.0 or q != 0.0 or s != 0.0 or u != 0.0:  # forces of laws that a car does not have
+            for r in range(first, len(result)):
+                result[r] += (p * rows[c, r] + q * rows[c + 1, r]) + (s * rows[c + 2, r] + u * rows[c + 3, r])
+    for c in range(whole, count):
         number = by[c]
-        if number != 0.0:  # forces of laws that a car does not have
+        if number != 0.0:
             for r in range(first, len(result)):
                 result[r] += number * rows[c, r]
 

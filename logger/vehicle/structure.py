@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +49,7 @@ class Output:
             raise ValueError("the road has no velocity or acceleration here: only an output of order 0 may contain it")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Structure:
     """Matrices of one car. n degrees of freedom, w wheels.
 
@@ -83,6 +84,10 @@ class Structure:
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""
+        return self._state_space
+
+    @cached_property
+    def _state_space(self) -> tuple[Array, Array]:
         n = len(self.mass)
         inverse = np.linalg.inv(self.mass)
         a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.stiffness, -inverse @ self.damping]])

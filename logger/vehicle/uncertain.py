@@ -1,7 +1,7 @@
 """How far a vehicle's numbers may be off, and the cars that it may be instead.
 
 Problem: numbers that were fitted come with standard errors, but they hang together: more mass and a stiffer spring make
-the same car as far as the fit can tell, so that errors one by one make a car look less certain than it is. Solution:
+the same car as far as the fit can show, so that errors one by one make a car look less certain than it is. Solution:
 the errors with their correlations, cut into directions that have nothing to do with one another (the eigenvectors of
 the correlation matrix); for each there is the car a standard error away.
 """

@@ -57,8 +57,8 @@ def test_each_name_is_documented(name: str) -> None:
 
 def test_importing_it_loads_nothing_that_takes_long_and_prints_nothing() -> None:
     code = "import ridelog, sys; raise SystemExit(len({'scipy', 'numba'} & set(sys.modules)))"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (told.returncode, told.stdout, told.stderr) == (0, "", "")
+    reported = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (reported.returncode, reported.stdout, reported.stderr) == (0, "", "")
     assert set(ridelog.__all__) <= set(dir(ridelog))
 
 
@@ -163,15 +163,15 @@ def test_a_calibration_is_the_commands(
     from logger.commands.main import main
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    told: list[str] = []
-    found = ridelog.calibrate("rav4-2009", passengers=2, progress=told.append)
-    again = ridelog.calibrate("rav4-2009", passengers=2, progress=told.append)
-    assert ["computed in" in words for words in told] == [True, True, False, False]
-    assert "found in" in told[2] and again.as_json() == found.as_json()
+    reported: list[str] = []
+    found = ridelog.calibrate("rav4-2009", passengers=2, progress=reported.append)
+    again = ridelog.calibrate("rav4-2009", passengers=2, progress=reported.append)
+    assert ["computed in" in words for words in reported] == [True, True, False, False]
+    assert "found in" in reported[2] and again.as_json() == found.as_json()
     assert main(["calibrate", "--vehicle", "rav4-2009", "--passengers", "2", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found.as_json()
-    plain = ridelog.calibrate(ridelog.read_vehicle("rav4-2009"), progress=told.append)
-    assert told[-1].endswith("not kept") and [path.name for path in tmp_path.iterdir()] == ["ridelog"]
+    plain = ridelog.calibrate(ridelog.read_vehicle("rav4-2009"), progress=reported.append)
+    assert reported[-1].endswith("not kept") and [path.name for path in tmp_path.iterdir()] == ["ridelog"]
     assert (found.accel_rms_per_root_gd.slope < plain.accel_rms_per_root_gd.slope).all()
     assert found.sprung_mass_kg > plain.sprung_mass_kg
 

@@ -50,7 +50,7 @@ def test_gaps_at_the_ends_of_a_part_are_cut_off() -> None:
     assert first.usable is None and last.usable is None
 
 
-def test_clipped_readings_are_told() -> None:
+def test_clipped_readings_are_reported() -> None:
     (run,) = driven_stretches(drive({(7, 7.05): CLIPPED}))
     assert run.usable is not None and (run.usable == CLIPPED).sum() == 5
 

@@ -14,7 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, Settings, SpeedCalibration, calibrate, loaded
+from logger.estimation.rms_calibration import (
+    LEVELS_IRI,
+    SPEEDS_MPS,
+    CalibrationSettings,
+    SpeedCalibration,
+    calibrate,
+    loaded,
+)
 from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
 from logger.roads.gd_iri import iri_per_root_gd
@@ -56,9 +63,9 @@ def cost(figures: Figures) -> None:
         figures.at_most(f"calibration of {name}", time.perf_counter() - started_s, 2.0, "s")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "car.calibration.json"
-        keep([path], fingerprint(vehicle, GAIN, Settings()), speeds)
+        keep([path], fingerprint(vehicle, GAIN, CalibrationSettings()), speeds)
         started_s = time.perf_counter()
-        found = find([path], fingerprint(vehicle, GAIN, Settings()))
+        found = find([path], fingerprint(vehicle, GAIN, CalibrationSettings()))
         took_s = time.perf_counter() - started_s
     figures.at_most("finding it again" if found else "NOT FOUND AGAIN", 1e3 * took_s, 20.0, "ms")
 
@@ -81,7 +88,8 @@ def agreement(figures: Figures) -> None:
 def errors(figures: Figures) -> None:
     """Over other seeds: is the slope unbiased, and its standard error the scatter from one set of roads to another?"""
     car = known_vehicle(RAV4)
-    runs = [[speed.iri_per_accel_rms for speed in calibrate(car, GAIN, Settings(seed=seed))] for seed in OTHER_SEEDS]
+    runs = [[speed.iri_per_accel_rms for speed in calibrate(car, GAIN, CalibrationSettings(seed=seed))]
+            for seed in OTHER_SEEDS]
     exact = rms_relation(car, GAIN, SPEEDS_MPS).iri_per_accel_rms * iri_per_root_gd() / iso8608.IRI_PER_ROOT_GD
     slopes = np.array([[line.slope for line in run] for run in runs])
     stds = np.array([[line.standard_error for line in run] for run in runs])
@@ -121,7 +129,7 @@ def window_lengths() -> None:
     """Fig 6.12 to 6.15 are about 100 ft and 25 ft; 6.3 calls the relation independent of length. The line nearly is."""
     print("RAV4, lines over windows: IRI per r.m.s. / spread / R2 over roads of IRI 1 to 10")
     for feet in (25, 100, 300):
-        car = calibrate(known_vehicle(RAV4), GAIN, Settings(window_m=feet * FOOT_M))
+        car = calibrate(known_vehicle(RAV4), GAIN, CalibrationSettings(window_m=feet * FOOT_M))
         lines = [speed.window_iri_per_accel_rms for speed in car]
         print(f"  {feet:3d} ft " + "  ".join(f"{line.slope:5.2f}/{line.spread:4.0%}/{line.r2:.2f}" for line in lines))
     lines = [speed.iri_per_accel_rms for speed in car]

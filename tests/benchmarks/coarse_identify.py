@@ -2,7 +2,7 @@
 
 A car whose mass and dampers are wrong by some per cent drives over its road; its sensor has noise and rounds to a
 BMA220's step, its places are off by what wanders with a receiver's correlation in time (a first-order Gauss-Markov
-process made here). ``identify`` finds both numbers, once told of the step and the places (``run.yaml``) and once not.
+process made here). ``identify`` finds both numbers, once with the step and the places (``run.yaml``) and once without.
 Printed are how many of the estimates lie within two of their standard errors of the truth, and their r.m.s. error.
 
     python -m tests.benchmarks.coarse_identify [DRIVES]
@@ -37,27 +37,27 @@ def main() -> int:
     drives = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     figures = Figures()
     for words, case in CASES.items():
-        told, untold = (np.array([off(seed, *case, known) for seed in range(1, drives + 1)]) for known in (True, False))
-        told, refused = told[np.isfinite(told).all(axis=(1, 2))], int(np.isnan(told).any(axis=(1, 2)).sum())
-        untold = untold[np.isfinite(untold).all(axis=(1, 2))]
-        inside = float((np.abs(told[..., 1]) < 2).mean())
+        exact, plain = (np.array([off(seed, *case, known) for seed in range(1, drives + 1)]) for known in (True, False))
+        exact, refused = exact[np.isfinite(exact).all(axis=(1, 2))], int(np.isnan(exact).any(axis=(1, 2)).sum())
+        plain = plain[np.isfinite(plain).all(axis=(1, 2))]
+        inside = float((np.abs(exact[..., 1]) < 2).mean())
         # Of so many numbers two deviations less may be inside by chance.
-        least = LEAST_SHARE - 2 * np.sqrt(LEAST_SHARE * (1 - LEAST_SHARE) / told[..., 1].size)
+        least = LEAST_SHARE - 2 * np.sqrt(LEAST_SHARE * (1 - LEAST_SHARE) / exact[..., 1].size)
         figures.at_least(f"{words}: within 2 errors", 100 * inside, 100 * least, "%")
-        print(f"  error {100 * np.sqrt((told[..., 0] ** 2).mean()):.2f} %; without run.yaml "
-              f"{100 * np.sqrt((untold[..., 0] ** 2).mean()):.2f} %, and {(np.abs(untold[..., 1]) < 2).mean():.0%} "
-              f"within 2 standard errors in {len(untold)} drives that are not refused; {refused} refused with it",
+        print(f"  error {100 * np.sqrt((exact[..., 0] ** 2).mean()):.2f} %; without run.yaml "
+              f"{100 * np.sqrt((plain[..., 0] ** 2).mean()):.2f} %, and {(np.abs(plain[..., 1]) < 2).mean():.0%} "
+              f"within 2 standard errors in {len(plain)} drives that are not refused; {refused} refused with it",
               flush=True)
     return int(figures.missed > 0)
 
 
-def off(seed: int, step_mps2: float, noise_mps2: float, place_std_m: float, told: bool) -> list[tuple[float, float]]:
+def off(seed: int, step_mps2: float, noise_mps2: float, place_std_m: float, known: bool) -> list[tuple[float, float]]:
     """By which share each number is off, and by how many of its standard errors; NaN where the runs are refused."""
     car = ridelog.read_vehicle("rav4-2009")
     road = ridelog.random_road(iso_class="B", length_m=320.0, seed=seed)
     drive = ridelog.simulate(car.with_numbers(TRUE), road, 10.0 + 0.3 * (seed % 7), noise_mps2=noise_mps2,
                              step_mps2=step_mps2, seed=seed)
-    facts = RecordFacts(step_mps2=step_mps2 or None, place_std_m=place_std_m or None) if told else UNKNOWN
+    facts = RecordFacts(step_mps2=step_mps2 or None, place_std_m=place_std_m or None) if known else UNKNOWN
     wandering_m = place_std_m * wandering(len(drive.distance_m), drive.rate_hz, np.random.default_rng(seed))
     run = replace(drive, distance_m=drive.distance_m + wandering_m, facts=facts)
     try:

@@ -3,8 +3,8 @@
     python -m tests.benchmarks.comfort_noise [--all]
 
 Drives over ISO 8608 roads of the classes' mean roughness go through the real pipeline with a receiver of 1 Hz: noise x
-range x class x speed, with gravity at four places within a step. The pipeline is told the true noise; the last rows are
-drives of which it is told the usual 0.1 m/s2 while the chip has half again as much, drives that learn it, drives in a
+range x class x speed, with gravity at four places within a step. The pipeline knows the true noise; the last rows are
+drives for which it is given the usual 0.1 m/s2 while the chip has half again as much, drives that learn it, drives in a
 car whose numbers are all 10 % off its file, and drives with an engine that shakes the car at 25 Hz with 0.15 m/s2.
 
 The truth is the acceleration that the simulated car had, without sensor, weighted by Wk as scipy computes its formula,
@@ -47,7 +47,7 @@ from logger.vehicle.structure import body_point
 from ..support.drives.measured import GRID_HZ, Drive, Receiver, block_of, iso_road, steady_drive
 from .estimator import LEAD_S, altered, config_for, rav4
 from .figures import Figures
-from .noise import GRANTED_MPS2, OFFSETS, Chip, step_of
+from .noise import ASSUMED_MPS2, OFFSETS, Chip, step_of
 
 Array = npt.NDArray[np.float64]
 
@@ -149,12 +149,12 @@ def _compared(records: Sequence[WindowRecord], weighted: Array, cost: float) -> 
 
 
 def drives(
-    noise: float, range_g: int, road_class: str, mph: int, windows: int, told: float | None = None,
+    noise: float, range_g: int, road_class: str, mph: int, windows: int, reported: float | None = None,
     learns: bool = False, car_off: float = 0.0, engine_mps2: float = 0.0,
 ) -> Rows:
     """Four drives, with gravity at another place within a step each.
 
-    told         the noise that is taken for true; ``learns``: it is learnt
+    reported     the noise that is taken for true; ``learns``: it is learnt
     car_off      share by which every number of the car is off its file
     engine_mps2  r.m.s. of a vibration of 25 Hz that no road makes
     """
@@ -168,8 +168,8 @@ def drives(
         turns = ENGINE_HZ / GRID_HZ * np.arange(len(drive.accel_mps2))
         engine = engine_mps2 * np.sqrt(2) * np.sin(2 * np.pi * turns)
         drive = replace(drive, accel_mps2=drive.accel_mps2 + engine)
-        guess = NoiseBelief.guessed(GRANTED_MPS2, step) if learns else None
-        believed = Sensor(guess.noise_rms_mps2 if guess else told or noise, step)
+        guess = NoiseBelief.guessed(ASSUMED_MPS2, step) if learns else None
+        believed = Sensor(guess.noise_rms_mps2 if guess else reported or noise, step)
         parts.append(driven(drive, chip, believed, guess, 1000 * mph + 10 * range_g + number))
     return pooled(parts)
 
@@ -179,12 +179,12 @@ def cost(mph: int, windows: int) -> tuple[float, float]:
     step = step_of(2)
     road = iso_road(iri_from_gd_n0(CLASS_GD_N0_CM3["B"]), windows * WINDOW_M, FIRST_SEED)
     drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ)
-    readings, _ = Chip("BMA220", GRANTED_MPS2, step, counts=(-32, 31)).read(drive.accel_mps2, np.random.default_rng(1))
+    readings, _ = Chip("BMA220", ASSUMED_MPS2, step, counts=(-32, 31)).read(drive.accel_mps2, np.random.default_rng(1))
     structure = half_car.structure(rav4())
     usable, nowhere = np.ones(len(readings), dtype=np.bool_), np.zeros(len(readings))
     taken = []
     for response in (None, WEIGHTING.response):
-        estimator = RoadEstimator(LinearCar(structure, body_point(structure)), Sensor(GRANTED_MPS2, step), WINDOW_M,
+        estimator = RoadEstimator(LinearCar(structure, body_point(structure)), Sensor(ASSUMED_MPS2, step), WINDOW_M,
                                   ride_response=response)
         begun_s = time.process_time()
         estimator.push(readings, usable, nowhere, drive.place_m - drive.place_m[0])
@@ -253,8 +253,8 @@ def main() -> int:
         print(f"cores of this machine for the estimator at {mph} mph: {without:.4f} without the ride, {with_ride:.4f} "
               "with it")
     for road_class, mph in itertools.product("AB", extent.mph[::2]):
-        print_row(f"2 g, 0.15 told 0.1, {road_class} {mph}",
-                  drives(0.15, 2, road_class, mph, extent.windows, told=GRANTED_MPS2))
+        print_row(f"2 g, 0.15 given 0.1, {road_class} {mph}",
+                  drives(0.15, 2, road_class, mph, extent.windows, reported=ASSUMED_MPS2))
         print_row(f"2 g, 0.15 learnt, {road_class} {mph}",
                   drives(0.15, 2, road_class, mph, extent.windows, learns=True))
         print_row(f"2 g, 0.1, wrong car, {road_class} {mph}",

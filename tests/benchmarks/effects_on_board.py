@@ -12,8 +12,8 @@ the plain car with its own file has; "back" is the share of it that the file wit
 loss is below 0.01 has nothing to win back. "in 1" and "in 2" are the shares of windows within one and two standard
 errors; those of ``speed_scale`` are asked for where the car truly was.
 
-Then the plain car with files whose numbers are all off, by errors drawn anew for each drive, without standard errors in
-the file and with them: their windows must lie within the errors that are told as often as they should.
+Then the plain car with files whose numbers are all off, by new errors for each drive, without standard errors in
+the file and with them: their windows must lie within the errors that are given as often as they should.
 
 A damper's asymmetry costs little, and 78 % of that comes back.
 
@@ -289,7 +289,7 @@ def estimates(drive: Drive, vehicle: Vehicle, effects: Sequence[Chosen] = (), er
     return Windows(drive.road.iri(begin_m, end_m)[inside], estimate[inside], std[inside])
 
 
-def told(name: str) -> tuple[Chosen, ...]:
+def reported(name: str) -> tuple[Chosen, ...]:
     """The effect as a file has it."""
     effect = shipped_effects()[name]
     return (chosen(effect, EFFECTS[name]),)
@@ -331,7 +331,7 @@ def main() -> int:
     for name in args.only or EFFECTS:
         drives = records(name, which)
         plain = pooled([estimates(one, rav4()) for one in drives])
-        true = pooled([estimates(one, rav4(), told(name)) for one in drives])
+        true = pooled([estimates(one, rav4(), reported(name)) for one in drives])
         loss = own.r2 - plain.r2
         back[name] = (true.r2 - plain.r2) / loss if loss > LEAST_LOSS else float("nan")
         kept.append(true)

@@ -41,7 +41,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
-from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -209,7 +209,7 @@ def print_score(name: str, found: Score) -> None:
 
 @cache
 def rav4() -> Vehicle:
-    """The car that the estimator is told of."""
+    """The car that the estimator knows."""
     return read_vehicle(vehicle_file("rav4-2009"))
 
 
@@ -230,8 +230,8 @@ def roads(levels: tuple[float, ...], length_m: float, draw: int = 0) -> tuple[Ro
     return tuple(found)
 
 
-def told(sensor: Accelerometer) -> Sensor:
-    """What the estimator is told of a sensor. Fast readings with their noise make a sum without steps."""
+def reported(sensor: Accelerometer) -> Sensor:
+    """What the estimator knows of a sensor. Fast readings with their noise make a sum without steps."""
     if sensor.oversample == 1:
         return Sensor(sensor.noise_mps2, sensor.step_mps2)
     return Sensor(sqrt((sensor.noise_mps2**2 + sensor.step_mps2**2 / 12) / sensor.oversample), 0.0)
@@ -296,7 +296,7 @@ def exact_drive(
     travelled_m = place_m - place_m[0]
     numbers = np.arange(np.ceil(-place_m[0] / window_m), np.floor((road.length_m - place_m[0]) / window_m)).astype(int)
     begin_m = place_m[0] + numbers * window_m
-    found = estimates(told(sensor), readings, clipped, travelled_m, window_m, spent)
+    found = estimates(reported(sensor), readings, clipped, travelled_m, window_m, spent)
     nothing = (np.nan, np.nan)
     estimate, std = np.array([found.get(number, nothing) for number in numbers.tolist()]).T
     limit = np.full(len(numbers), np.nan)
@@ -344,16 +344,16 @@ def known_best(
 
     lap = readings[round(LEAD_S * GRID_HZ):][:samples]
     felt = lap - lap.mean()
-    told_by = road.spectrum_m3 * np.abs(response) ** 2 * GRID_HZ / (2 * variance * speed)
+    reported_by = road.spectrum_m3 * np.abs(response) ** 2 * GRID_HZ / (2 * variance * speed)
     waves = _conjugate_gradients(lambda x: x + backward(forward(x)) / variance, backward(felt) / variance,
-                                 1 / (1 + np.mean(road.gain**2) * told_by), 600 if np.ptp(road.gain) else 3)
+                                 1 / (1 + np.mean(road.gain**2) * reported_by), 600 if np.ptp(road.gain) else 3)
     golden = frequency_response(sections(SPACING_M), wave_number, 1 / SPACING_M)
     golden = golden * (np.exp(2j * np.pi * wave_number * TIRE_BASE_M) - 1) / TIRE_BASE_M
     slope = np.fft.rfft(road.gain * np.fft.irfft(waves * colour, count)) / rise
     mean = np.fft.irfft(np.where(wave_number > 0, slope * golden, 0), count)
     gains = np.geomspace(road.gain.min() * 0.99, road.gain.max() * 1.01, 30)
     step_cpm = wave_number[1]
-    left = [np.sum(np.abs(golden) ** 2 * road.spectrum_m3 * g**2 / (1 + g**2 * told_by)) * step_cpm for g in gains]
+    left = [np.sum(np.abs(golden) ** 2 * road.spectrum_m3 * g**2 / (1 + g**2 * reported_by)) * step_cpm for g in gains]
     spread = np.sqrt(np.interp(road.gain, gains, left))
     sums = np.concatenate([[0.0], np.cumsum(_expected_absolute(mean, spread))]) * SPACING_M
     at = np.arange(count + 1) * SPACING_M
@@ -422,7 +422,7 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
             scores.append(score(pooled([one for _, one in parts])))
             print_score(f"{mph} mph, all roads", scores[-1])
         print("limit as ridelog estimate prints it, ISO roads of waviness 2:  " + "  ".join(
-            f"{mph:g} mph {limit:.4f}" for mph, limit in zip(extent.mph, told_limits(sensor, extent), strict=True)))
+            f"{mph:g} mph {limit:.4f}" for mph, limit in zip(extent.mph, reported_limits(sensor, extent), strict=True)))
         print(f"estimator: {1000 * spent.taken_s / spent.driven_s:.2f} ms per second of drive")
         for mph, found in zip(extent.mph, scores, strict=True):
             exact_goals(figures, sensor, mph, found)
@@ -434,10 +434,10 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
             figures.at_most(f"{sensor.name}: size of that trend", abs(trend), BIAS_GOAL_PERCENT[sensor], "%")
 
 
-def told_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
+def reported_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
     """The product's own limit at each speed, over the levels driven."""
     structure = half_car.structure(rav4())
-    limits = Limits(LinearCar(structure, body_point(structure)), told(sensor), WINDOW_M)
+    limits = ErrorBound(LinearCar(structure, body_point(structure)), reported(sensor), WINDOW_M)
     return [pooled_r2([limits.at(mph * MPH_MPS, RoadSpectrum.of_iri(level)) for level in extent.levels])
             for mph in extent.mph]
 
@@ -515,7 +515,7 @@ def wrong(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (
 
 @dataclass(frozen=True)
 class Logged:
-    """What the pipeline said of some windows, and what is true at the place it told and where the car really was; and
+    """What the pipeline said of some windows, and what is true at the place it gave and where the car really was; and
     what it learnt of the noise."""
 
     windows: Windows
@@ -524,7 +524,7 @@ class Logged:
 
 
 def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Config:
-    """The service's settings for a sensor; ``latency_s`` is what it is told of the receiver."""
+    """The service's settings for a sensor; ``latency_s`` is what it is given for the receiver."""
     config = Config()
     driver = "pasco" if sensor is PASCO else "bma220"
     sections = config.accelerometer.sections
@@ -536,7 +536,7 @@ def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Conf
 
 
 def logged_drive(
-    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, told_latency_s: float, seed: int,
+    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, reported_latency_s: float, seed: int,
     believed: Sensor | None = None, noise: NoiseBelief | None = None,
 ) -> Logged:
     """A drive through the real pipeline, and the exact IRI at the places its records tell.
@@ -545,7 +545,7 @@ def logged_drive(
     noise       what it believes of the noise before, where it learns it
     """
     rng = np.random.default_rng([FIRST_SEED, seed])
-    config = config_for(sensor, window_m, told_latency_s)
+    config = config_for(sensor, window_m, reported_latency_s)
     instrument = wiring.instrument(config.accelerometer)
     instrument = replace(instrument, sensor=believed or instrument.sensor, noise=noise)
     pipeline = wiring.pipeline(config, instrument, read_model(config.vehicle))
@@ -591,12 +591,12 @@ def gps(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (PA
     receivers = {
         "no slow error": (Receiver(slow_error_m=0.0), 0.15),
         WANDERING: (Receiver(), 0.15),
-        "the same, told 100 ms latency": (Receiver(), 0.10),
+        "the same, given 100 ms latency": (Receiver(), 0.10),
     }
     levels = tuple(extent.levels[::2])
     asked = [(sensor, name) for sensor in sensors for name in receivers if sensor is PASCO or name == WANDERING]
     for sensor, name in asked:
-        receiver, told_latency_s = receivers[name]
+        receiver, reported_latency_s = receivers[name]
         for feet in (25, 300):
             print(f"\n{sensor.name}, GPS at 1 Hz, 150 ms late, {name}, windows of {feet} ft "
                   "(limit: right IRI, wrong place)")
@@ -604,7 +604,7 @@ def gps(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (PA
             for mph in extent.mph:
                 found_drives = [steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ * sensor.oversample)
                                 for road in roads(levels, 1.25 * extent.windows * WINDOW_M, 7)]
-                parts = [logged_drive(drive, sensor, receiver, feet * FOOT_M, told_latency_s, seed)
+                parts = [logged_drive(drive, sensor, receiver, feet * FOOT_M, reported_latency_s, seed)
                          for seed, drive in enumerate(found_drives)]
                 found = print_logged(f"{mph} mph", parts)
                 if name == WANDERING and mph >= 20:
@@ -647,7 +647,7 @@ def varied_exact(drive: Drive, sensor: Accelerometer, seed: int, window_m: float
     readings, clipped = on_grid(drive, sensor, rng)
     place_m = drive.place_m[:: sensor.oversample][: len(readings)]
     numbers = np.arange(int(place_m[-1] / window_m))
-    found = estimates(told(sensor), readings, clipped, place_m, window_m)
+    found = estimates(reported(sensor), readings, clipped, place_m, window_m)
     estimate, std = np.array([found.get(number, (np.nan, np.nan)) for number in numbers.tolist()]).T
     speed_mps = drive.speed_mps[:: sensor.oversample][: len(readings)]
     rms = by_rms(readings, (place_m / window_m).astype(int), speed_mps, len(numbers))

@@ -233,9 +233,9 @@ def _judge(groups: Sequence[Group], enough: int, figures: Figures) -> None:
 
 
 def _page(groups: Sequence[Group]) -> str:
-    told = dict.fromkeys(line.told for group in groups for line in group.lines if line.told)
+    reported = dict.fromkeys(line.reported for group in groups for line in group.lines if line.reported)
     parts = [HEAD, "## What `ridelog status` says\n", "In these trials, among others (times and places differ):\n",
-             "\n".join(f"- {words}" for words in told) + "\n",
+             "\n".join(f"- {words}" for words in reported) + "\n",
              "When nothing is wrong: \"Nothing: all is well.\" What each stick is doing, and whether it may be pulled, "
              "stands above all else.\n"]
     return "\n".join([*parts, *map(_section, groups)])

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, simulate_drive
 from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter
 from logger.dsp.fixed_scaling import fixed_cascade
@@ -52,7 +52,7 @@ def main() -> int:
 
 def road_acceleration(gd_n0_cm3: float) -> Floats:
     """A minute of a RAV4 at 14 m/s, gravity included, at 100 Hz [m/s2]."""
-    plan = DrivePlan(speed_knots=((0, 14), (60, 14)), stretches=(Stretch(1000, gd_n0_cm3),))
+    plan = DrivePlan(speed_knots=((0, 14), (60, 14)), stretches=(RoadStretch(1000, gd_n0_cm3),))
     drive = simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
     return drive.accel_mps2[::10] + STANDARD_GRAVITY_MPS2
 

@@ -269,10 +269,10 @@ def passes(figures: Figures) -> None:
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
             model = VehicleModel(CAR, numbers, records, road)
             found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
-            told = with_common_roughness(model, found).fit
+            reported = with_common_roughness(model, found).fit
             errors.append([found.parameters[name] / value - 1 for name, value in wanted.items()])
             alone.append([found.standard_errors[name] / value for name, value in wanted.items()])
-            counted.append([told.standard_errors[name] / value for name, value in wanted.items()])
+            counted.append([reported.standard_errors[name] / value for name, value in wanted.items()])
         off = np.abs(errors)
         inside = 100 * float((off < 2 * np.array(counted)).mean())
         figures.at_least(f"{title}: within two standard errors", inside, 93.0, "%")
@@ -349,7 +349,7 @@ def road_bounds(speeds: tuple[float, ...]) -> Array:
 
 
 def no_answer_without_a_road(figures: Figures) -> None:
-    """What cannot be told of an input, or without one."""
+    """What cannot be estimated of an input, or without one."""
     flat = replace(bump_record(CAR), track=Track(1.0, np.zeros(2)))
     quarter = read_vehicle(vehicle_file("golden-car"))
     one_wheel = replace(bump_record(quarter), track=Track(1.0, np.zeros(2)))

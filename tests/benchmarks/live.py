@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.dump import Event, open_dump
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -63,7 +63,7 @@ def _record_drive(seconds: float, path: Path) -> None:
     while knots[-1][0] < seconds:
         t_s = knots[-1][0]
         knots += [(t_s + 5, 0), (t_s + 15, 12), (t_s + 60, 14), (t_s + 75, 24), (t_s + 100, 24), (t_s + 115, 0)]
-    plan = DrivePlan(speed_knots=knots, stretches=(Stretch(500, 60), Stretch(500, 200)), seed=11)
+    plan = DrivePlan(speed_knots=knots, stretches=(RoadStretch(500, 60), RoadStretch(500, 200)), seed=11)
     record(simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009"))), path)
 
 

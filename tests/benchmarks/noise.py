@@ -1,10 +1,10 @@
-"""The noise of a BMA220 learnt from drives, and what that is worth: beside 0.1 m/s2 for granted, and the true noise.
+"""The noise of a BMA220 learnt from drives, and what that is worth: beside an assumed 0.1 m/s2, and the true noise.
 
     python -m tests.benchmarks.noise [--all] [--only PART]
 
 drives: every drive goes through the real pipeline with a receiver of 1 Hz whose position wanders by 0.8 m: noise x
 range x speed x roads of several IRI, with gravity at another place within a step each time. Four times each: with
-0.1 m/s2 for granted (``noise_mps2: null``), with the true noise given, learning from a guess ("first drive"), and once
+an assumed 0.1 m/s2 (``noise_mps2: null``), with the true noise given, learning from a guess ("first drive"), and once
 more with what was learnt carried on ("learnt"). Roads, car and receiver are those of tests/benchmarks/estimator.py.
 
 limit: ISO roads with exact places and the noise given, beside the best that anybody could say (``rounding_limit``),
@@ -18,7 +18,7 @@ their standard errors. A noise counts as found within two of its standard errors
 learnt, which says so by its standard error.
 
 Goals: the noise found in 95 % of the drives; the bias within 3 % (5 % where the noise is below a fifth of a step) and
-no larger than for granted, R2 within 0.03 of that with the true noise, and of the limit, coverage within 0.04. Exit 1
+no larger than as assumed, R2 within 0.03 of that with the true noise, and of the limit, coverage within 0.04. Exit 1
 when one is missed.
 """
 
@@ -43,10 +43,10 @@ from .estimator import FIRST_SEED, LEAD_S, Logged, Score, estimates, logged_driv
 from .figures import Figures
 from .rounding_limit import Lap, best_values
 
-GRANTED_MPS2 = 0.1
+ASSUMED_MPS2 = 0.1
 LATENCY_S = 0.15
 OFFSETS = (0.0, 0.25, 0.5, -0.2)  # of gravity within a step, in steps
-WAYS = ("granted", "true", "first drive", "learnt")
+WAYS = ("assumed", "true", "first drive", "learnt")
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,12 @@ def four_ways(noise: float, range_g: int, mph: int, level: float, windows: int, 
     def driven(seed: int, believed: float, before: NoiseBelief | None = None) -> Logged:
         return logged_drive(drive, chip, Receiver(), WINDOW_M, LATENCY_S, seed, Sensor(believed, step), before)
 
-    guess = NoiseBelief.guessed(GRANTED_MPS2)
-    first = driven(2 * number, GRANTED_MPS2, guess)
+    guess = NoiseBelief.guessed(ASSUMED_MPS2)
+    first = driven(2 * number, ASSUMED_MPS2, guess)
     assert first.noise is not None
     carried = first.noise.next_drive()
-    return {"granted": driven(2 * number + 1, GRANTED_MPS2), "true": driven(2 * number + 1, noise),
-            "first drive": first, "learnt": driven(2 * number + 1, GRANTED_MPS2, carried)}
+    return {"assumed": driven(2 * number + 1, ASSUMED_MPS2), "true": driven(2 * number + 1, noise),
+            "first drive": first, "learnt": driven(2 * number + 1, ASSUMED_MPS2, carried)}
 
 
 def figures_of(found: Score) -> str:
@@ -138,11 +138,11 @@ def row(figures: Figures, noise: float, range_g: int, mph: int, extent: Extent) 
     name = f"{noise:g} m/s2, {range_g} g, {mph} mph"
     print(f"{name:24s} learnt " + " ".join(f"{one.noise_rms_mps2:.3f}+-{one.std_mps2:.3f}" for one in beliefs))
     print(f"{'':24s}" + "  ".join(f"{way:>11s}{figures_of(scores[way])}" for way in WAYS), flush=True)
-    found, true, granted = scores["learnt"], scores["true"], scores["granted"]
+    found, true, assumed = scores["learnt"], scores["true"], scores["assumed"]
     goal_percent = 3.0 if noise >= 0.2 * step_of(range_g) else 5.0
     figures.at_most(f"{name}: size of bias", 100 * abs(found.bias), goal_percent, "%")
-    figures.at_most(f"{name}: first drive's, granted's + 1", 100 * abs(scores["first drive"].bias),
-                    100 * abs(granted.bias) + 1, "%")
+    figures.at_most(f"{name}: first drive's, assumed's + 1", 100 * abs(scores["first drive"].bias),
+                    100 * abs(assumed.bias) + 1, "%")
     figures.at_least(f"{name}: R2, true noise's less 0.03", found.r2, true.r2 - 0.03, "")
     return learnt, off
 

@@ -71,14 +71,14 @@ def main() -> int:
     for case in CASES:
         trials = [trial(case, seed) for seed in range(drives)]
         complaints += sum(each[3] for each in trials)
-        told = [(guess.delay_s - truth_s, guess.std_s) for guess, truth_s, _, _ in trials
+        reported = [(guess.delay_s - truth_s, guess.std_s) for guess, truth_s, _, _ in trials
                 if guess.delay_s is not None and guess.std_s is not None]
         off_deg = [np.degrees(each[2]) for each in trials if np.isfinite(each[2])]
-        print(f"  {case.name}: told in {len(told)} of {drives} drives; forward within {max(off_deg, default=0):.1f} "
-              "degrees", flush=True)
-        if not told:
+        print(f"  {case.name}: found in {len(reported)} of {drives} drives; "
+              f"forward within {max(off_deg, default=0):.1f} degrees", flush=True)
+        if not reported:
             continue
-        error_s, std_s = np.array(told).T
+        error_s, std_s = np.array(reported).T
         off += list(error_s / std_s)
         print(f"    bias {error_s.mean():+.4f} s, mean standard error {std_s.mean():.4f} s, within two of them "
               f"{np.mean(np.abs(error_s) < 2 * std_s):.2f}", flush=True)

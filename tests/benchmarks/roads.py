@@ -62,26 +62,27 @@ def cost(figures: Figures) -> None:
 def spectra(figures: Figures) -> None:
     """Level and slope of the fitted spectrum, mean over 20 roads of 1 km."""
     for waviness in (1.5, 2.0, 2.5, 3.0):
-        told = [classify(iso8608.generate(256, 1000, SPACING_M, seed, waviness), SPACING_M) for seed in range(20)]
-        level = np.exp(np.mean([np.log(one.gd_n0_cm3 / 256) for one in told]))
+        reported = [classify(iso8608.generate(256, 1000, SPACING_M, seed, waviness), SPACING_M) for seed in range(20)]
+        level = np.exp(np.mean([np.log(one.gd_n0_cm3 / 256) for one in reported]))
         figures.at_most(f"waviness {waviness:g}: error of the level", 100 * abs(level - 1), 5, "%")
-        slope = np.mean([one.waviness for one in told])
+        slope = np.mean([one.waviness for one in reported])
         figures.at_most(f"waviness {waviness:g}: error of the slope", 100 * abs(slope / waviness - 1), 5, "%")
 
 
 def classes(figures: Figures) -> None:
     """Of each class 100 roads; and stretches of one long road, which chance makes more unlike each other."""
     for number, (letter, gd_n0_cm3) in enumerate(iso8608.CLASS_GD_N0_CM3.items()):
-        told = [classify(iso8608.generate(gd_n0_cm3, 1000, SPACING_M, 100 * number + seed), SPACING_M)
+        reported = [classify(iso8608.generate(gd_n0_cm3, 1000, SPACING_M, 100 * number + seed), SPACING_M)
                 for seed in range(100)]
-        figures.at_least(f"class {letter} found again, 1 km", sum(one.road_class == letter for one in told), 95, "/100")
+        figures.at_least(f"class {letter} found again, 1 km", sum(one.road_class == letter for one in reported), 95,
+        "/100")
     for length_m, goal in ((200, 95), (100, 90)):
-        told = [classify(one, SPACING_M) for one in stretches(256, length_m)]
-        hits = sum(one.road_class == "C" for one in told)
+        reported = [classify(one, SPACING_M) for one in stretches(256, length_m)]
+        hits = sum(one.road_class == "C" for one in reported)
         figures.at_least(f"class C found again, stretches of {length_m} m", hits, goal, "/100")
-        named = sum("C" in one.classes for one in told)
+        named = sum("C" in one.classes for one in reported)
         figures.at_least(f"class C among those named, stretches of {length_m} m", named, 95, "/100")
-        figures.at_most(f"error over promised error, {length_m} m", rms_of_promised(told, 256), 1.2, "")
+        figures.at_most(f"error over promised error, {length_m} m", rms_of_promised(reported, 256), 1.2, "")
 
 
 def stretches(gd_n0_cm3: float, length_m: float) -> list[Array]:
@@ -91,9 +92,9 @@ def stretches(gd_n0_cm3: float, length_m: float) -> list[Array]:
     return [road[start:start + size + 1] for start in range(0, 100 * size, size)]
 
 
-def rms_of_promised(told: list[Roughness], gd_n0_cm3: float) -> float:
+def rms_of_promised(reported: list[Roughness], gd_n0_cm3: float) -> float:
     """Root mean square of the errors of Gd(n0), each in its own standard errors; 1 is right."""
-    off = [np.log(one.gd_n0_cm3 / gd_n0_cm3) / (one.gd_n0_std_cm3 / one.gd_n0_cm3) for one in told]
+    off = [np.log(one.gd_n0_cm3 / gd_n0_cm3) / (one.gd_n0_std_cm3 / one.gd_n0_cm3) for one in reported]
     return float(np.sqrt(np.mean(np.square(off))))
 
 

@@ -106,14 +106,14 @@ def limit(acceleration: Array, columns: Array, noise_mps2: float, first: int) ->
     """Fisher's information (2, 2) of readings that are known to lie between their bounds."""
     place = acceleration[first:, None]
     steps = STEP_MPS2 * (np.arange(np.floor(place.min() / STEP_MPS2) - 2, np.ceil(place.max() / STEP_MPS2) + 3) + 0.5)
-    told = np.zeros(len(place))
+    reported = np.zeros(len(place))
     for low, high in pairwise(steps.tolist()):
         near, far = (np.abs((bound - place[:, 0]) / noise_mps2) for bound in (low, high))
         inside = np.abs(norm.sf(near) - np.where((low < place[:, 0]) & (place[:, 0] < high), 1 - norm.sf(far),
                                                  norm.sf(far)))
-        told += np.where(inside > 1e-12, (norm.pdf(near) - norm.pdf(far)) ** 2 / np.maximum(inside, 1e-300), 0.0)
+        reported += np.where(inside > 1e-12, (norm.pdf(near) - norm.pdf(far)) ** 2 / np.maximum(inside, 1e-300), 0.0)
     slopes = columns[:, first:]
-    return np.asarray((slopes * told) @ slopes.T / noise_mps2**2)
+    return np.asarray((slopes * reported) @ slopes.T / noise_mps2**2)
 
 
 if __name__ == "__main__":

@@ -96,8 +96,9 @@ def judged(vehicle: Vehicle, track: Track, way: Callable[[Array], Array], time_s
 
     columns = track.elevation_m.reshape(len(track.elevation_m), -1).T
     roads = [road_under(0.0, track.spacing_m, column, vehicle.contact_patch_m) for column in columns]
-    told = judge(vehicle, roads, way, time_s)
-    return np.stack([told.body_mps2, told.wheel_mps2[:, 0], told.travel_m[:, 0], told.tire_m[:, 0]], axis=1)
+    reported = judge(vehicle, roads, way, time_s)
+    return np.stack([reported.body_mps2, reported.wheel_mps2[:, 0], reported.travel_m[:, 0], reported.tire_m[:, 0]],
+    axis=1)
 
 
 def report(figures: Figures, name: str, found: Array, expected: Array) -> None:

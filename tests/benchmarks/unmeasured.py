@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import Found, diagnose_same_road
+from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.likelihood import SameRoad
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -31,7 +31,7 @@ ABSORBED = ("sensor_gain", "tire_enveloping", "speed_scale")
 FIRST_SEED = 1
 
 
-def diagnosed(seed: int, effect: str | None, folder: Path) -> Found:
+def diagnosed(seed: int, effect: str | None, folder: Path) -> UnknownRoadDiagnosis:
     """A case, from files."""
     from ..validation.cases.case_files import write_case
     from ..validation.cases.same_road import same_road_case
@@ -44,8 +44,8 @@ def diagnosed(seed: int, effect: str | None, folder: Path) -> Found:
     return diagnose_same_road(problem, shipped_effects())
 
 
-def told(seed: int, effect: str | None) -> tuple[list[str], tuple[str, ...]]:
-    """The verdict of a case, and what its first effect cannot be told from; printed."""
+def reported(seed: int, effect: str | None) -> tuple[list[str], tuple[str, ...]]:
+    """The verdict of a case, and what its first effect cannot be distinguished from; printed."""
     started = time.process_time()
     with TemporaryDirectory() as folder:
         found = diagnosed(seed, effect, Path(folder))
@@ -62,13 +62,13 @@ def main() -> int:
     figures = Figures()
     right = alarms = extra = 0
     for seed, effect in enumerate(FOUND, FIRST_SEED):
-        verdict, alike = told(seed, effect)
+        verdict, alike = reported(seed, effect)
         right += bool(verdict) and effect in (verdict[0], *alike)
         extra += len(verdict) > 1
     for seed in NOTHING_SEEDS:
-        alarms += bool(told(seed, None)[0])
-    wrong = sum(bool(told(seed, effect)[0]) for seed, effect in enumerate(ABSORBED, FIRST_SEED))
-    figures.at_least("right effect first, or told as alike", right / len(FOUND), 0.8, "share")
+        alarms += bool(reported(seed, None)[0])
+    wrong = sum(bool(reported(seed, effect)[0]) for seed, effect in enumerate(ABSORBED, FIRST_SEED))
+    figures.at_least("right effect first, or named as not distinguishable", right / len(FOUND), 0.8, "share")
     figures.at_most("more than the one effect named", extra / len(FOUND), 0.2, "share")
     figures.at_most("false alarms where nothing is missing", alarms / len(NOTHING_SEEDS), 0.05, "share")
     figures.at_most("effects that the road takes, named as others", wrong / len(ABSORBED), 0.34, "share")

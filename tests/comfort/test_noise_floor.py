@@ -51,7 +51,7 @@ def test_ride_is_found_under_noise_within_its_errors(rms_mps2: float, noise_mps2
         std = np.array([getattr(one, name).std for one in found])[known]
         assert abs(value.mean() / exact.mean() - 1) < tolerance, name
         off = np.abs(value - exact) / std
-        # VDV's error is told somewhat too large: the ride's sixth moment is taken for a Gaussian's.
+        # VDV's error is given somewhat too large: the ride's sixth moment is taken for a Gaussian's.
         assert 0.58 < np.mean(off <= 1) < 0.85, name
         assert 0.90 < np.mean(off <= 2) < 0.99, name
 

@@ -28,27 +28,27 @@ def add(effect: str, vehicle: Path | str, out: Path, *arguments: str) -> int:
 def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, second = tmp_path / "with-friction.yaml", tmp_path / "with-both.yaml"
     assert add("dry_friction", "rav4-2009", first, *runs, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["effect"] == "dry_friction"
-    error = told["standard_errors"]["friction_force_n"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["effect"] == "dry_friction"
+    error = reported["standard_errors"]["friction_force_n"]
     assert 0.01 < error < 7.0
-    assert told["parameters"]["friction_force_n"] == pytest.approx(70.0, abs=max(7.0, 3 * error))
-    assert told["noise_floor_error"] == pytest.approx(told["error_after"], rel=0.1)
-    assert told["error_after"] < told["error_refitted"] <= told["error_before"]
-    assert told["helps"] is True
+    assert reported["parameters"]["friction_force_n"] == pytest.approx(70.0, abs=max(7.0, 3 * error))
+    assert reported["noise_floor_error"] == pytest.approx(reported["error_after"], rel=0.1)
+    assert reported["error_after"] < reported["error_refitted"] <= reported["error_before"]
+    assert reported["helps"] is True
     assert main(["compare", "--vehicle", str(first), "--json", *runs]) == 0
     compared = json.loads(capsys.readouterr().out)
-    assert compared["error"] == pytest.approx(told["error_as_written"], rel=1e-6)
-    assert compared["refitted"]["error"] == pytest.approx(told["error_after"], rel=0.02)
-    assert {one["name"] for one in told["numbers"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
+    assert compared["error"] == pytest.approx(reported["error_as_written"], rel=1e-6)
+    assert compared["refitted"]["error"] == pytest.approx(reported["error_after"], rel=0.02)
+    assert {one["name"] for one in reported["numbers"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
 
     model = read_model(first)
     assert [one.effect.name for one in model.effects] == ["dry_friction"]
-    assert model.effects[0].values == told["parameters"]
-    assert model.effects[0].standard_errors == told["standard_errors"]
+    assert model.effects[0].values == reported["parameters"]
+    assert model.effects[0].standard_errors == reported["standard_errors"]
     assert [step.step for step in model.history] == ["as it was given", "numbers refitted", "added dry_friction"]
-    assert model.history[-1].error == told["error_after"]
-    mass = next(one for one in told["numbers"] if one["name"] == "sprung_mass_kg")
+    assert model.history[-1].error == reported["error_after"]
+    mass = next(one for one in reported["numbers"] if one["name"] == "sprung_mass_kg")
     assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["written"]
 
     # Rebound and bump are alike in this car: one more number gains nothing.
@@ -66,11 +66,11 @@ def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest
     own.write_text(OWN, "utf-8")
     out.write_text(vehicle_file("rav4-2009").read_text("utf-8"), "utf-8")
     assert add(str(own), out, out, *runs) == 0  # over the old file, as it was asked for
-    told = capsys.readouterr().out
-    assert told.startswith("long_bracket: offset_m 0.")
+    reported = capsys.readouterr().out
+    assert reported.startswith("long_bracket: offset_m 0.")
     for words in ("It helps", "Error before: ", "Error after: ", "distances as recorded: where compare begins with it",
                   "sprung_mass_kg", "Shift", f"Vehicle: {out}"):
-        assert words in told
+        assert words in reported
     model = read_model(out)
     assert model.effects[0].file == str(own)
     assert 0.36 < model.effects[0].values["offset_m"] < 0.44

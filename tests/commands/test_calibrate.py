@@ -85,7 +85,7 @@ def test_the_second_time_it_is_found(
 
 
 @pytest.mark.parametrize("more", [["--recompute"], ["--window", "30.48"], ["--seed", "2"], ["--low-pass", "15"]])
-def test_what_is_asked_anew_is_computed_anew(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
+def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
     first = Call(capsys, car, "--json")
     other = Call(capsys, car, "--json", *more)
     assert "computed in" in other.err
@@ -93,7 +93,7 @@ def test_what_is_asked_anew_is_computed_anew(car: Path, capsys: pytest.CaptureFi
     assert "found in" in Call(capsys, car, "--json").err  # and the first is still there
 
 
-def test_a_changed_vehicle_and_a_damaged_file_are_computed_anew(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_changed_vehicle_and_a_damaged_file_are_computed_again(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = Call(capsys, car, "--json")
     stored = car.with_name("mine.calibration.json")
     slope = first.json()["speeds"][0]["iri_per_accel_rms"]

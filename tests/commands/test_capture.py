@@ -87,7 +87,7 @@ def test_wrong_use_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, o
         run(monkeypatch, Port([], gone=False), tmp_path / out, *arguments)
 
 
-def test_a_missing_port_is_told(tmp_path: Path) -> None:
+def test_a_missing_port_is_reported(tmp_path: Path) -> None:
     with pytest.raises(NotPresent, match="no such port"):
         main.main(["capture", str(tmp_path / "tty"), "--out", str(tmp_path / "a.dump")])
 
@@ -121,9 +121,9 @@ def test_a_real_terminal_until_sigterm(tmp_path: Path) -> None:
         assert process.stderr is not None
         assert b"Ctrl-C" in process.stderr.readline()
         os.write(master, data)
-        told = b""
-        while b"1024 bytes," not in told:
-            told += os.read(process.stderr.fileno(), 4096)
+        reported = b""
+        while b"1024 bytes," not in reported:
+            reported += os.read(process.stderr.fileno(), 4096)
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate(timeout=10)
     os.close(master)

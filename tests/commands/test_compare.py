@@ -37,32 +37,32 @@ def compare(*arguments: str) -> int:
 def test_for_a_program_and_as_a_page(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert compare(*runs, "--json", "--out", str(page)) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [run["run"] for run in told["runs"]] == runs
-    assert all(run["samples"] == 1200 for run in told["runs"])
-    assert told["missing"] is True
-    assert 0 < told["refitted"]["error"] <= told["error"] < 2
+    reported = json.loads(capsys.readouterr().out)
+    assert [run["run"] for run in reported["runs"]] == runs
+    assert all(run["samples"] == 1200 for run in reported["runs"])
+    assert reported["missing"] is True
+    assert 0 < reported["refitted"]["error"] <= reported["error"] < 2
     assert page.read_text("utf-8").startswith("<!doctype html>")
 
 
 def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert compare(*runs) == 0
-    told = capsys.readouterr().out
-    lines = told.splitlines()
+    reported = capsys.readouterr().out
+    lines = reported.splitlines()
     assert lines[0] == "rav4-2009 on 2 runs, 24 s"
     assert lines[2].startswith("The residual (measured - model) is ")
-    assert "Next: ridelog diagnose" in " ".join(told.split())
+    assert "Next: ridelog diagnose" in " ".join(reported.split())
     assert all(len(line) <= 100 for line in lines)
-    assert "wheel hop" in told and "run1, " in told
-    assert all(len(line) <= 80 for line in told[told.index("Where"):].splitlines())
+    assert "wheel hop" in reported and "run1, " in reported
+    assert all(len(line) <= 80 for line in reported[reported.index("Where"):].splitlines())
 
 
-def test_numbers_are_far_off_by_what_is_granted(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    told = []
+def test_numbers_are_far_off_by_their_prior(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    reported = []
     for tolerance in ("0.01", "0.4"):
         assert compare(*runs, "--json", "--tolerance", tolerance) == 0
-        told.append(json.loads(capsys.readouterr().out)["refitted"])
-    firm, loose = told
+        reported.append(json.loads(capsys.readouterr().out)["refitted"])
+    firm, loose = reported
     assert firm["moved_far"] and not loose["moved_far"]
     assert max(map(abs, loose["moves"].values())) > max(map(abs, firm["moves"].values()))
 

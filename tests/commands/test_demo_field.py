@@ -19,11 +19,11 @@ DOC = Path(__file__).parents[2] / "docs" / "field-lab.md"
 
 def test_the_drives_are_unpacked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--field", "--unpack", "--out", str(tmp_path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["vehicle"] == "rav4-2009"
-    assert [Path(one).name for one in told["dumps"]] == ["first.dump.gz", "second.dump.gz", "third.dump.gz",
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["vehicle"] == "rav4-2009"
+    assert [Path(one).name for one in reported["dumps"]] == ["first.dump.gz", "second.dump.gz", "third.dump.gz",
                                                          "fourth.dump.gz"]
-    assert all(Path(one).is_file() for one in [*told["dumps"], *told["lines"]])
+    assert all(Path(one).is_file() for one in [*reported["dumps"], *reported["lines"]])
     assert main(["demo", "--field", "--unpack", "--out", str(tmp_path)]) == 0
     assert f"Next: ridelog extract {tmp_path / 'first.dump.gz'}" in capsys.readouterr().out
 
@@ -57,27 +57,28 @@ def test_the_effect_is_found_and_the_fourth_drive_is_judged_rightly(ridelog: Pat
     done = subprocess.run([ridelog, "demo", "--field", "--json", "--out", str(tmp_path)],
                           capture_output=True, text=True, check=False, timeout=600)
     assert (done.returncode, done.stderr) == (0, "")
-    told = json.loads(done.stdout)
-    assert [Path(one["run"]).name for one in told["runs"]] == ["first", "second", "third", "fourth"]
-    assert all(one["by_road"] for one in told["runs"])
-    (name,) = told["added"]
-    (effect,) = told["effects"]
-    assert name == effect["effect"] == told["truth"]["effect"] and not told["unexplained"] and not told["left"]
-    for parameter, value in told["truth"]["parameters"].items():
+    reported = json.loads(done.stdout)
+    assert [Path(one["run"]).name for one in reported["runs"]] == ["first", "second", "third", "fourth"]
+    assert all(one["by_road"] for one in reported["runs"])
+    (name,) = reported["added"]
+    (effect,) = reported["effects"]
+    assert name == effect["effect"] == reported["truth"]["effect"]
+    assert not reported["unexplained"] and not reported["left"]
+    for parameter, value in reported["truth"]["parameters"].items():
         assert effect["parameters"][parameter] == pytest.approx(value, rel=0.1)
-    before, after = (told["fourth"][when]["comparison"] for when in ("before", "after"))
+    before, after = (reported["fourth"][when]["comparison"] for when in ("before", "after"))
     assert abs(before["bias"]) > 0.2 and before["within_two"] < 0.75
     assert abs(after["bias"]) < 0.05 and after["within_two"] > 0.8
     assert after["r2"] > 0.7 > before["r2"] + 0.5
     assert [one.effect.name for one in read_model(tmp_path / "vehicle-1.yaml").effects] == [name]
-    page = Path(told["page"]).read_text("utf-8")
+    page = Path(reported["page"]).read_text("utf-8")
     assert page.count("<svg") == 4 and "simulated" in page
     assert not any(word in page for word in ("<script", "http:", "https:"))
 
 
 @pytest.mark.slow
 def test_the_document_shows_what_its_commands_print(tmp_path: Path) -> None:
-    """All of it, in order, in one folder; ``python -m tests.support.printed`` writes it anew."""
+    """All of it, in order, in one folder; ``python -m tests.support.printed`` rewrites it."""
     page = DOC.read_text("utf-8")
     commands = shown(page)
     assert [one.command.split()[1] for one in commands] == [

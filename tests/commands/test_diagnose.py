@@ -35,38 +35,38 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
                                      capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert diagnose(*offset_runs, "--json", "--out", str(page)) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["verdict"] == ["sensor_offset"]
-    assert told["unexplained"] is False
-    assert told["noise_floor_error"] < told["baseline_error"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["verdict"] == ["sensor_offset"]
+    assert reported["unexplained"] is False
+    assert reported["noise_floor_error"] < reported["baseline_error"]
     unseen = np.concatenate([one.accel_z_mps2[1400:] for one in map(read_run, offset_runs)])  # a third, after 2 s
-    assert told["unseen_noise_floor_error"] == pytest.approx(0.03 / np.sqrt(np.mean(unseen**2)), rel=0.1)
-    best, *others = told["candidates"]
+    assert reported["unseen_noise_floor_error"] == pytest.approx(0.03 / np.sqrt(np.mean(unseen**2)), rel=0.1)
+    best, *others = reported["candidates"]
     assert best["effect"] == "sensor_offset"
     assert 0 < best["standard_errors"]["offset_m"] < 0.02
     assert best["parameters"]["offset_m"] == pytest.approx(0.4, abs=0.04)
     assert best["p_value"] < 1e-6 and best["confused_with"] == []
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= others[0].keys()
     assert [one["p_value"] for one in others] == sorted(one["p_value"] for one in others)
-    assert told["judged_on"] == "stretches that no fit saw"
+    assert reported["judged_on"] == "stretches that no fit saw"
     assert best["error"] < 0.7 * min(one["error"] for one in others)
-    assert told["not_tried"].keys() == {"roll"}
-    assert {one["effect"] for one in told["candidates"]} == set(FEW) - {"roll"}
-    assert told["unexplained_shape"] is None
+    assert reported["not_tried"].keys() == {"roll"}
+    assert {one["effect"] for one in reported["candidates"]} == set(FEW) - {"roll"}
+    assert reported["unexplained_shape"] is None
     assert main(["compare", "--vehicle", "rav4-2009", *offset_runs, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["error"] == told["baseline_error"]
+    assert json.loads(capsys.readouterr().out)["error"] == reported["baseline_error"]
     html = page.read_text("utf-8")
     assert "sensor_offset is missing" in html and html.count("<svg") == 2
 
 
 def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert diagnose(*write_runs(tmp_path, [])) == 0
-    told = capsys.readouterr().out
-    lines = told.splitlines()
+    reported = capsys.readouterr().out
+    lines = reported.splitlines()
     assert lines[0] == "rav4-2009 on 2 runs, 36 s. 4 effects are known."
     assert lines[2].startswith("Nothing is missing")
-    assert "Next: nothing" in told
-    assert "roll: could not be tried" in told
+    assert "Next: nothing" in reported
+    assert "roll: could not be tried" in reported
     assert all(len(line) <= 100 for line in lines)
 
 
@@ -79,36 +79,36 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     right = write_runs(tmp_path / "right", [], noise_mps2=0.0)
     assert diagnose(*right, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["verdict"] == [] and told["unexplained"] is False
-    assert "sensor_offset" not in told["hidden"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["verdict"] == [] and reported["unexplained"] is False
+    assert "sensor_offset" not in reported["hidden"]
     assert main(["compare", "--vehicle", "rav4-2009", *right, "--json"]) == 0
     compared = json.loads(capsys.readouterr().out)
     assert compared["missing"] is False and not any(mark["found"] for mark in compared["marks"])
     rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
     assert diagnose(*write_runs(tmp_path / "rubbing", rubbing, noise_mps2=0.0), "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["verdict"] == ["dry_friction"] and told["unexplained"] is False
-    assert told["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["verdict"] == ["dry_friction"] and reported["unexplained"] is False
+    assert reported["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)
 
 
 def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                                           ) -> None:
     assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["unseen_noise_floor_error"] == told["noise_floor_error"]
-    assert told["judged_on"] == "stretches that no fit saw"
-    assert told["steps"][-1]["error"] == pytest.approx(told["noise_floor_error"], rel=0.1)
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["unseen_noise_floor_error"] == reported["noise_floor_error"]
+    assert reported["judged_on"] == "stretches that no fit saw"
+    assert reported["steps"][-1]["error"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
 
 
 def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert diagnose(*write_runs(tmp_path / "runs", [], more=out_of_balance), "--out", str(page)) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "Something is missing that no candidate explains" in told
-    assert "It repeats every 2.07 m of the way" in told  # the circumference of 0.33 m
-    assert "A wheel of 0.33 m radius" in told
-    assert "Nothing is missing" not in told
+    reported = " ".join(capsys.readouterr().out.split())
+    assert "Something is missing that no candidate explains" in reported
+    assert "It repeats every 2.07 m of the way" in reported  # the circumference of 0.33 m
+    assert "A wheel of 0.33 m radius" in reported
+    assert "Nothing is missing" not in reported
     assert "What repeats along the way" in page.read_text("utf-8")
 
 
@@ -117,10 +117,10 @@ def test_an_effect_of_the_users_own_that_is_like_another(offset_runs: list[str],
     own = tmp_path / "bracket.py"
     own.write_text(OWN, "utf-8")
     assert diagnose(*offset_runs, "--effect-file", str(own)) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "these runs cannot tell" in told.lower()
-    assert "drive a smooth road" in told  # what the file says would show it
-    assert "5 effects are known" in told
+    reported = " ".join(capsys.readouterr().out.split())
+    assert "these runs cannot distinguish them" in reported
+    assert "drive a smooth road" in reported  # what the file says would show it
+    assert "5 effects are known" in reported
 
 
 def test_what_cannot_be_diagnosed(offset_runs: list[str], tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Records that are not what they seem, at the command line: refused with the option that mends them, or told of."""
+"""Records that are not what they seem, at the command line: refused with the option that mends them, or reported."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def comfort(ridelog: Path, tmp_path: Path):
 @pytest.mark.parametrize("step", [0.0, 0.0383, 0.098, 0.613])
 @pytest.mark.parametrize("level", [0.0, 9.81])
 def test_a_good_record_is_not_doubted(comfort, step: float, level: float) -> None:
-    status, told, complaints = comfort(EVEN_S, rounded(at(EVEN_S, FINE) + level, step))
-    assert (status, told["doubts"], told["resampled"], complaints) == (0, [], None, [])
+    status, reported, complaints = comfort(EVEN_S, rounded(at(EVEN_S, FINE) + level, step))
+    assert (status, reported["doubts"], reported["resampled"], complaints) == (0, [], None, [])
 
 
 def test_a_standing_car_is_not_refused(comfort) -> None:
-    status, told, _ = comfort(EVEN_S, np.full(len(EVEN_S), 9.8))
-    assert (status, told["a_w_mps2"]) == (0, pytest.approx(0, abs=1e-9))
+    status, reported, _ = comfort(EVEN_S, np.full(len(EVEN_S), 9.8))
+    assert (status, reported["a_w_mps2"]) == (0, pytest.approx(0, abs=1e-9))
 
 
 @pytest.mark.parametrize("taken_hz", [51, 90])
@@ -49,14 +49,14 @@ def test_repeated_samples_are_refused_and_dropped(comfort, taken_hz: float) -> N
     t_s, values = held(FINE, taken_s, 200, 0.0192)
     status, _, complaints = comfort(t_s, values)
     assert (status, len(complaints)) == (2, 1)
-    assert "ride.csv: expected every sample to be taken anew, found" in complaints[0]
+    assert "ride.csv: expected every sample to be a new measurement, found" in complaints[0]
     assert f"({taken_hz} Hz written at 200): --resample drops the repeats" in complaints[0]
-    status, told, complaints = comfort(t_s, values, "--resample", "100")
+    status, reported, complaints = comfort(t_s, values, "--resample", "100")
     assert (status, complaints) == (0, [])
-    assert told["a_w_mps2"] == pytest.approx(honest["a_w_mps2"], rel=0.01)
-    assert told["resampled"]["from_hz"] == pytest.approx(taken_hz, rel=1e-3)
-    assert told["resampled"]["repeats_dropped"] == pytest.approx(1 - taken_hz / 200, abs=0.03)
-    assert told["unseen_from_hz"] == pytest.approx(taken_hz / 2, rel=1e-3)
+    assert reported["a_w_mps2"] == pytest.approx(honest["a_w_mps2"], rel=0.01)
+    assert reported["resampled"]["from_hz"] == pytest.approx(taken_hz, rel=1e-3)
+    assert reported["resampled"]["repeats_dropped"] == pytest.approx(1 - taken_hz / 200, abs=0.03)
+    assert reported["unseen_from_hz"] == pytest.approx(taken_hz / 2, rel=1e-3)
 
 
 def test_values_in_g_are_refused_and_converted(comfort) -> None:
@@ -65,19 +65,19 @@ def test_values_in_g_are_refused_and_converted(comfort) -> None:
     status, _, complaints = comfort(EVEN_S, in_g)
     assert (status, len(complaints)) == (2, 1)
     assert "found a mean of 0.995, as gravity in g has it: --unit g" in complaints[0]
-    status, told, complaints = comfort(EVEN_S, in_g, "--unit", "g")
+    status, reported, complaints = comfort(EVEN_S, in_g, "--unit", "g")
     assert (status, complaints) == (0, [])
-    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=1e-4)
+    assert reported["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=1e-4)
     assert comfort(EVEN_S, in_g, "--unit", "mps2")[0] == 0
-    status, told, complaints = comfort(EVEN_S, in_g - 0.995)
-    assert (status, [doubt["what"] for doubt in told["doubts"]], len(complaints)) == (0, ["quiet"], 1)
+    status, reported, complaints = comfort(EVEN_S, in_g - 0.995)
+    assert (status, [doubt["what"] for doubt in reported["doubts"]], len(complaints)) == (0, ["quiet"], 1)
     assert "is it in g?" in complaints[0]
 
 
 @pytest.mark.parametrize("level", [9.81, 0.1])
-def test_a_record_that_never_changes_is_told_of(comfort, level: float) -> None:
-    status, told, complaints = comfort(EVEN_S, np.full_like(EVEN_S, level))
-    assert (status, [doubt["what"] for doubt in told["doubts"]], len(complaints)) == (0, ["constant"], 1)
+def test_a_record_that_never_changes_is_reported(comfort, level: float) -> None:
+    status, reported, complaints = comfort(EVEN_S, np.full_like(EVEN_S, level))
+    assert (status, [doubt["what"] for doubt in reported["doubts"]], len(complaints)) == (0, ["constant"], 1)
     assert f"every sample is {level:.4g} m/s2" in complaints[0]
 
 
@@ -93,11 +93,11 @@ def test_a_file_behind_the_bare_option_is_no_rate(ridelog: Path) -> None:
     assert "expected a rate in Hz, found 'ride.csv'; a file goes before --resample" in done.stderr
 
 
-def test_the_end_of_a_range_is_told_of(comfort) -> None:
-    status, told, complaints = comfort(EVEN_S, np.clip(at(EVEN_S, FINE), -5, 0.9))
+def test_the_end_of_a_range_is_reported(comfort) -> None:
+    status, reported, complaints = comfort(EVEN_S, np.clip(at(EVEN_S, FINE), -5, 0.9))
     assert (status, len(complaints)) == (0, 1)
     assert "samples of accel_z_mps2 stand at 0.9 m/s2, the end of a range" in complaints[0]
-    assert told["doubts"][0]["at_mps2"] == 0.9
+    assert reported["doubts"][0]["at_mps2"] == 0.9
 
 
 @pytest.mark.parametrize(("t_s", "words"), [
@@ -110,9 +110,9 @@ def test_uneven_times_are_refused_and_laid_on_a_grid(comfort, t_s: np.ndarray, w
     assert (status, len(complaints)) == (2, 1)
     assert words in complaints[0]
     assert "--resample" in complaints[0]
-    status, told, complaints = comfort(t_s, at(t_s, FINE), "--resample")
+    status, reported, complaints = comfort(t_s, at(t_s, FINE), "--resample")
     assert (status, complaints) == (0, [])
-    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
+    assert reported["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
 
 
 def test_bursts_are_refused_and_spread(comfort) -> None:
@@ -120,9 +120,9 @@ def test_bursts_are_refused_and_spread(comfort) -> None:
     arrived_s = np.ceil(EVEN_S * 12 - 1e-9) / 12
     status, _, complaints = comfort(arrived_s, at(EVEN_S, FINE))
     assert (status, "--resample" in complaints[0]) == (2, True)
-    status, told, _ = comfort(arrived_s, at(EVEN_S, FINE), "--resample")
+    status, reported, _ = comfort(arrived_s, at(EVEN_S, FINE), "--resample")
     assert status == 0
-    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
+    assert reported["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
 
 
 def test_what_cannot_be_mended_is_refused_all_the_same(comfort) -> None:

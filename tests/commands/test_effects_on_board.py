@@ -33,7 +33,7 @@ def file_of(folder: Path, effects: str, more: str = "") -> Path:
     return path
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+def reported(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     capsys.readouterr()
     assert main([*map(str, arguments), "--json"]) == 0
     found: dict[str, Any] = json.loads(capsys.readouterr().out)
@@ -48,7 +48,7 @@ def test_a_drive_is_judged_by_the_file_that_has_its_effects(
     write_profile(tmp_path / "profile.csv", ROAD)
     assert main(["simulate", "--vehicle", str(car), "--profile", str(tmp_path / "profile.csv"), "--speed", "16",
                  "--noise", "0.05", "--out", str(tmp_path / "drive.csv")]) == 0
-    plain, own = (told(capsys, "estimate", tmp_path, "--vehicle", vehicle)["comparison"]
+    plain, own = (reported(capsys, "estimate", tmp_path, "--vehicle", vehicle)["comparison"]
                   for vehicle in ("rav4-2009", car))
     assert abs(own["bias"]) < 0.05 < abs(plain["bias"])
     assert own["r2"] > max(plain["r2"], 0.85 * own["limit_r2"])
@@ -62,7 +62,7 @@ def test_standard_errors_of_the_file_are_in_those_of_the_windows(
     assert main(["simulate", "--vehicle", "rav4-2009", "--profile", str(tmp_path / "profile.csv"), "--speed", "16",
                  "--noise", "0.05", "--out", str(tmp_path / "drive.csv")]) == 0
     gain = "[{name: sensor_gain, gain: 1, standard_errors: {gain: 0.1}}]"
-    sure, unsure = (told(capsys, "estimate", tmp_path, "--vehicle", file_of(tmp_path, effects))
+    sure, unsure = (reported(capsys, "estimate", tmp_path, "--vehicle", file_of(tmp_path, effects))
                     for effects in ("[]", gain))
     added = np.sqrt(unsure["iri_std_m_per_km"] ** 2 - sure["iri_std_m_per_km"] ** 2)
     assert added == pytest.approx(0.1 * unsure["iri_m_per_km"], rel=0.25)
@@ -96,14 +96,14 @@ def test_a_gain_is_in_the_calibration_and_friction_in_the_modes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     louder = file_of(tmp_path, "[{name: sensor_gain, gain: 2}]")
-    ratios = [told(capsys, "calibrate", "--vehicle", car)["speeds"][0]["iri_per_accel_rms"]
+    ratios = [reported(capsys, "calibrate", "--vehicle", car)["speeds"][0]["iri_per_accel_rms"]
               for car in ("rav4-2009", louder)]
     assert ratios[1] == pytest.approx(ratios[0] / 2, rel=1e-6)
     car = file_of(tmp_path, EFFECTS["bent"], "standard_errors: {sprung_mass_kg: 30}\n")
-    smooth, rough = (told(capsys, "modes", "--vehicle", car, "--iri", iri)["modes"][0] for iri in (2, 9))
+    smooth, rough = (reported(capsys, "modes", "--vehicle", car, "--iri", iri)["modes"][0] for iri in (2, 9))
     assert smooth["damping_ratio"] > 1.1 * rough["damping_ratio"]
     assert 0 < rough["frequency_std_hz"] < 0.05
-    assert told(capsys, "modes", "--vehicle", "rav4-2009")["modes"][0]["frequency_std_hz"] is None
+    assert reported(capsys, "modes", "--vehicle", "rav4-2009")["modes"][0]["frequency_std_hz"] is None
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

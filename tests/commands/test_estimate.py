@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def told(capsys: pytest.CaptureFixture[str], run: Path, *arguments: object) -> dict[str, Any]:
+def reported(capsys: pytest.CaptureFixture[str], run: Path, *arguments: object) -> dict[str, Any]:
     capsys.readouterr()
     assert main(["estimate", str(run), "--vehicle", CAR, "--json", *map(str, arguments)]) == 0
     out = capsys.readouterr().out
@@ -60,7 +60,7 @@ def write(run: Path, columns: dict[str, np.ndarray]) -> Path:
 
 
 def test_windows_beside_the_profile_and_the_limit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = told(capsys, folder)
+    result = reported(capsys, folder)
     found, limit = result["comparison"], result["limit"]
     assert result["iri_m_per_km"] == pytest.approx(iri(ROAD.elevation_m, 0.05), rel=0.03)
     assert abs(found["bias"]) < 0.03
@@ -77,10 +77,10 @@ def test_windows_beside_the_profile_and_the_limit(folder: Path, capsys: pytest.C
     assert [(row["from_mps"], row["to_mps"]) for row in result["speeds"]] == [(15, 20)]
 
 
-def test_the_estimated_profile_is_the_road_within_the_range_told(
+def test_the_estimated_profile_is_the_road_within_the_range_reported(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = told(capsys, folder, "--profile-out", tmp_path / "road.csv")
+    result = reported(capsys, folder, "--profile-out", tmp_path / "road.csv")
     assert result["profile_files"] == [str(tmp_path / "road.csv")]
     profile = read_profile(tmp_path / "road.csv")
     x = profile.start_m + profile.spacing_m * np.arange(len(profile.elevation_m))
@@ -97,7 +97,7 @@ def test_the_estimated_profile_is_the_road_within_the_range_told(
 
 
 def test_windows_as_csv(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = told(capsys, folder, "--out", tmp_path / "windows.csv", "--window", "30.48")
+    result = reported(capsys, folder, "--out", tmp_path / "windows.csv", "--window", "30.48")
     with (tmp_path / "windows.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(result["windows"])
@@ -114,7 +114,7 @@ def test_a_drive_alone_is_estimated_without_comparison(
 ) -> None:
     alone = tmp_path / "drive.csv"
     alone.write_bytes((folder / "drive.csv").read_bytes())
-    with_road, by_file, by_folder = told(capsys, folder), told(capsys, alone), told(capsys, tmp_path)
+    with_road, by_file, by_folder = reported(capsys, folder), reported(capsys, alone), reported(capsys, tmp_path)
     assert not by_file["compared"]
     assert "comparison" not in by_file
     assert "iri_exact_m_per_km" not in by_file["windows"][0]
@@ -126,11 +126,11 @@ def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixtur
     (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
     assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
                  "0.07", "--rate", "208", "--out", str(tmp_path / "drive.csv")]) == 0
-    result = told(capsys, tmp_path, "--noise", "0.07")
+    result = reported(capsys, tmp_path, "--noise", "0.07")
     assert result["rate_hz"] == pytest.approx(208)
     assert result["comparison"]["r2"] == pytest.approx(result["comparison"]["limit_r2"], abs=0.06)
     assert abs(result["comparison"]["bias"]) < 0.03
-    assert result["limit"]["std_m_per_km"] == pytest.approx(told(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
+    assert result["limit"]["std_m_per_km"] == pytest.approx(reported(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
 
 
 @pytest.mark.parametrize(("noise", "step", "rate"), [(0.2, 0.613, 100), (0.11, 0.0, 100), (0.15, 0.0, 208)])
@@ -140,17 +140,17 @@ def test_the_noise_is_learnt_from_the_drive(
     assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
                  f"{noise}", "--step", f"{step}", "--rate", f"{rate}", "--out", str(tmp_path / "drive.csv")]) == 0
     (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
-    result = told(capsys, tmp_path, "--noise", "auto", "--step", step)
+    result = reported(capsys, tmp_path, "--noise", "auto", "--step", step)
     assert abs(result["noise_mps2"] - noise) < 2.5 * result["noise_std_mps2"]
     assert 0.02 * noise < result["noise_std_mps2"] < 0.2 * noise
-    taken = told(capsys, tmp_path, "--step", step)
+    taken = reported(capsys, tmp_path, "--step", step)
     assert taken["noise_mps2"] == 0.05 and taken["noise_std_mps2"] is None
     assert result["comparison"]["r2"] > taken["comparison"]["r2"] - 0.01
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} +- "
                         f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
-    assert lines[2].startswith("Taken for granted: ")
+    assert lines[2].startswith("Assumed: ")
 
 
 def test_the_step_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path,
@@ -158,10 +158,10 @@ def test_the_step_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path,
     for name in ("drive.csv", "profile.csv"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     write_run_facts(tmp_path, RecordFacts(step_mps2=0.613))
-    assert told(capsys, tmp_path)["step_mps2"] == 0.613
-    assert told(capsys, tmp_path, "--step", 0.0)["step_mps2"] == 0.0
-    assert told(capsys, tmp_path, "--resample", "100")["step_mps2"] == 0.0  # laid on other times
-    assert told(capsys, folder)["step_mps2"] == 0.0
+    assert reported(capsys, tmp_path)["step_mps2"] == 0.613
+    assert reported(capsys, tmp_path, "--step", 0.0)["step_mps2"] == 0.0
+    assert reported(capsys, tmp_path, "--resample", "100")["step_mps2"] == 0.0  # laid on other times
+    assert reported(capsys, folder)["step_mps2"] == 0.0
 
 
 @pytest.mark.parametrize("step", [0.0, 0.03, 0.613])
@@ -173,28 +173,28 @@ def test_a_drive_that_tells_nothing_of_the_noise_says_so(
     columns["distance_m"] *= 0.0
     columns["accel_z_mps2"] = np.random.default_rng(1).normal(0, 0.5, len(columns["t_s"]))
     write(tmp_path, columns)
-    result = told(capsys, tmp_path, "--noise", "auto", "--step", step)
+    result = reported(capsys, tmp_path, "--noise", "auto", "--step", step)
     assert (result["noise_learnt"], result["noise_std_mps2"], result["noise_mps2"]) == (False, None, 0.05)
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
-    assert "This drive tells nothing of the noise. Taken for granted: 0.05 m/s2" in capsys.readouterr().out
+    assert "This drive shows nothing of the noise. Assumed: 0.05 m/s2" in capsys.readouterr().out
 
 
-def test_a_distance_that_goes_back_a_little_is_laid_anew(
+def test_a_distance_that_goes_back_a_little_is_computed_from_the_speed(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     columns = read(folder)
     columns["distance_m"] += 0.3 * (columns["t_s"].astype(int) % 2)
     write(tmp_path, columns)
     (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
-    result = told(capsys, tmp_path)
-    assert result["distance_relaid_m"] == pytest.approx(0.15, abs=0.03)
-    assert result["comparison"]["r2"] > told(capsys, folder)["comparison"]["r2"] - 0.08
+    result = reported(capsys, tmp_path)
+    assert result["distance_moved_m"] == pytest.approx(0.15, abs=0.03)
+    assert result["comparison"]["r2"] > reported(capsys, folder)["comparison"]["r2"] - 0.08
 
 
 def test_the_screen_says_what_was_assumed_and_what_is_possible(
     folder: Path, tmp_path: Path, ridelog: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = told(capsys, folder)
+    result = reported(capsys, folder)
     done = subprocess.run([ridelog, "estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out",
                            tmp_path / "p.csv"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -222,7 +222,7 @@ def test_a_drive_without_a_window(speed_mps: float, tmp_path: Path, capsys: pyte
     t = np.arange(100) / 100
     drive = write(tmp_path, {"t_s": t, "accel_z_mps2": 0.1 * np.sin(9 * t), "speed_mps": 0 * t + speed_mps,
                              "distance_m": speed_mps * t})
-    result = told(capsys, drive)
+    result = reported(capsys, drive)
     assert (result["window_count"], result["answered_count"], result["windows"]) == (0, 0, [])
     assert main(["estimate", str(drive), "--vehicle", CAR, "--out", str(tmp_path / "w.csv")]) == 0
     assert "No IRI: not one whole window was driven" in capsys.readouterr().out
@@ -238,7 +238,7 @@ def test_a_short_drive_has_windows_without_a_profile(
     assert main(asked) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("IRI ") for line in lines)
-    why = f"No profile in {road}: the readings tell no wavelengths over a stretch longer than the longest of them"
+    why = f"No profile in {road}: the readings resolve no wavelengths over a stretch longer than the longest of them"
     assert lines[-1] == why
     assert windows.read_text().count("\n") > 10
     assert main([*asked, "--json"]) == 0
@@ -313,7 +313,7 @@ def test_a_road_without_any_roughness_in_places_has_a_limit_all_the_same(
     assert main(["simulate", "--vehicle", CAR, "--flat", "400", "--obstacle",
                  "bump:start_m=200,height_m=0.08,width_m=3.6", "--speed", "16", "--noise", "0.05", "--out",
                  str(tmp_path / "drive.csv"), "--profile-out", str(tmp_path / "profile.csv")]) == 0
-    result = told(capsys, tmp_path)
+    result = reported(capsys, tmp_path)
     on_profile = [window for window in result["windows"] if window["iri_exact_m_per_km"] is not None]
     assert min(window["iri_exact_m_per_km"] for window in on_profile) == pytest.approx(0, abs=1e-3)
     assert min(window["limit_std_m_per_km"] for window in on_profile) > 0

@@ -40,14 +40,14 @@ def note(tmp_path: Path) -> Path:
     return tmp_path / "notes" / "sda1.json"
 
 
-def told(note: Path) -> str:
+def reported(note: Path) -> str:
     read = read_note(note)
     assert read is not None
     line, = stick_lines([read])
     return line
 
 
-def test_a_person_is_told_what_was_copied(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_person_is_shown_what_was_copied(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for said in ("ok: 2 files copied (0.0 MB), 0 were there\n", "ok: 0 files copied (0.0 MB), 2 were there\n"):
         assert main(["export", "--from", str(logs), "--to", str(stick)]) == 0
         assert capsys.readouterr().out == said
@@ -70,7 +70,7 @@ def test_the_logs_are_those_of_the_settings(
     assert "2 files copied" in capsys.readouterr().out
 
 
-def test_what_could_not_be_copied_is_told_with_its_reason(
+def test_what_could_not_be_copied_is_reported_with_its_reason(
         logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (stick / "ridelog").write_text("a file where a folder should be\n")
     assert main(["export", "--from", str(logs), "--to", str(stick)]) == 1
@@ -89,7 +89,7 @@ def test_a_reason_from_outside_cannot_forge_a_line(
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
     lines = capsys.readouterr().out.split("\n")
     assert len(lines) == 4
-    assert all(line.isprintable() for line in (*lines, told(note)))
+    assert all(line.isprintable() for line in (*lines, reported(note)))
 
 
 @pytest.mark.parametrize("arguments", [[], ["--to"], ["--to", "a", "--removed"], ["--to", "a", "--unmounted", "b"]])
@@ -101,9 +101,9 @@ def test_wrong_use_is_status_2(arguments: list[str]) -> None:
 
 def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path, stick: Path, note: Path) -> None:
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 0
-    assert told(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; leave it in"
+    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; leave it in"
     assert main(["export", "--unmounted", str(stick), "--note", str(note)]) == 0
-    assert told(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; it may be pulled"
+    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; it may be pulled"
     assert main(["export", "--removed", "--note", str(note)]) == 0
     assert not note.exists()
     assert main(["export", "--removed", "--note", str(note)]) == 0
@@ -112,15 +112,15 @@ def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path,
 def test_a_stick_is_named_by_its_device_each_time_it_is_plugged_in(logs: Path, stick: Path, note: Path) -> None:
     again = note.with_name("sda1.28.json")
     again.touch()
-    assert told(again) == "stick sda1: plugged in, waits for its turn; leave it in"
+    assert reported(again) == "stick sda1: plugged in, waits for its turn; leave it in"
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(again)]) == 0
-    assert told(again).startswith("stick sda1: 2 files copied")
+    assert reported(again).startswith("stick sda1: 2 files copied")
 
 
 def test_a_copy_that_never_began_is_not_called_complete(stick: Path, note: Path) -> None:
     note.touch()
     main(["export", "--unmounted", str(stick), "--note", str(note)])
-    assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+    assert reported(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
 
 
 def test_the_light_goes_out_after_the_note_was_removed(note: Path, tmp_path: Path) -> None:
@@ -139,19 +139,19 @@ def test_a_stick_that_could_not_be_mounted_is_not_written_to(logs: Path, stick: 
     assert main(["export", "--from", str(logs), "--to", str(stick), "--mounted", "--note", str(note)]) == 1
     assert list(stick.iterdir()) == []
     main(["export", "--unmounted", str(stick), "--note", str(note)])
-    assert told(note).startswith("stick sda1: WRONG, ")
-    assert told(note).endswith("expected one with FAT or exFAT; it may be pulled")
+    assert reported(note).startswith("stick sda1: WRONG, ")
+    assert reported(note).endswith("expected one with FAT or exFAT; it may be pulled")
 
 
 def test_a_stick_that_is_still_mounted_must_stay(note: Path) -> None:
     assert main(["export", "--unmounted", "/proc", "--note", str(note)]) == 1
-    assert told(note).endswith("leave it in")
+    assert reported(note).endswith("leave it in")
 
 
 def test_a_copy_that_was_killed_is_not_called_complete(stick: Path, note: Path) -> None:
     note.write_text('{"stick": "sda1", "state": "copying", "ok": true, "text": "copying, 1 of 9 files"}')
     main(["export", "--unmounted", str(stick), "--note", str(note)])
-    assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+    assert reported(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
 
 
 def test_an_export_that_the_logger_cannot_remember_is_no_success(
@@ -166,7 +166,7 @@ def test_an_export_that_the_logger_cannot_remember_is_no_success(
     assert said.startswith("WRONG: 2 files copied")
     assert "cannot remember it, and will not make room: Read-only file system" in said
     main(["export", "--unmounted", str(stick), "--note", str(note)])
-    assert told(note).startswith("stick sda1: WRONG, 2 files copied")
+    assert reported(note).startswith("stick sda1: WRONG, 2 files copied")
 
 
 def test_a_note_that_cannot_be_written_stops_no_export(
@@ -211,7 +211,7 @@ def test_a_stick_that_is_not_paired_is_refused_in_its_note(
     assert main([*asked, "--to", str(stick)]) == 0
     with pytest.raises(CheckFailed, match="not the stick"):
         main([*asked, "--to", str(other)])
-    assert told(note).startswith("stick sda1: WRONG, this is not the stick")
+    assert reported(note).startswith("stick sda1: WRONG, this is not the stick")
     assert list(other.iterdir()) == []
 
 
@@ -266,4 +266,4 @@ def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, t
     (tmp_path / "ridelog.yaml").write_text("log: 7\n")
     with pytest.raises(Exception, match="expected a mapping"):
         main(["export", "--config", str(tmp_path / "ridelog.yaml"), "--to", str(stick), "--note", str(note)])
-    assert "expected a mapping" in told(note)
+    assert "expected a mapping" in reported(note)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 from dataclasses import replace
+from functools import reduce
+from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +14,8 @@ import pytest
 import yaml
 
 from drivers.dump import DumpWriter, open_dump
-from drivers.events import GPS
-from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from drivers.events import GPS, Event
+from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
@@ -21,7 +23,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
-    stretches=(Stretch(1200, 90),), reception=Reception(first_fix_s=2, latency_s=0.2), seed=11,
+    stretches=(RoadStretch(1200, 90),), reception=Reception(first_fix_s=2, latency_s=0.2), seed=11,
     offset_mps2=(0.1, 0.2, 0.15),
 )
 FROM_M, TO_M, ZERO_M = 100.0, 800.0, 4000.0
@@ -164,6 +166,59 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, t
         assert said in done.stderr
         assert len(done.stderr.splitlines()) == 1
     assert call(dump, "--out", tmp_path / "file").returncode == 2
+
+
+def without_speeds(data: bytes) -> bytes:
+    """Sentences of a receiver that tells places alone: no VTG, and neither speed nor course in RMC."""
+    found = []
+    for sentence in data[data.find(b"$"):].decode("ascii", "replace").splitlines():
+        words = sentence.lstrip("$").split("*")[0].split(",")
+        if words[0].endswith("RMC"):
+            words[7] = words[8] = ""
+        if not words[0].endswith("VTG"):
+            body = ",".join(words)
+            found.append(f"${body}*{reduce(xor, body.encode()):02X}\r\n")
+    return "".join(found).encode()
+
+
+@pytest.mark.slow
+def test_dumps_without_speeds_or_with_three_readings_are_refused_in_one_line(place: Path, tmp_path: Path) -> None:
+    with open_dump(place / "town.dump") as reader:
+        header, events = reader.header, list(reader)
+    fixes, readings = ([one for one in events if (one.source == GPS) == is_fix] for is_fix in (True, False))
+    middle = readings[len(readings) // 2 :][:3]
+    second_s = sorted({one.t_us // 1_000_000 for one in fixes})
+    silent = [Event(second * 1_000_000 + 999_999, GPS, without_speeds(b"".join(
+        one.data for one in fixes if one.t_us // 1_000_000 == second))) for second in second_s]
+    for name, kept, said in (
+        ("silent", [*readings, *(one for one in silent if one.data)], "expected fixes with a speed and a place"),
+        ("three", [*fixes, *middle], "expected 5 s and 30 m of driving with fixes and readings"),
+        ("bare", middle, "expected fixes with a speed and a place"),
+    ):
+        writer = DumpWriter(tmp_path / f"{name}.dump", header)
+        for event in sorted(kept, key=lambda one: one.t_us):
+            writer.write(event)
+        writer.close()
+        done = call(tmp_path / f"{name}.dump", "--out", tmp_path / "runs")
+        assert done.returncode == 2, done.stdout
+        assert said in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("length_m", "status", "said"), [
+    (40, 2, "expected 5 s and 30 m of driving on the profile"), (150, 0, "of driving left out, off the profile")])
+def test_of_a_line_that_is_shorter_than_the_drive_the_part_on_it_is_used(
+    place: Path, drive: Drive, tmp_path: Path, length_m: int, status: int, said: str
+) -> None:
+    header, *rows = line(drive).splitlines()
+    (tmp_path / "short.csv").write_text("\n".join([header, *rows[2800 : 2801 + round(length_m / SPACING_M)]]) + "\n")
+    done = call(place / "town.dump", "--out", tmp_path / "runs", "--profile", tmp_path / "short.csv")
+    assert done.returncode == status
+    assert said in done.stdout + done.stderr
+    assert len(done.stderr.splitlines()) == (status != 0)
+    if status == 0:
+        way_m = columns(tmp_path / "runs" / "town")["distance_m"]
+        assert float(np.ptp(way_m)) == pytest.approx(length_m, abs=60)  # with a lead before and behind
 
 
 @pytest.mark.slow

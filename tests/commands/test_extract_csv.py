@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -19,7 +19,7 @@ from ..support.drives.phones import LAYOUTS, Phone, phone_in, phyphox, rotation,
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
-    stretches=(Stretch(1200, 90),), seed=11,
+    stretches=(RoadStretch(1200, 90),), seed=11,
 )
 FROM_M, TO_M = 100.0, 800.0
 
@@ -112,14 +112,14 @@ def test_the_lab_finds_the_same_error_as_on_the_true_drive(
     for vehicle, within in (("sedan-2015", 0.02), ("rav4-2009", 0.05)):
         errors = []
         for one in (run, exact):
-            told = subprocess.run(["ridelog", "compare", "--json", "--vehicle", vehicle, str(one)], capture_output=True,
-                                  text=True, timeout=300)
-            assert told.returncode == 0, told.stderr
-            errors.append(json.loads(told.stdout)["error"])
+            reported = subprocess.run(["ridelog", "compare", "--json", "--vehicle", vehicle, str(one)],
+                                  capture_output=True, text=True, timeout=300)
+            assert reported.returncode == 0, reported.stderr
+            errors.append(json.loads(reported.stdout)["error"])
         assert abs(errors[0] - errors[1]) < within, (vehicle, errors)
 
 
-def test_a_phone_that_slips_is_cut_there_and_levelled_anew(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: Drive, phone: Phone, tmp_path: Path) -> None:
     slipped = phone.time_s > 55.0
     force = phone.force_mps2.copy()
     angle = np.radians(40)
@@ -137,7 +137,7 @@ def test_a_phone_that_slips_is_cut_there_and_levelled_anew(drive: Drive, phone: 
 
 
 @pytest.mark.slow
-def test_repeated_samples_are_dropped_and_the_true_rate_is_told(drive: Drive, tmp_path: Path) -> None:
+def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: Drive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     taken = phone_in(drive, rng, rotation(rng), rate_hz=102.0, jitter=0.0)
     time_s = np.arange(taken.time_s[0], taken.time_s[-1], 1 / 200)
@@ -151,7 +151,7 @@ def test_repeated_samples_are_dropped_and_the_true_rate_is_told(drive: Drive, tm
 
 
 @pytest.mark.slow
-def test_a_slow_phone_is_told_of_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
+def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     done = call("--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
                 "--out", tmp_path / "runs")

@@ -105,9 +105,9 @@ def test_the_headers_stand_side_by_side(tmp_path: Path) -> None:
 def test_json_names_files_and_scales(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "deep" / "er"
     assert main(["fixed-point", "--full-scale-g", "2", "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["data_bits"] == 32
-    weighting, car = told["filters"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["data_bits"] == 32
+    weighting, car = reported["filters"]
     assert Path(weighting["file"]).is_file()
     assert weighting["input_step"] == pytest.approx(2 * 9.80665 / 2**31)
     assert weighting["sections"] == 7
@@ -122,7 +122,7 @@ def test_json_names_files_and_scales(tmp_path: Path, capsys: pytest.CaptureFixtu
     (["--spacing", "0.001"], r"--spacing 0.001: expected sections that 32-bit coefficients can hold"),
     (["--full-scale-g", "0"], r"--full-scale-g 0: expected 0.01 to 1000 g"),
 ])
-def test_wrong_use_is_told(tmp_path: Path, arguments: list[str], complaint: str) -> None:
+def test_wrong_use_is_reported(tmp_path: Path, arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):
         main(["fixed-point", *arguments, "--out", str(tmp_path / "out")])
     assert not (tmp_path / "out").exists()

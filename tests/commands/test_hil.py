@@ -28,7 +28,7 @@ from logger.errors import BadInput
 from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
 from logger.service.config import AccelerometerConfig, Config, load_config
-from logger.service.hil.log_comparison import Session, compare, read_sessions
+from logger.service.hil.log_comparison import LoggedSession, compare, read_sessions
 from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.pipeline import longest_wait_us
 from logger.service.receiver_learning import FILE_NAME, header_fields
@@ -154,14 +154,14 @@ def ended_us(row: WindowRecord) -> int:
 
 
 def logged(rows: list[WindowRecord], change: Callable[[int, WindowRecord], WindowRecord | None] = lambda _, row: row,
-           shift_us: int = 9_876_543, is_open: bool = False) -> Session:
+           shift_us: int = 9_876_543, is_open: bool = False) -> LoggedSession:
     """The rows as a service on a clock of its own would have them, changed (None: left out)."""
     kept = [changed for number, row in enumerate(rows) if (changed := change(number, row)) is not None]
-    return Session(4, tuple(replace(row, t_us=row.t_us + shift_us) for row in kept), is_open)
+    return LoggedSession(4, tuple(replace(row, t_us=row.t_us + shift_us) for row in kept), is_open)
 
 
 def test_the_same_rows_agree_on_any_clock(rows: list[WindowRecord]) -> None:
-    found = compare(rows, [Session(3, (), False), logged(rows)], BRIDGE_S)
+    found = compare(rows, [LoggedSession(3, (), False), logged(rows)], BRIDGE_S)
     assert found.ok
     assert (found.session, found.matched, found.expected) == (4, len(rows), len(rows))
     assert found.clock_shift_s == 9.876543
@@ -197,7 +197,7 @@ def test_one_row_may_lie_outside_and_two_of_these_not(rows: list[WindowRecord], 
                                                       by: float | None) -> None:
     known = [n for n, row in enumerate(rows) if getattr(row, attribute) is not None and row.iri_m_per_km is not None]
 
-    def wrong(count: int) -> Session:
+    def wrong(count: int) -> LoggedSession:
         return logged(rows, lambda n, row: row if n not in known[5:5 + count] else replace(
             row, **{attribute: None if by is None else getattr(row, attribute) + by}))
 
@@ -256,7 +256,7 @@ def test_other_flags_count_but_not_that_utc_was_still_unknown(rows: list[WindowR
 
 
 def test_rows_written_before_utc_was_known_have_none_only_while_the_log_is_open(rows: list[WindowRecord]) -> None:
-    def undated(first: int, last: int, is_open: bool) -> Session:
+    def undated(first: int, last: int, is_open: bool) -> LoggedSession:
         return logged(rows, lambda n, row: replace(row, utc_us=None, flags=(*row.flags, "time_unset"))
                       if first <= n < last else row, is_open=is_open)
 
@@ -271,7 +271,7 @@ def test_of_a_drive_sent_twice_the_second_time_counts(rows: list[WindowRecord]) 
     second = [replace(row, segment=row.segment + len(rows), t_us=row.t_us + 90_000_000,
                       distance_start_m=row.distance_start_m + travelled_m if row.distance_start_m is not None else None)
               for row in rows]
-    found = compare(rows, [Session(1, (*first, *second), True)], BRIDGE_S)
+    found = compare(rows, [LoggedSession(1, (*first, *second), True)], BRIDGE_S)
     assert not found.ok
     assert found.clock_shift_s == 90.0
     assert found.moved_before_m == pytest.approx(travelled_m)
@@ -283,7 +283,7 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
         found = compare(rows, sessions, BRIDGE_S)
         assert not found.ok
         assert found.session is None
-        assert "TX on RX" in command.Result(False, None, found).text()
+        assert "TX on RX" in command.PlayedDrive(False, None, found).text()
 
 
 def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_since(
@@ -307,10 +307,10 @@ def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_si
 
 
 def test_late_bytes_fail_the_run_and_say_so() -> None:
-    late = command.Result(False, Sent(1.0, {"nmea": 3}, (1.0, 51.0, 60.0)), None)
+    late = command.PlayedDrive(False, Sent(1.0, {"nmea": 3}, (1.0, 51.0, 60.0)), None)
     assert not late.ok
     assert "TOO LATE" in late.text()
-    assert command.Result(False, Sent(1.0, {"nmea": 3}, (1.0, 49.0, 600.0)), None).ok
+    assert command.PlayedDrive(False, Sent(1.0, {"nmea": 3}, (1.0, 49.0, 600.0)), None).ok
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

@@ -51,16 +51,16 @@ def identify(runs: list[str], free: str, *more: str) -> int:
 def test_for_a_program(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "fitted.yaml"
     assert identify(runs, f"{MASS},{DAMPERS}", "--start", f"{MASS}=700", "--json", "--out", str(out)) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= told.keys()
-    assert told["converged"] is True
+    reported = json.loads(capsys.readouterr().out)
+    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= reported.keys()
+    assert reported["converged"] is True
     for name, truth in ((MASS, 875), (DAMPERS, 1776)):
-        assert told["parameters"][name] == pytest.approx(truth, abs=4 * told["standard_errors"][name])
-    assert told["error_after"] < 0.1 < told["error_before"]
-    assert told["residuals_white_p_value"] > 0.001
-    assert told["residuals_free_of_road_p_value"] > 0.001
+        assert reported["parameters"][name] == pytest.approx(truth, abs=4 * reported["standard_errors"][name])
+    assert reported["error_after"] < 0.1 < reported["error_before"]
+    assert reported["residuals_white_p_value"] > 0.001
+    assert reported["residuals_free_of_road_p_value"] > 0.001
     written = read_vehicle(out)
-    assert written.sprung_mass_kg == told["parameters"][MASS]
+    assert written.sprung_mass_kg == reported["parameters"][MASS]
     assert written.rear is not None
     assert written.front.suspension_damping_n_s_per_m == written.rear.suspension_damping_n_s_per_m
     assert f"# {MASS}: " in out.read_text("utf-8")
@@ -69,8 +69,8 @@ def test_for_a_program(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
 def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert identify(runs, f"{MASS},{DAMPERS}", "--tries", "2", "--low-pass", "20", "--robust") == 0
     text = capsys.readouterr().out
-    for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "taken for white noise of 0.0",
-                  "These runs tell all that was asked.", "Known best in the combination", "below 20 Hz"):
+    for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "as white noise of 0.0",
+                  "These runs determine all that was asked.", "Known best in the combination", "below 20 Hz"):
         assert words in text
 
 
@@ -79,7 +79,7 @@ def test_a_model_that_lacks_something(runs: list[str], tmp_path: Path, capsys: p
     wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, "--noise", "white"]) == 0
     text = capsys.readouterr().out
-    assert "yes, the model misses something of the car" in text
+    assert "yes, the model lacks something of the car" in text
     assert "the standard errors are a guide only" in text
 
 
@@ -89,9 +89,9 @@ def test_what_the_runs_cannot_tell(runs: list[str], capsys: pytest.CaptureFixtur
     assert caught.value.exit_status == 1
     assert identify(runs, "pitch_inertia_kg_m2", "--json") == 1
     printed = capsys.readouterr()
-    told = json.loads(printed.out)
-    assert (told["parameters"], told["converged"], told["error_after"]) == ({}, False, None)
-    assert "pitch_inertia_kg_m2" in told["cannot_tell"][0]
+    reported = json.loads(printed.out)
+    assert (reported["parameters"], reported["converged"], reported["error_after"]) == ({}, False, None)
+    assert "pitch_inertia_kg_m2" in reported["cannot_tell"][0]
     assert printed.err.count("\n") == 1
 
 
@@ -108,7 +108,8 @@ def other_run(run: str, folder: Path, change: Callable[[Array], Array]) -> str:
 @pytest.mark.parametrize(("change", "message"), [
     (lambda z: 0 * z, "expected an acceleration that moves, found 0 m/s2 all along"),
     (lambda z: 0 * z - 0.4, "expected an acceleration that moves, found -0.4 m/s2 all along"),
-    (lambda z: np.repeat(np.round(z[::3], 3), 3)[: len(z)], "expected every sample to be taken anew, found 6[0-9]%"),
+    (lambda z: np.repeat(np.round(z[::3], 3), 3)[: len(z)], "expected every sample to be a new measurement, found "
+                                                            "6[0-9]%"),
     (lambda z: z + 9.81, "expected gravity removed from the acceleration, found 9.8[0-9] m/s2 on average"),
     (lambda z: -z - 9.81, "expected gravity removed from the acceleration, found -9.8[0-9] m/s2 on average"),
 ])
@@ -123,9 +124,9 @@ def test_another_road_than_the_one_that_was_driven(runs: list[str], tmp_path: Pa
     other = other_run(runs[0], tmp_path / "other", np.array)
     write_profile(tmp_path / "other" / "profile.csv", road_record(CAR, 10.0, 4.0, 2, gd_n0_cm3=4000.0).track)
     assert identify([other], MASS, "--json") == 1
-    told = json.loads(capsys.readouterr().out)
-    assert (told["parameters"], told["converged"]) == ({}, False)
-    assert "explains nothing of what was measured" in told["cannot_tell"][0]
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["parameters"], reported["converged"]) == ({}, False)
+    assert "explains nothing of what was measured" in reported["cannot_tell"][0]
 
 
 @pytest.mark.parametrize("more", [(), ("--bump", "height_m=0.15,width_m=2.6")])
@@ -137,16 +138,16 @@ def test_a_sensor_upside_down(runs: list[str], tmp_path: Path, more: tuple[str, 
     assert identify([f"{runs[0]}/drive.csv" if more else runs[0]], f"{MASS},{DAMPERS}{place}", *more) == 0
 
 
-def test_what_speaks_against_an_estimate_is_told(runs: list[str], tmp_path: Path,
+def test_what_speaks_against_an_estimate_is_reported(runs: list[str], tmp_path: Path,
                                                  capsys: pytest.CaptureFixture[str]) -> None:
     narrow = ("--bounds", f"{MASS}=600,700", "--start", f"{MASS}=650", "--noise", "white")
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, *narrow, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["cannot_tell"]
-    assert len(told) == 3
+    reported = json.loads(capsys.readouterr().out)["cannot_tell"]
+    assert len(reported) == 3
     expected = (f"{MASS} ended at a bound", "are not white", "follow the road")
-    for words, found in zip(expected, told, strict=True):
+    for words, found in zip(expected, reported, strict=True):
         assert words in found
     assert identify(runs, MASS, *narrow) == 0
     assert "all that was asked" not in capsys.readouterr().out
@@ -161,9 +162,9 @@ def test_a_simulation_without_noise(tmp_path: Path, capsys: pytest.CaptureFixtur
                  str(tmp_path / "drive.csv")]) == 0
     capsys.readouterr()
     assert identify([str(tmp_path)], f"{MASS},{DAMPERS}", "--start", f"{MASS}=700", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["converged"], told["cannot_tell"]) == (True, [])
-    assert [told["parameters"][name] for name in (MASS, DAMPERS)] == pytest.approx([875, 1776], rel=1e-6)
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["converged"], reported["cannot_tell"]) == (True, [])
+    assert [reported["parameters"][name] for name in (MASS, DAMPERS)] == pytest.approx([875, 1776], rel=1e-6)
 
 
 def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
@@ -175,14 +176,14 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
     files = [str(path) for path in drives]
     assert identify(files, f"{MASS},each.bump.height_m", "--bump", "height_m=0.12,width_m=2.6", "--json",
                     "--start", "each.bump.height_m=0.13", "--bounds", "run2.bump.height_m=0.05,0.2") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["converged"] is True
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["converged"] is True
     for name, truth in ((MASS, 875), ("run1.bump.height_m", 0.15), ("run2.bump.height_m", 0.10),
                         ("run1.bump.start_m", 12.0), ("run2.bump.start_m", 12.0)):
-        assert told["parameters"][name] == pytest.approx(truth, abs=4 * told["standard_errors"][name])
-    assert told["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
+        assert reported["parameters"][name] == pytest.approx(truth, abs=4 * reported["standard_errors"][name])
+    assert reported["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
     assert identify(files[:1], "step.height_m", "--step", "start_m=12,height_m=0.1", "--noise", "white") == 0
-    assert "yes, the model misses something of the car" in capsys.readouterr().out
+    assert "yes, the model lacks something of the car" in capsys.readouterr().out
 
 
 def rubbing_vehicle(folder: Path, friction_n: float) -> str:
@@ -210,21 +211,21 @@ def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_pat
     vehicle, out = rubbing_vehicle(tmp_path, 50.0), tmp_path / "fitted.yaml"
     asked = ["identify", rubbing_run, "--vehicle", vehicle, "--free", f"{MASS},{FRICTION}"]
     assert main([*asked, "--start", f"{MASS}=820", "--json", "--out", str(out)]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["converged"], told["cannot_tell"]) == (True, [])
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["converged"], reported["cannot_tell"]) == (True, [])
     for name, truth in ((MASS, 875), (FRICTION, 90)):
-        assert told["parameters"][name] == pytest.approx(truth, abs=3 * told["standard_errors"][name])
-    assert (told["start"][FRICTION], told["bounds"][FRICTION]) == (50.0, [0.0, 2000.0])
+        assert reported["parameters"][name] == pytest.approx(truth, abs=3 * reported["standard_errors"][name])
+    assert (reported["start"][FRICTION], reported["bounds"][FRICTION]) == (50.0, [0.0, 2000.0])
     written = read_model(out)
     (friction,) = written.effects
-    assert written.vehicle.sprung_mass_kg == told["parameters"][MASS]
-    assert friction.values["friction_force_n"] == told["parameters"][FRICTION]
-    assert friction.standard_errors["friction_force_n"] == told["standard_errors"][FRICTION]
+    assert written.vehicle.sprung_mass_kg == reported["parameters"][MASS]
+    assert friction.values["friction_force_n"] == reported["parameters"][FRICTION]
+    assert friction.standard_errors["friction_force_n"] == reported["standard_errors"][FRICTION]
     assert main(asked) == 0
     text = capsys.readouterr().out
     assert f"{FRICTION} " in text
     assert "starts end at the same place" in text
-    assert "These runs tell all that was asked." in text
+    assert "These runs determine all that was asked." in text
 
 
 @pytest.mark.parametrize(("free", "more", "message"), [
@@ -256,14 +257,14 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     out = tmp_path / "fitted.yaml"
     assert identify(files, f"{MASS},road.waviness", "--same-road", "--start", f"{MASS}=800", "--json",
                     "--out", str(out)) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= told.keys()
-    assert told["parameters"][MASS] == pytest.approx(875, abs=4 * told["standard_errors"][MASS])
-    assert told["road"]["road1.gd_n0_cm3"] == pytest.approx(64, rel=0.6)
-    assert read_vehicle(out).sprung_mass_kg == told["parameters"][MASS]
+    reported = json.loads(capsys.readouterr().out)
+    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= reported.keys()
+    assert reported["parameters"][MASS] == pytest.approx(875, abs=4 * reported["standard_errors"][MASS])
+    assert reported["road"]["road1.gd_n0_cm3"] == pytest.approx(64, rel=0.6)
+    assert read_vehicle(out).sprung_mass_kg == reported["parameters"][MASS]
     assert identify(files[:1], MASS, "--unmeasured-road", "--waviness", "2.1") == 0
     text = capsys.readouterr().out
-    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "taken for one of ISO 8608", "Poorly determined"):
+    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "to be one of ISO 8608", "Poorly determined"):
         assert words in text
     assert identify(files[:1], "pitch_inertia_kg_m2", "--unmeasured-road", "--json") == 1
     assert "pitch_inertia_kg_m2" in json.loads(capsys.readouterr().out)["cannot_tell"][0]
@@ -274,7 +275,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(("free", "more", "message"), [
     (MASS, ("--unmeasured-road", "--bump", "height_m=0.1,width_m=2"), "--bump: expected a road whose profile is known"),
     (MASS, ("--same-road", "--noise", "ar"), "--noise: expected a road whose profile is known"),
-    (MASS, ("--same-road", "--unmeasured-road"), "--unmeasured-road: expected no --same-road beside it"),
+    (MASS, ("--same-road", "--unmeasured-road"), "--unmeasured-road: expected no --same-road with it"),
     (MASS, ("--same-road", "--waviness", "9"), "--waviness 9: expected 1 to 3.5"),
     (MASS, ("--waviness", "2"), "expected --unmeasured-road or --same-road with it"),
     ("contact_patch_m", ("--unmeasured-road",), "cannot be found where the road is not known"),

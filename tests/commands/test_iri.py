@@ -137,7 +137,7 @@ def test_the_installed_command_answers_in_one_line(ridelog: Path, tmp_path: Path
     assert ended.stderr == f"ridelog: {path}:3: expected a number for elevation_m, found 'oops'\n"
 
 
-def test_an_erd_file_is_told_by_its_first_line(
+def test_an_erd_file_is_recognised_by_its_first_line(
     road: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "road.erd"

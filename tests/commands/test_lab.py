@@ -82,12 +82,12 @@ def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
                        monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", StringIO())
     assert lab(runs, tmp_path / "out") == 0
-    told = capsys.readouterr()
-    assert told.err.count("\n") == 1 and "as with --yes" in told.err
-    order = [told.out.index(f"=== {title} ===") for title in
+    reported = capsys.readouterr()
+    assert reported.err.count("\n") == 1 and "as with --yes" in reported.err
+    order = [reported.out.index(f"=== {title} ===") for title in
              ("Compare", "Diagnose", "Add sensor_offset", "Compare again", "The end")]
     assert order == sorted(order)
-    assert "Nothing more is missing" in told.out
+    assert "Nothing more is missing" in reported.out
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["story.html", "vehicle-1.yaml"]
     assert [one.effect.name for one in read_model(tmp_path / "out" / "vehicle-1.yaml").effects] == ["sensor_offset"]
     html = (tmp_path / "out" / "story.html").read_text("utf-8")
@@ -102,11 +102,11 @@ def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_for_a_program_where_nothing_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert lab(write_runs(tmp_path / "runs", []), tmp_path / "out", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["added"] == [] and told["refused"] == [] and told["unexplained"] is False
-    assert [step["error"] for step in told["steps"]] == [told["error_before"], told["error_after"]]
-    assert told["error_after"] == pytest.approx(told["noise_floor_error"], rel=0.1)
-    assert told["vehicles"] == [] and Path(told["story"]).read_text("utf-8").startswith("<!doctype html>")
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["added"] == [] and reported["refused"] == [] and reported["unexplained"] is False
+    assert [step["error"] for step in reported["steps"]] == [reported["error_before"], reported["error_after"]]
+    assert reported["error_after"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
+    assert reported["vehicles"] == [] and Path(reported["story"]).read_text("utf-8").startswith("<!doctype html>")
 
 
 def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
@@ -114,9 +114,9 @@ def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.Ca
     asked = answering("rust", "no")
     assert lab(runs, tmp_path) == 0
     assert len(asked) == 2 and "Add sensor_offset?" in asked[0]
-    told = capsys.readouterr().out
-    assert "Expected yes, no, or one of " in told
-    assert "left out as you wished: sensor_offset" in told
+    reported = capsys.readouterr().out
+    assert "Expected yes, no, or one of " in reported
+    assert "left out as you wished: sensor_offset" in reported
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
 
 
@@ -125,9 +125,9 @@ def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, c
                                               answering: Callable[..., list[str]]) -> None:
     answering("roll", "sensor_gain", "y")
     assert lab(runs, tmp_path) == 0
-    told = capsys.readouterr().out
-    assert "elevation_right_m" in told  # why it cannot be roll
-    assert told.index("=== Add sensor_gain ===") < told.index("=== Add sensor_offset ===")
+    reported = capsys.readouterr().out
+    assert "elevation_right_m" in reported  # why it cannot be roll
+    assert reported.index("=== Add sensor_gain ===") < reported.index("=== Add sensor_offset ===")
     assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["sensor_gain",
                                                                                             "sensor_offset"]
     assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
@@ -188,10 +188,10 @@ def test_no_more_files_are_written_than_were_looked_at(
 
 def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--lab", "--unpack", "--out", str(tmp_path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["runs"] == [str(tmp_path / "slow"), str(tmp_path / "brisk")]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["runs"] == [str(tmp_path / "slow"), str(tmp_path / "brisk")]
     with pytest.raises(BadInput, match="expected --lab"):
         main(["demo", "--unpack"])
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="expected a folder"):
-        lab(told["runs"], tmp_path / "file")
+        lab(reported["runs"], tmp_path / "file")

@@ -122,9 +122,9 @@ def test_what_takes_long_without_a_compiler_is_said_before(
     car = car_with(tmp_path, "{name: wheel_lift}")
     with pytest.raises(TypeError):
         main([*COMMANDS[command](tmp_path), "--vehicle", car, *runs])
-    told = capsys.readouterr().err
-    assert "Without the lab extra (pip install '.[lab]') simulations with wheel_lift take" in told
-    assert told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert "Without the lab extra (pip install '.[lab]') simulations with wheel_lift take" in reported
+    assert reported.count("\n") == 1
 
 
 @pytest.mark.parametrize("command", ["diagnose", "lab", "demo"])
@@ -159,7 +159,7 @@ def changed(run: str, folder: Path, **columns: Callable[[npt.NDArray[np.float64]
 CHANGES = {
     "zeros": ({"accel": lambda a: 0.0}, "drive.csv: expected accelerations after the first 2 s, found zeros only"),
     "held": ({"accel": lambda a: np.repeat(np.round(a[::3], 3), 3)[: len(a)]},
-             "drive.csv: expected every sample to be taken anew, found 6[0-9]% that repeat"),
+             "drive.csv: expected every sample to be a new measurement, found 6[0-9]% that repeat"),
     "constant": ({"accel": lambda a: 1.5}, "drive.csv: .* found 1.5 m/s2 all along"),
     "tiny": ({"accel": lambda a: 1e-9 * a}, "drive.csv: expected accelerations in m/s2, found none above"),
     "NaN": ({"accel": lambda a: np.where(a == a[500], np.nan, a)}, "drive.csv:502: expected a number for accel_z_mps2"),
@@ -273,9 +273,9 @@ def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], 
     write_profile(tmp_path / "profile.csv", given.track)
     for more in ([], ["--out", str(tmp_path / "page.html")]):
         assert main(["compare", "--vehicle", "rav4-2009", str(tmp_path), "--json", *more]) == 0
-        told = capsys.readouterr()
-        assert told.err == ""
-    assert json.loads(told.out)["error"] < 1
+        reported = capsys.readouterr()
+        assert reported.err == ""
+    assert json.loads(reported.out)["error"] < 1
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])

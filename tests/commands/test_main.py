@@ -38,7 +38,7 @@ def test_help_lists_the_verbs_and_loads_nothing_heavy() -> None:
     assert out.endswith("heavy:\n")
 
 
-def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("ridelog ")
 
@@ -48,12 +48,12 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
 def test_wrong_use_is_one_line_and_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as leaving:
         main.main(arguments)
-    told = capsys.readouterr()
+    reported = capsys.readouterr()
     assert leaving.value.code == 2
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    assert "--help')" in told.err
-    assert "\x1b" not in told.err
+    assert reported.out == ""
+    assert reported.err.count("\n") == 1
+    assert "--help')" in reported.err
+    assert "\x1b" not in reported.err
 
 
 def fault(error: BaseException) -> Callable[[object], int]:
@@ -62,7 +62,7 @@ def fault(error: BaseException) -> Callable[[object], int]:
     return run
 
 
-@pytest.mark.parametrize(("error", "status", "told"), [
+@pytest.mark.parametrize(("error", "status", "reported"), [
     (BadInput("a.yaml:3: expected a number"), 2, "ridelog: a.yaml:3: expected a number\n"),
     (CheckFailed("2 rows\nare torn"), 1, "ridelog: 2 rows are torn\n"),
     (DumpError("a.dump:1: expected a header"), 2, "ridelog: a.dump:1: expected a header\n"),
@@ -75,7 +75,7 @@ def fault(error: BaseException) -> Callable[[object], int]:
     (PermissionError(13, "Permission denied", "/\u202e\udcffx"), 2, "ridelog: /\\u202e\\udcffx: Permission denied\n"),
 ])
 def test_an_expected_fault_is_one_line_and_its_status(
-        error: BaseException, status: int, told: str, monkeypatch: pytest.MonkeyPatch,
+        error: BaseException, status: int, reported: str, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     verb = types.ModuleType("logger.commands.verify", "A verb that fails.")
     verb.__dict__.update(add_arguments=lambda parser: None, run=fault(error))
@@ -84,7 +84,7 @@ def test_an_expected_fault_is_one_line_and_its_status(
     with pytest.raises(SystemExit) as leaving:
         main.run()
     assert leaving.value.code == status
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == reported
 
 
 def test_a_closed_pipe_is_no_traceback() -> None:
@@ -94,6 +94,6 @@ def test_a_closed_pipe_is_no_traceback() -> None:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
-        told = process.stderr.read()
-    assert told == b""
+        reported = process.stderr.read()
+    assert reported == b""
     assert process.returncode == main.EXIT_PIPE_CLOSED

@@ -137,7 +137,8 @@ def test_records_that_will_not_do(tmp_path: Path) -> None:
     held_s = np.arange(3000) / 100
     noise = np.repeat(np.random.default_rng(1).normal(size=(1000, 2)).round(3), 3, axis=0)
     held = written(tmp_path / "held.csv", {"t_s": held_s, "a": noise[:, 0], "b": noise[:, 1]})
-    with pytest.raises(BadInput, match=r"held.csv: expected every sample to be taken anew, found 67% that repeat"):
+    with pytest.raises(BadInput, match=r"held.csv: expected every sample to be a new measurement, found 67% that "
+                                       "repeat"):
         main(["modes", str(held)])
     big = written(tmp_path / "big.csv", {"t_s": np.arange(9) / 100, "a": np.arange(9) * 1e12})
     with pytest.raises(BadInput, match=r"big.csv:4: expected a within 1e\+12, found 2e\+12"):

@@ -38,21 +38,21 @@ def plan(*arguments: object) -> int:
 def test_for_a_program_and_as_a_page(road: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert plan("--profile", road, "--speed", 8, "--speed", 12, "--json", "--out", page) == 0
-    told = json.loads(capsys.readouterr().out)
+    reported = json.loads(capsys.readouterr().out)
     names = set(FEW) - {"roll"}
-    assert told["detectability"].keys() == told["isolability"].keys() == names
-    assert told["left_out"].keys() == {"roll"}
-    for name, beside in told["isolability"].items():
+    assert reported["detectability"].keys() == reported["isolability"].keys() == names
+    assert reported["left_out"].keys() == {"roll"}
+    for name, beside in reported["isolability"].items():
         assert beside.keys() == names - {name}
-        assert all(0 <= one <= told["detectability"][name] + 1e-9 for one in beside.values())
-    offset = told["isolability"]["sensor_offset"]
+        assert all(0 <= one <= reported["detectability"][name] + 1e-9 for one in beside.values())
+    offset = reported["isolability"]["sensor_offset"]
     assert min(offset, key=lambda name: offset[name]) == "cg_shift"  # both move the sensor against the body
-    assert told["noise_mps2"] == 0.05 and not told["noise_measured"]
-    assert [one["drive"] for one in told["drives"]] == [f"{road} at 8 m/s", f"{road} at 12 m/s"]
-    more = [one["more_named"] for one in told["next"]]
+    assert reported["noise_mps2"] == 0.05 and not reported["noise_measured"]
+    assert [one["drive"] for one in reported["drives"]] == [f"{road} at 8 m/s", f"{road} at 12 m/s"]
+    more = [one["more_named"] for one in reported["next"]]
     assert all(round(a, 1) >= round(b, 1) for a, b in pairwise(more))
-    assert min(more) > -0.01 and all(gain > 1 for one in told["next"] for gain in one["gains"].values())
-    assert any("pitch gyroscope" in one["do"] for one in told["next"])
+    assert min(more) > -0.01 and all(gain > 1 for one in reported["next"] for gain in one["gains"].values())
+    assert any("pitch gyroscope" in one["do"] for one in reported["next"])
     html = page.read_text("utf-8")
     assert html.count("<svg") == 1 and html.count("<rect") == len(names) ** 2
 
@@ -96,9 +96,9 @@ def test_wrong_use_is_one_line(arguments: tuple[str, ...], complaint: str, road:
     flat = tmp_path / "flat.csv"
     flat.write_text("distance_m,elevation_m\n" + "".join(f"{one},0\n" for one in range(100)), "ascii")
     names = {"ROAD": str(road), "FLAT": str(flat)}
-    with pytest.raises((BadInput, OSError)) as told:
+    with pytest.raises((BadInput, OSError)) as reported:
         plan(*[names.get(one, one) for one in arguments])
-    assert complaint in str(told.value) and "\n" not in str(told.value)
+    assert complaint in str(reported.value) and "\n" not in str(reported.value)
 
 
 @pytest.mark.slow

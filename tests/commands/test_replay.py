@@ -30,7 +30,7 @@ def rows(folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def replayed(ridelog: Path, short_dump: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A folder with the logs of the short drive, and what the command told as it made them."""
+    """A folder with the logs of the short drive, and what the command printed as it made them."""
     folder = tmp_path_factory.mktemp("replayed")
     done = call(ridelog, "replay", short_dump, "--out", folder, "--rate", "0", "--json")
     assert done.returncode == 0, done.stderr
@@ -50,8 +50,8 @@ def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path)
 
 
 def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
-    folder, told = replayed
-    outcome = json.loads(told)
+    folder, reported = replayed
+    outcome = json.loads(reported)
     (log,) = sorted(folder.glob("*.csv"))
     assert outcome["files"] == [log.name]
     text = log.read_text()
@@ -89,7 +89,7 @@ def test_a_recording_that_was_cut_gives_what_it_holds(
     assert "cut short" in done.stdout
     kept = rows(tmp_path / "out")
     assert len(kept) > 20
-    # The last seconds could not wait for what the road behind the cut would have told of them.
+    # The last seconds could not wait for what the road behind the cut would have shown of them.
     same = [a == b for a, b in zip(kept, rows(replayed[0]), strict=False)]
     began_s = [float(row.split(",")[2]) for row in kept]
     settled = [one_s < began_s[-1] - 8.0 for one_s in began_s]

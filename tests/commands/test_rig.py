@@ -30,7 +30,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: object) -> dict:
+def reported(capsys: pytest.CaptureFixture[str], *words: object) -> dict:
     assert main([*map(str, words), "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
@@ -38,7 +38,8 @@ def told(capsys: pytest.CaptureFixture[str], *words: object) -> dict:
 def test_a_comparison_falls_to_the_noise_and_knows_no_speed_and_no_place(
         bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = bench / "compare.html"
-    found = told(capsys, "compare", "--vehicle", bench / "rig.yaml", bench / "random", bench / "sweep", "--out", page)
+    found = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", bench / "random", bench / "sweep",
+                     "--out", page)
     measured = np.concatenate([np.loadtxt(bench / name / "drive.csv", delimiter=",", skiprows=1)[1000:, 1]
                                for name in ("random", "sweep")])
     floor = NOISE_MPS2 / float(np.sqrt((measured**2).mean()))
@@ -62,7 +63,7 @@ def test_the_true_rig_is_right_without_a_fit(bench: Path) -> None:
 
 def test_what_needs_a_road_cannot_be_tried_and_nothing_is_missing(
         bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = told(capsys, "diagnose", "--vehicle", bench / "rig.yaml", bench / "random")
+    found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", bench / "random")
     assert (found["verdict"], found["unexplained"]) == ([], False)
     why = found["not_tried"]
     assert all("driven by time" in why[name] for name in ("speed_scale", "tire_enveloping", "roll"))
@@ -73,7 +74,7 @@ def test_what_needs_a_road_cannot_be_tried_and_nothing_is_missing(
 
 @pytest.mark.parametrize("run", ["random", "sweep"])
 def test_numbers_of_the_rig_are_identified(bench: Path, run: str, capsys: pytest.CaptureFixture[str]) -> None:
-    found = told(capsys, "identify", "--vehicle", bench / "true.yaml", bench / run, "--free",
+    found = reported(capsys, "identify", "--vehicle", bench / "true.yaml", bench / run, "--free",
                  "sprung_mass_kg,front.suspension_damping_n_s_per_m", "--start", "sprung_mass_kg=4")
     assert found["converged"]
     assert found["at_bound"] == []
@@ -90,8 +91,8 @@ def test_a_fit_with_coloured_noise_that_ends_at_a_bound_says_what_to_try(
     main([*words, "--noise", "ar"])
     assert "try --noise white" in capsys.readouterr().out
     main([*words, "--noise", "white"])
-    assert "At a bound" in (told_white := capsys.readouterr().out)
-    assert "try --noise white" not in told_white
+    assert "At a bound" in (reported_white := capsys.readouterr().out)
+    assert "try --noise white" not in reported_white
 
 
 @pytest.mark.parametrize("more", [False, True])
@@ -109,7 +110,7 @@ def test_a_record_that_was_low_passed_is_compared_below(bench: Path, tmp_path: P
     drive[:, 1] = sosfiltfilt(sections, drive[:, 1])
     head = path.read_text().splitlines()[0]
     np.savetxt(path, drive, "%.9g", ",", header=head, comments="")
-    found = told(capsys, "compare", "--vehicle", bench / "true.yaml", tmp_path / "run")
+    found = reported(capsys, "compare", "--vehicle", bench / "true.yaml", tmp_path / "run")
     assert found["low_passed_at_hz"] == pytest.approx(15.0, rel=0.05)
     assert 12.0 < found["pass_band_hz"][1] < 15.0
     assert found["error"] < 0.006
@@ -122,7 +123,7 @@ def test_a_simulated_rig_is_what_the_integrator_says(bench: Path, tmp_path: Path
     run = tmp_path / "run"
     run.mkdir()
     shutil.copy(bench / "random" / "excitation.csv", run)
-    made = told(capsys, "simulate", "--vehicle", bench / "true.yaml", "--excitation", run / "excitation.csv",
+    made = reported(capsys, "simulate", "--vehicle", bench / "true.yaml", "--excitation", run / "excitation.csv",
                 "--rate", RATE_HZ, "--output", "travel", "--out", run / "drive.csv")
     assert made["more_columns"] == ["travel_front_m"]
     assert (run / "drive.csv").read_text().startswith("t_s,accel_z_mps2,travel_front_m\n")
@@ -196,7 +197,7 @@ def with_signals(folder: Path, rig: Rig, table: np.ndarray, declared: str = SIGN
 
 def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = with_signals(tmp_path / "run", Rig(), random_table(12.0, 1))
-    found = told(capsys, "compare", "--vehicle", bench / "rig.yaml", run)
+    found = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", run)
     drive = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)[1000:]
     floors = dict(zip(("wheel_accel_mps2", "front_travel_m"), (0.02, 2e-5) / drive[:, 2:].std(axis=0), strict=True))
     for name, floor in floors.items():
@@ -204,7 +205,7 @@ def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: py
     assert found["signals"]["front_travel_m"] > 5 * floors["front_travel_m"]
     assert main(["compare", "--vehicle", str(bench / "rig.yaml"), str(run)]) == 0
     assert "Errors of the other signals: wheel_accel_mps2" in capsys.readouterr().out
-    alone = told(capsys, "compare", "--vehicle", bench / "rig.yaml", bench / "random")
+    alone = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", bench / "random")
     assert alone["signals"] == {}
 
 
@@ -237,9 +238,9 @@ def test_signals_that_cannot_be_are_refused_in_one_line(bench: Path, tmp_path: P
 def test_two_more_signals_name_and_measure_the_friction(bench: Path, tmp_path: Path,
                                                         capsys: pytest.CaptureFixture[str]) -> None:
     run = with_signals(tmp_path / "run", Rig(friction_n=0.5), random_table(20.0, 7))
-    found = told(capsys, "diagnose", "--vehicle", bench / "rig.yaml", run)
+    found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", run)
     assert found["verdict"] == ["dry_friction"]
-    added = told(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", run,
+    added = reported(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", run,
                  "--out", tmp_path / "with.yaml")
     force, error = (added[key]["friction_force_n"] for key in ("parameters", "standard_errors"))
     assert abs(force - 0.5) < 3 * error
@@ -255,14 +256,15 @@ def test_dry_friction_in_a_bench_rig_is_named_and_measured(
     table = random_table(20.0, 7) if kind == "random" else swept_table(20.0)
     seen = shaken(Rig(friction_n=0.5), table)
     write_run(tmp_path / "run", seen, NOISE_MPS2, 8)
-    found = told(capsys, "diagnose", "--vehicle", bench / "rig.yaml", tmp_path / "run")
+    found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", tmp_path / "run")
     assert found["verdict"] == ["dry_friction"]
     out = tmp_path / "with.yaml"
-    added = told(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", tmp_path / "run", "--out", out)
+    added = reported(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", tmp_path / "run",
+                     "--out", out)
     force, error = (added[key]["friction_force_n"] for key in ("parameters", "standard_errors"))
     assert 0.002 < error < 0.01
     assert abs(force - 0.5) < 3 * error
     assert added["error_after"] < 0.02 < 5 * 0.02 < added["error_refitted"]
     assert added["error_after"] < 1.3 * added["noise_floor_error"]
-    again = told(capsys, "diagnose", "--vehicle", out, tmp_path / "run")
+    again = reported(capsys, "diagnose", "--vehicle", out, tmp_path / "run")
     assert again["verdict"] == []

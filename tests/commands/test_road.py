@@ -1,4 +1,4 @@
-"""``ridelog road``: what it writes can be read, what it reads is told, and what it cannot use is one line."""
+"""``ridelog road``: what it writes can be read, what it reads is described, and what it cannot use is one line."""
 
 import json
 from pathlib import Path
@@ -22,8 +22,8 @@ def classify(path: Path, capsys: pytest.CaptureFixture[str], *arguments: str) ->
     assert main(["road", "classify", str(path), "--json", *arguments]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 1
-    told: dict = json.loads(lines[0])
-    return told
+    reported: dict = json.loads(lines[0])
+    return reported
 
 
 def test_a_road_is_written_as_a_profile(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -57,23 +57,23 @@ def test_an_iri_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str], wa
 
 def test_classify_prints_the_fields_of_the_contract(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     generate(tmp_path / "road.csv", "--class", "C", "--length", "600", "--spacing", "0.1")
-    told = classify(tmp_path / "road.csv", capsys)
-    assert list(told)[:4] == ["class", "gd_n0_cm3", "waviness", "iri_m_per_km"]
-    assert told["class"] == "C"
-    assert told["gd_n0_cm3"] == pytest.approx(256, abs=3 * told["gd_n0_std_cm3"])
-    assert told["waviness"] == pytest.approx(2, abs=3 * told["waviness_std"])
-    assert told["iri_m_per_km"] == pytest.approx(iri(iso8608.generate(256, 600, 0.1, 1), 0.1), rel=1e-5)
-    assert told["iri_m_per_km"] == pytest.approx(told["iri_expected_m_per_km"],
-                                                 abs=3 * told["iri_expected_std_m_per_km"])
+    reported = classify(tmp_path / "road.csv", capsys)
+    assert list(reported)[:4] == ["class", "gd_n0_cm3", "waviness", "iri_m_per_km"]
+    assert reported["class"] == "C"
+    assert reported["gd_n0_cm3"] == pytest.approx(256, abs=3 * reported["gd_n0_std_cm3"])
+    assert reported["waviness"] == pytest.approx(2, abs=3 * reported["waviness_std"])
+    assert reported["iri_m_per_km"] == pytest.approx(iri(iso8608.generate(256, 600, 0.1, 1), 0.1), rel=1e-5)
+    assert reported["iri_m_per_km"] == pytest.approx(reported["iri_expected_m_per_km"],
+                                                 abs=3 * reported["iri_expected_std_m_per_km"])
 
 
-def test_two_tracks_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_tracks_are_distinguished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left, right = (iso8608.generate(gd, 300, 0.1, 1) for gd in (64, 1024))
     rows = "".join(f"{0.1 * number:.1f},{a},{b}\n" for number, (a, b) in enumerate(zip(left, right, strict=True)))
     path = tmp_path / "tracks.csv"
     path.write_text("distance_m,elevation_m,elevation_right_m\n" + rows)
-    told = classify(path, capsys)
-    assert (told["class"], told["right"]["class"]) == ("B", "D")
+    reported = classify(path, capsys)
+    assert (reported["class"], reported["right"]["class"]) == ("B", "D")
     assert main(["road", "classify", str(path)]) == 0
     screen = capsys.readouterr().out
     assert "left track" in screen
@@ -110,9 +110,9 @@ def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.Captu
     path.write_text("distance_m,elevation_m\n" + "".join(f"{0.05 * i:.2f},{road[i]:.6f}\n" for i in kept))
     with pytest.raises(BadInput, match=r"uneven\.csv:\d+: expected even steps"):
         main(["road", "classify", str(path)])
-    told = classify(path, capsys, "--resample", "0.1")
-    assert told["class"] == "C"
-    assert told["highest_cpm"] < 0.25 / 0.0999
+    reported = classify(path, capsys, "--resample", "0.1")
+    assert reported["class"] == "C"
+    assert reported["highest_cpm"] < 0.25 / 0.0999
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -142,5 +142,5 @@ def test_wrong_use_is_one_line(arguments: list[str], capsys: pytest.CaptureFixtu
 
 def test_a_profile_that_is_too_short(tmp_path: Path) -> None:
     generate(tmp_path / "road.csv", "--class", "A", "--length", "60")
-    with pytest.raises(BadInput, match=r"road\.csv: too short to tell its class: expected at least 100 m, found 60 m"):
+    with pytest.raises(BadInput, match=r"road\.csv: too short to classify: expected at least 100 m, found 60 m"):
         main(["road", "classify", str(tmp_path / "road.csv")])

@@ -361,10 +361,10 @@ def test_what_a_step_of_a_thousandth_cannot_follow_is_refused(folder: Path) -> N
 
 def test_the_effects_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "--list-effects", "--json"]) == 0
-    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["effects"]}
-    assert list(told) == sorted(shipped_effects())
-    assert told["top_mount_compliance"]["parameters"][0]["vanishes_at"] == "infinity"
-    assert told["sensor_bandwidth"]["parameters"][1]["choices"] == list(range(1, 9))
+    reported = {one["name"]: one for one in json.loads(capsys.readouterr().out)["effects"]}
+    assert list(reported) == sorted(shipped_effects())
+    assert reported["top_mount_compliance"]["parameters"][0]["vanishes_at"] == "infinity"
+    assert reported["sensor_bandwidth"]["parameters"][1]["choices"] == list(range(1, 9))
     assert main(["simulate", "--list-effects"]) == 0
     words = capsys.readouterr().out
     assert "dry_friction: Coulomb friction in each suspension\n  friction_force_n=60  (0 to 2000)  of each" in words

@@ -40,8 +40,8 @@ def test_millimetres_are_suspected(tmp_path: Path, capsys: pytest.CaptureFixture
         rows = [f"{i * 0.1:.1f},{factor * 0.01 * (i % 7):.4f}" for i in range(400)]
         file.write_text("distance_m,elevation_m\n" + "\n".join(rows) + "\n")
         assert main(["iri", str(file), "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert (told["iri_m_per_km"] > 100, len(told.get("doubts", []))) == (bool(doubts), doubts)
+        reported = json.loads(capsys.readouterr().out)
+        assert (reported["iri_m_per_km"] > 100, len(reported.get("doubts", []))) == (bool(doubts), doubts)
         assert main(["iri", str(file)]) == 0
         assert ("Elevation in mm?" in capsys.readouterr().out) == bool(doubts)
 

@@ -24,7 +24,9 @@ def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["studies"]
     assert len(listed) == len(text.splitlines())
-    assert set(listed[0]) == {"name", "where", "title", "covers", "word", "because"}
+    assert set(listed[0]) == {"name", "where", "title", "covers", "words", "items"}
+    assert set(listed[0]["items"][0]) == {"item", "word", "because"}
+    assert [one["item"] for one in listed[0]["items"]] == listed[0]["covers"]
     assert main(["study", "--list", "--shelf", "field"]) == 0
     assert "table-4-4" not in capsys.readouterr().out
 
@@ -43,12 +45,13 @@ def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFix
 def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "fig-4-25", "--quick", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["study", "where", "title", "covers", "word", "because", "how", "source", "failure", "tables",
+    assert list(told) == ["study", "where", "title", "covers", "words", "items", "how", "source", "failure", "tables",
                           "verdict", "figures"]
     assert told["failure"] is None
-    table = told["tables"][0]
+    table = told["tables"][1]
     assert all(len(row) == len(table["columns"]) for row in table["rows"])
     assert told["figures"][0]["lines"][0]["name"] == "102 mm"
+    assert told["figures"][0]["printed"].startswith("peaks for heights of 101.6 to 203.2 mm")
 
 
 def test_all_with_one_that_fails(
@@ -61,8 +64,8 @@ def test_all_with_one_that_fails(
     out = tmp_path / "pages"
     assert main(["study", "all", "--quick", "--out", str(out), "--json"]) == 1
     shown = capsys.readouterr()
-    told = json.loads(shown.out)
-    assert [(one["name"], one["failure"]) for one in told["studies"]] == [
+    reported = json.loads(shown.out)
+    assert [(one["name"], one["failure"]) for one in reported["studies"]] == [
         ("table-9-9", "KeyError: 'table-9-9'"), ("table-4-1", None)]
     assert shown.err.count("of 2] table-") == 2
     page = (out / "index.html").read_text()
@@ -83,7 +86,7 @@ def test_a_study_that_needs_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [(["table-9-9"], "study 'table-9-9': expected one of "), ([], "expected the NAME of a study, all, or --list"),
-     (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
+     (["--list", "fig-4-25"], "expected no NAME with it, found fig-4-25"),
      (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
      (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],
 )

@@ -36,7 +36,7 @@ def zenodo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made.zenodo_4386256(tmp_path_factory.mktemp("zenodo") / "set", (roads[0], roads[1], roads[2]), (0, 2))
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: object) -> dict[str, Any]:
+def reported(capsys: pytest.CaptureFixture[str], *words: object) -> dict[str, Any]:
     assert main(["study", *map(str, words), "--json"]) == 0
     found: dict[str, Any] = json.loads(capsys.readouterr().out)
     return found
@@ -53,7 +53,7 @@ def rows(table: dict[str, Any], compared: str) -> dict[str, dict[str, Any]]:
 
 @pytest.mark.slow
 def test_cars_of_lira_cd_find_the_profilers_iri(lira_cd: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    ten, hundred, repeats = told(capsys, "lira-cd", lira_cd, "--vehicle", made.CAR)["tables"]
+    ten, hundred, repeats = reported(capsys, "lira-cd", lira_cd, "--vehicle", made.CAR)["tables"]
     assert ten["title"] == "Windows of 10 m"
     for table, r2 in ((ten, 0.8), (hundred, 0.9)):
         found = rows(table, "car, moved along to fit")
@@ -62,8 +62,8 @@ def test_cars_of_lira_cd_find_the_profilers_iri(lira_cd: Path, capsys: pytest.Ca
             assert row["R2"] > r2
             assert abs(row["bias"]) < 0.03
             assert row["within 2 (95%)"] > 0.8
-    assert rows(repeats, "ARAN beside P79, 10 m")["CPH1 HH"]["R2"] > 0.85  # one error of 10 %, halved
-    tracks = rows(repeats, "P79, right track beside left, 10 m")["CPH1 HH"]
+    assert rows(repeats, "ARAN against P79, 10 m")["CPH1 HH"]["R2"] > 0.85  # one error of 10 %, halved
+    tracks = rows(repeats, "P79, right track against left, 10 m")["CPH1 HH"]
     assert tracks["MAE [m/km]"] == pytest.approx(0.05 * np.sqrt(2 / np.pi) * 5.1, rel=0.35)
 
 
@@ -76,7 +76,7 @@ def test_a_factor_is_that_of_the_other_road(lira_cd: Path, tmp_path: Path, capsy
     cells = [line.split(";") for line in lines]
     file.write_text("\n".join([header, *(";".join([at, *(str(2 * float(one)) for one in more)])
                                          for at, *more in cells)]), "latin-1")
-    _, hundred, _ = told(capsys, "lira-cd", tmp_path / "set", "--vehicle", made.CAR)["tables"]
+    _, hundred, _ = reported(capsys, "lira-cd", tmp_path / "set", "--vehicle", made.CAR)["tables"]
     factors = {row[0]: float(row[1].split("times ")[1].split()[0]) for row in hundred["rows"]
                if row[1].startswith("car, times")}
     assert factors["CPH1 HH"] == pytest.approx(2, rel=0.05)
@@ -86,7 +86,7 @@ def test_a_factor_is_that_of_the_other_road(lira_cd: Path, tmp_path: Path, capsy
 @pytest.mark.slow
 def test_phones_of_zenodo_find_the_lasers_iri(zenodo: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    found = told(capsys, "zenodo-4386256", zenodo, "--vehicle", made.CAR, "--out", page)
+    found = reported(capsys, "zenodo-4386256", zenodo, "--vehicle", made.CAR, "--out", page)
     ten, hundred = found["tables"]
     for table, mae in ((ten, 0.4), (hundred, 0.15)):
         cars = rows(table, "car")
@@ -102,19 +102,20 @@ def test_phones_of_zenodo_find_the_lasers_iri(zenodo: Path, capsys: pytest.Captu
 
 def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = made.lira_map(tmp_path / "set", {"1ccf": (0, 0.1), "85e7": (20, 0.1), "e9ef": (0, 0.2)})
-    ten, hundred, _ = told(capsys, "lira-map", folder)["tables"]
+    ten, hundred, _ = reported(capsys, "lira-map", folder)["tables"]
     named = {(row[0], row[1]): dict(zip(ten["columns"], row, strict=True)) for row in ten["rows"]}
     iri = [one["value"] for one in json.loads((folder / "trip_iri_1ccf.json").read_text())["path"]["data"]]
     # Logarithms off by a and b each: they differ by the root of a^2 + b^2, whatever the road.
     for name, off in (("85e7 beside 1ccf", np.hypot(0.1, 0.1)), ("e9ef beside 1ccf", np.hypot(0.1, 0.2))):
         expected = 1 - off**2 / np.var(np.log(iri))
         assert named[name, "nearest cells"]["R2 of log IRI"] == pytest.approx(expected, abs=0.05)
+        assert named[name, "laid over, each 200 m moved by up to 4 m"]["R2"] > named[name, "laid over"]["R2"] - 0.01
     assert all(row[3] > other[3] for row, other in zip(hundred["rows"], ten["rows"], strict=True))
 
 
 def test_a_minute_of_comma2k19_becomes_rows_and_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     road = made.surveyed(1)
-    found = told(capsys, "comma2k19", made.comma2k19(tmp_path / "set", road, late_s=0.3, faster_mps=0.2))
+    found = reported(capsys, "comma2k19", made.comma2k19(tmp_path / "set", road, late_s=0.3, faster_mps=0.2))
     table, speed = found["tables"]
     assert [row[2] for row in speed["rows"]] == pytest.approx([0.3, 0.2, 0.0], abs=0.011)
     known = [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
@@ -125,6 +126,18 @@ def test_a_minute_of_comma2k19_becomes_rows_and_a_map(tmp_path: Path, capsys: py
     ours = np.array([row["IRI [m/km]"] for row in known])
     assert np.median(np.abs(ours - exact)) < 0.4
     assert found["figures"][0]["x"] == "east [m]"
+
+
+def test_the_size_of_gravity_tells_the_unit_of_a_car(lira_cd: Path, tmp_path: Path) -> None:
+    import h5py
+
+    cars = tmp_path / "platoon_CPH1_HH.hdf5"
+    shutil.copy(lira_cd / "AutoPi_CAN" / cars.name, cars)
+    (in_g,), _ = recordings(cars)
+    with h5py.File(cars, "a") as file:
+        file["GM/16006/pass_1/acc.xyz"][:, 1:] *= made.GRAVITY_MPS2
+    (in_mps2,), _ = recordings(cars)
+    assert (in_g.unit, in_mps2.unit) == ("g", "m/s2")
 
 
 # --- what is not there, or something else ---

@@ -12,7 +12,7 @@ import pytest
 
 from drivers.dump import open_dump
 from logger.demo import field_drives
-from logger.demo.motion import Stretch, body_acceleration, build_road, drive_along, sensed_acceleration
+from logger.demo.motion import RoadStretch, body_acceleration, build_road, drive_along, sensed_acceleration
 from logger.demo.unpacking import unpacked
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
@@ -66,7 +66,7 @@ def test_what_a_car_with_effects_feels_is_what_an_exact_model_says_times_the_gai
     """A gain alone leaves the car linear, which ``body_acceleration`` steps exactly."""
     car = read_vehicle(vehicle_file("rav4-2009"))
     motion = drive_along(((0, 10), (10, 14), (20, 9)))
-    road = build_road([Stretch(1, 100)], (), 260.0, 3)
+    road = build_road([RoadStretch(1, 100)], (), 260.0, 3)
     felt = sensed_acceleration(compose(car, [chosen(shipped_effects()["sensor_gain"], {"gain": 1.25})]), road, motion)
     exact = 1.25 * body_acceleration(car, road, motion)
     settled = slice(3000, -1000)

@@ -59,7 +59,7 @@ def test_roads_have_their_level_and_the_exact_iri(make) -> None:
     assert road.iri(edges_m[:-1] - road.length_m, edges_m[1:] - road.length_m) == pytest.approx(lap, rel=1e-6)
 
 
-def test_the_spectrum_that_is_told_is_that_of_the_elevations() -> None:
+def test_the_spectrum_that_is_reported_is_that_of_the_elevations() -> None:
     road = iso_road(3.0, 2000.0, 8, waviness=1.8)
     waves = np.abs(np.fft.rfft(road.elevation_m)) ** 2 * 2 * SPACING_M / len(road.elevation_m)
     inside = (road.wave_number_cpm > 0.02) & (road.wave_number_cpm < 2.8)
@@ -87,8 +87,8 @@ def test_the_receiver_tells_where_the_car_was(car: Vehicle) -> None:
     drive = varied_drive(car, iso_road(2.0, 600.0, 2), [(0.0, 10.0), (20.0, 15.0)])
     fixes = Receiver(slow_error_m=0.0, speed_noise_mps=0.0).fixes(drive, 1_000_000, np.random.default_rng(1))
     at_s = 0.37 + np.arange(len(fixes))
-    told_m = [place_of(fix.lat_deg) for fix in fixes if fix.lat_deg is not None]
-    assert told_m == pytest.approx(np.interp(at_s * 100, np.arange(len(drive.place_m)), drive.place_m), abs=1e-3)
+    reported_m = [place_of(fix.lat_deg) for fix in fixes if fix.lat_deg is not None]
+    assert reported_m == pytest.approx(np.interp(at_s * 100, np.arange(len(drive.place_m)), drive.place_m), abs=1e-3)
     late_s = np.array([fix.t_us for fix in fixes]) / 1e6 - 1.0 - at_s
     assert late_s.min() >= 0.15
     assert late_s.max() < 0.25

@@ -11,7 +11,7 @@ from scipy import signal
 
 from drivers.dump import open_dump
 from logger.demo import make
-from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
 from logger.roads import iso8608
@@ -22,7 +22,8 @@ from logger.vehicle import half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 SHIPPED = Path(make.__file__).parent / "drive.dump.gz"
-SHORT = DrivePlan(speed_knots=((0, 10), (10, 10), (20, 15), (30, 15)), stretches=(Stretch(100, 50), Stretch(1, 200)))
+SHORT = DrivePlan(speed_knots=((0, 10), (10, 10), (20, 15), (30, 15)),
+                  stretches=(RoadStretch(100, 50), RoadStretch(1, 200)))
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +150,7 @@ def test_body_moves_as_scipy_says() -> None:
 
 
 def test_road_has_the_roughness_of_its_stretches() -> None:
-    plan = replace(SHORT, speed_knots=((0, 20), (200, 20)), stretches=(Stretch(2000, 30), Stretch(1, 480)))
+    plan = replace(SHORT, speed_knots=((0, 20), (200, 20)), stretches=(RoadStretch(2000, 30), RoadStretch(1, 480)))
     drive = simulate_drive(plan, RAV4)
     smooth, rough = drive.road.iri([0, 2000, 4000])
     assert smooth == pytest.approx(iso8608.iri_from_gd_n0(30), rel=0.06)

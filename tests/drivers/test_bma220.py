@@ -191,7 +191,7 @@ def test_a_failed_toggle_is_not_read_again() -> None:
     assert len(wire.log) == 3
 
 
-# ---- errors told apart
+# ---- errors distinguished
 
 def failing(number: int) -> Wire:
     return Wire(RecordedBus(Bma220Chip()), dict.fromkeys(range(100), (number, False)))
@@ -218,7 +218,7 @@ def test_a_wrong_chip_is_named_with_its_id_and_place() -> None:
         driver(bus).start()
 
 
-def test_a_held_bus_is_told_at_once() -> None:
+def test_a_held_bus_is_reported_at_once() -> None:
     wire = failing(errno.ETIMEDOUT)
     with pytest.raises(Timeout):
         driver(wire).start()

@@ -42,7 +42,7 @@ def test_nothing_is_said_of_samples_that_come_as_they_are_taken(burst: int) -> N
 
 
 @pytest.mark.parametrize("burst", [25, 40])
-def test_bursts_that_do_no_harm_are_told_of_and_dated_in_time(burst: int) -> None:
+def test_bursts_that_do_no_harm_are_reported_and_dated_in_time(burst: int) -> None:
     samples, error_ms, age_s = dated(even(100), burst)
     assert samples.doubt("Look.") == ""
     assert "at a time" in samples.note and "nothing has to be done" in samples.note
@@ -59,7 +59,7 @@ def test_bursts_that_come_too_late_are_a_doubt_with_advice(burst: int) -> None:
     assert "three times a second" in samples.doubt("Look.")
 
 
-def test_a_clock_that_drifts_is_told_of_and_followed() -> None:
+def test_a_clock_that_drifts_is_reported_and_followed() -> None:
     rate_hz = 100 * (1 + 0.012 * np.linspace(0, 1, 6000))
     samples, error_ms, _ = dated(np.cumsum(1e6 / rate_hz), 5)
     assert samples.doubt("Look.") == ""
@@ -67,7 +67,7 @@ def test_a_clock_that_drifts_is_told_of_and_followed() -> None:
     assert error_ms < 1
 
 
-def test_another_rate_is_told_of_with_what_it_may_mean() -> None:
+def test_another_rate_is_reported_with_what_it_may_mean() -> None:
     samples, error_ms, _ = dated(even(147), 5)
     assert "147.0 samples a second where 100 are expected" in samples.note
     assert "lost on the way" in samples.note

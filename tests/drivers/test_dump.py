@@ -85,7 +85,7 @@ def test_read_back(tmp_path: Path, name: str) -> None:
     assert (path.read_bytes()[:2] == b"\x1f\x8b") == name.endswith(".gz")
 
 
-def test_compression_is_told_by_the_first_bytes(tmp_path: Path) -> None:
+def test_compression_is_recognised_by_the_first_bytes(tmp_path: Path) -> None:
     (tmp_path / "a.dump").write_bytes(gzip.compress((FIRST + LINES[0]).encode()))
     assert read(tmp_path / "a.dump") == (EVENTS[:1], False)
 

@@ -35,7 +35,7 @@ def ramp(fake: FakeIio) -> Callable[[int], np.ndarray]:
 
 def fake_in(folder: Path, buffered: bool = True, **tree: str | None) -> FakeIio:
     """A fake with other files; ``__`` in a name stands for a slash."""
-    fake = FakeIio(folder, Clock(), buffered)
+    fake = FakeIio(folder, Clock(), buffered=buffered)
     fake.tree |= {name.replace("__", "/"): text for name, text in tree.items()}
     fake.accel = ramp(fake)
     return fake

@@ -15,7 +15,7 @@ from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 
 
 class Clock:
-    """Time that passes only when told to, or slept."""
+    """Time that passes only when stepped, or slept."""
 
     def __init__(self, now_us: int = 0) -> None:
         self.now = now_us
@@ -219,7 +219,7 @@ def test_a_port_is_silent_or_short_on_cue_and_loses_nothing() -> None:
     assert [port.read(10, 0.1) for _ in range(6)] == [b"", b"", b"a", b"b", b"cdef", b""]
 
 
-def test_an_unplugged_port_has_gone_until_it_is_back_and_opened_anew() -> None:
+def test_an_unplugged_port_has_gone_until_it_is_back_and_opened_again() -> None:
     clock = Clock()
     port = RecordedPort([Cue(Fault.UNPLUG, at_us=10), Cue(Fault.REPLUG, at_us=20)], clock.now_us)
     port.load(b"before")

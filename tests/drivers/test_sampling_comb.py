@@ -1,4 +1,4 @@
-"""Ticks of an adapter's timer, told from the teeth of the samples themselves."""
+"""Ticks of an adapter's timer, distinguished from the teeth of the samples themselves."""
 
 from __future__ import annotations
 

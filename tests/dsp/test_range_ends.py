@@ -1,4 +1,4 @@
-"""Samples that stand at an end of the range, told from the crests of a ride."""
+"""Samples that stand at an end of the range, distinguished from the crests of a ride."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Repeated samples, told from coarse ones: how often falsely, and how often where there are some."""
+"""Repeated samples, distinguished from coarse ones: how often falsely, and how often where there are some."""
 
 from __future__ import annotations
 

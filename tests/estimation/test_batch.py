@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.estimation.batch import Windows, exact_iri, laid_anew, local_level, on_grid, score
+from logger.estimation.batch import Windows, exact_iri, local_level, monotonic_distance, on_grid, score
 from logger.estimation.sensor_noise import Sensor
 from logger.roads.iri import rectified_slope
 
@@ -49,7 +49,7 @@ def test_a_distance_that_jumps_is_laid_by_the_speed() -> None:
     speed = 10 + 3 * np.sin(t)
     true = 10 * t + 3 * (1 - np.cos(t))
     corrected = true + 0.4 * np.where(t.astype(int) % 2 == 0, 1, -1)
-    laid = laid_anew(corrected, 1.01 * speed, 100.0)
+    laid = monotonic_distance(corrected, 1.01 * speed, 100.0)
     assert (np.diff(laid) >= 0).all()
     assert laid[100:-100] == pytest.approx(true[100:-100], abs=0.02)
     assert np.abs(np.diff(laid)[100:-100] * 100 - speed[100:-101]).max() < 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from logger.estimation.error_bound import Limit, Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, Limit, pooled_r2
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.roads.gd_iri import iri_of_road
@@ -27,8 +27,8 @@ WINDOW_M = 7.62
 LEVELS = (1.0, 2.5, 7.0)
 
 
-def limits(sensor: Sensor, window_m: float = WINDOW_M) -> Limits:
-    return Limits(LinearCar(STRUCTURE, body_point(STRUCTURE)), sensor, window_m)
+def limits(sensor: Sensor, window_m: float = WINDOW_M) -> ErrorBound:
+    return ErrorBound(LinearCar(STRUCTURE, body_point(STRUCTURE)), sensor, window_m)
 
 
 def golden_car(n: np.ndarray) -> np.ndarray:
@@ -91,7 +91,7 @@ def test_how_much_windows_differ_is_what_the_road_s_own_relation_says(window_m: 
     assert limit.spread_m_per_km == pytest.approx(road.std, rel=0.01)
 
 
-def test_without_noise_nearly_all_is_told_and_with_much_nothing() -> None:
+def test_without_noise_nearly_all_is_reported_and_with_much_nothing() -> None:
     spectrum = RoadSpectrum.of_iri(3.0)
     r2 = [limits(Sensor(noise, 0.0)).at(8.0, spectrum).r2 for noise in (1e-4, 0.01, 0.1, 1.0, 1e4)]
     assert r2 == sorted(r2, reverse=True)

@@ -60,15 +60,16 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
         g = gain * there.psd(n) / now.psd(n)
         return float(-np.log1p(g).sum() - (power / (1 + g)).sum()) + log_prior(there, before)
 
-    told = gain / (1 + gain)
-    found = learnt(Belief(now), told * power / (1 + gain), told, n, 1.0, before)  # the most probable waves have this
+    resolved = gain / (1 + gain)
+    # The most probable waves have this power.
+    found = learnt(Belief(now), resolved * power / (1 + gain), resolved, n, 1.0, before)
     h = 1e-4
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
     ]) / (2 * h)
     tilt = -np.log(np.maximum(n, FLATTENED_BELOW_CPM) / PIVOT_CPM)
     rows = np.stack([np.ones(400), tilt])
-    expected = (rows * told**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+    expected = (rows * resolved**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
     if before is not None:
         expected += np.diag([0.3**-2, 0.1**-2])
     step = np.linalg.solve(expected, slope)
@@ -120,8 +121,8 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     weight = np.full(1024, NOISE_MPS2**-2)
     solution = block.solve(reading, weight, now, variance, 400)
     share = block.seen_points(weight > 0) / block.count
-    told = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
-    found = learnt(Belief(now), whitened(block, solution, variance), told, block.wave_number_cpm, share, None)
+    resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
+    found = learnt(Belief(now), whitened(block, solution, variance), resolved, block.wave_number_cpm, share, None)
     step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
     h = 0.02
     slope = np.array([
@@ -130,7 +131,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     seen = solution.gain > 0
     tilt = -np.log(np.maximum(block.wave_number_cpm[seen], FLATTENED_BELOW_CPM) / PIVOT_CPM)
     rows = np.stack([np.ones(seen.sum()), tilt])
-    curvature = (rows * share * told[seen] ** 2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+    curvature = (rows * share * resolved[seen] ** 2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
     exact = np.linalg.solve(curvature, slope)
     error = np.sqrt(np.diag(np.linalg.inv(curvature)))
     assert exact[0] > 2 * error[0]  # there is something to learn
@@ -156,9 +157,9 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
             for _ in range(8):
                 solution = block.solve(reading, weight, belief.spectrum, even, 8, waves)
                 waves = solution.waves
-                told = solution.gain / (1 + solution.gain)
+                resolved = solution.gain / (1 + solution.gain)
                 belief = learnt(
-                    belief, whitened(block, solution, even), told, block.wave_number_cpm, share, None
+                    belief, whitened(block, solution, even), resolved, block.wave_number_cpm, share, None
                 )
             scores.append((belief.spectrum.log_level - true.log_level) / belief.log_level_std)
             wavinesses.append(belief.spectrum.waviness - waviness)

@@ -7,10 +7,9 @@ from scipy.signal import sosfilt
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
 from logger.estimation.iri_posterior import (
     SlopeErrors,
-    acceleration_variance_left,
     raised,
-    reading_noise_psd,
     resolved_share,
+    steady_motion,
     unseen_share,
     window_iri,
 )
@@ -69,8 +68,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
     assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)
 
-    noise_psd = reading_noise_psd(deviation**2, RATE_HZ, speed_mps)
-    left = acceleration_variance_left(CAR, speed_mps, spectrum, noise_psd)
+    left = steady_motion(CAR, speed_mps, spectrum, RATE_HZ, 8192).remaining_variance(deviation**2)
     assert left == pytest.approx((accel - fitted).var(), rel=0.05)
 
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
@@ -89,7 +87,8 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
 
 
 def test_the_levels_error_moves_all_windows_alike() -> None:
-    """The shared part is the change of the estimate when level and told share change, times the level's error."""
+    """The shared part is the change of the estimate when level and the reported share change, times the level's
+    error."""
     spectrum = RoadSpectrum.of_iri(1.0)
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
     dull, louder = errors.at(5.0, spectrum, 0.3**2), errors.at(5.0, raised(spectrum), 0.3**2)
@@ -110,7 +109,7 @@ def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
     assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre
 
 
-def test_told_share_goes_from_nothing_to_all_with_the_noise() -> None:
+def test_reported_share_goes_from_nothing_to_all_with_the_noise() -> None:
     spectrum = RoadSpectrum.of_iri(2.0)
     seen = CAR.power(15.0) > 0
     shares = [resolved_share(CAR, 15.0, spectrum, noise_psd)[seen] for noise_psd in (1e12, 1e-3, 1e-30)]

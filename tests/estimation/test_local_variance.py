@@ -104,8 +104,8 @@ def test_one_round_is_mackays_with_the_exact_posterior(variance_of: Callable[[],
     reading = read(before, np.random.default_rng(1))
     posterior = np.linalg.inv(matrix.T @ (weights()[:, None] * matrix) + np.diag(1 / before))
     innovations = posterior @ (matrix.T @ (weights() * reading))
-    told = 1 - np.diag(posterior) / before
-    exact = (4 + near(block.count) @ (innovations**2 * seen)) / (4 + near(block.count) @ (told * seen))
+    reported = 1 - np.diag(posterior) / before
+    exact = (4 + near(block.count) @ (innovations**2 * seen)) / (4 + near(block.count) @ (reported * seen))
     expected = 0.6 * np.log(exact) + 0.4 * np.log(before)
 
     local = LocalRoughness(SPACING_M)
@@ -182,7 +182,7 @@ def test_readings_that_tell_nothing_teach_nothing() -> None:
 @pytest.mark.parametrize("variance", [
     np.ones(300), np.full(300, 3.7), 4.0 ** np.sin(np.arange(300) / 20), np.where(np.arange(300) == 150, 900.0, 0.3),
 ])
-def test_mean_told_is_the_mean_over_points(variance: np.ndarray) -> None:
+def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
     gain = np.geomspace(1e-4, 1e4, 41)
     direct = (variance[:, None] * gain / (1 + variance[:, None] * gain)).mean(axis=0)
     tolerance = 1e-12 if np.ptp(variance) == 0 else 2e-3

@@ -17,19 +17,19 @@ def test_nothing_is_said_of_a_sensor_that_is_well() -> None:
     assert fed(town()).complaints == ()
 
 
-def test_a_tilt_is_told() -> None:
+def test_a_tilt_is_reported() -> None:
     seen = drive("town", 600.0, Mounting(30.0, 14.0, 9.0), Receiver(), FINE, seed=2)
     (words,) = fed(seen).complaints
     assert "tilted by 1" in words
 
 
-def test_an_axis_that_was_named_wrongly_is_told() -> None:
+def test_an_axis_that_was_named_wrongly_is_reported() -> None:
     (words,) = fed(town(), 0, -1.0).complaints
     assert words.startswith("gravity is felt along +z, not along -x")
 
 
 @pytest.mark.parametrize(("loose_deg", "words"), [((0.0, 12.0), "tilted by 1"), ((50.0, 0.0), "turned by")])
-def test_a_sensor_that_came_loose_is_told(loose_deg: tuple[float, float], words: str) -> None:
+def test_a_sensor_that_came_loose_is_reported(loose_deg: tuple[float, float], words: str) -> None:
     seen = drive("town", 1800.0, Mounting(30.0, loose_at_s=700.0, loose_deg=loose_deg), Receiver(), FINE, seed=3)
     alignment = fed(seen)
     assert words in alignment.moved

@@ -10,8 +10,9 @@ from scipy.stats import norm
 
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, residual_evidence
-from logger.estimation.quantisation import bounds, cavity, first_guess, improved, without_own
+from logger.estimation.quantisation import bounds, cavity, even_variance, first_guess, improved, without_own
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.streaming import RoadEstimator
 from logger.profiles.track import Track
 from logger.roads import iso8608
@@ -107,35 +108,45 @@ def test_nothing_read_says_nothing() -> None:
     assert interval_evidence(none, none, none, none, np.log([0.1, 0.2])) == pytest.approx([0.0, 0.0])
 
 
+def smooth_motion(count: int) -> SteadyMotion:
+    """White up to a tenth of the rate of 1 Hz, then it falls."""
+    f_hz = np.fft.rfftfreq(count)
+    psd = 1 / (1 + (f_hz / 0.1) ** 4)
+    return SteadyMotion(0.6 * psd / psd.mean(), 1.0)
+
+
 def test_even_readings_leave_what_algebra_says() -> None:
-    others, even = cavity(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
-    assert even == pytest.approx(np.full(256, 0.02))
+    motion = SteadyMotion(np.full(129, 0.08), 1.0)
+    variance = np.geomspace(0.01, 0.5, 256)
+    others = cavity(motion, variance)
     assert others == pytest.approx(np.full(256, 0.04), rel=0.01)
+    assert even_variance(motion, others, np.full(256, 0.02)) == pytest.approx(0.02)
 
 
-def test_uneven_readings_leave_what_dense_algebra_says() -> None:
-    """A process that is known to be smooth, read well here and badly there; the mean of what is left of it."""
+@pytest.mark.parametrize("clustered", [0.0, 8.0])
+def test_uneven_readings_leave_what_dense_algebra_says(clustered: float) -> None:
+    """A process that is known to be smooth, read well here and badly there, one by one or for some time."""
     rng = np.random.default_rng(3)
-    count = 400
-    f = np.fft.rfftfreq(count)
-    power = 1 / (1 + (f / 0.1) ** 4)
-    power *= 0.3 * count / (2 * power.sum())
+    count = 800
+    motion = smooth_motion(count)
     lag = np.abs(np.arange(count)[:, None] - np.arange(count))
-    prior = np.fft.irfft(power, count)[np.minimum(lag, count - lag)] + 1e-12 * np.eye(count)
-    variance = np.exp(rng.normal(np.log(0.1), 1.5, count))
-
-    def left(even: float) -> float:
-        ends = np.full(len(f), 2.0)
-        ends[[0, -1]] = 1.0
-        return float(ends @ (power * even / (power + even))) / count
+    covariance = np.fft.irfft(motion.psd) * motion.rate_hz / 2
+    prior = covariance[np.minimum(lag, count - lag)] + 1e-12 * np.eye(count)
+    walk = np.exp(-0.5 * (lag / clustered) ** 2) @ rng.normal(size=count) if clustered else rng.normal(size=count)
+    variance = 0.1 * np.exp(1.5 * walk / walk.std())
 
     inverse = np.linalg.inv(prior + np.diag(variance))
     exact = 1 / np.diag(inverse) - variance
-    found, even = cavity(left, variance)
-    assert 1 / np.mean(1 / even) > 1 / np.mean(1 / variance)
-    assert found.mean() == pytest.approx(exact.mean(), rel=0.15)
-    by_mean_precision = 1 / (1 / left(1 / np.mean(1 / variance)) - np.mean(1 / variance))
-    assert by_mean_precision < 0.8 * exact.mean()  # what the mean of the precisions would say
+    found = cavity(motion, variance)
+    assert np.log(found / exact).mean() == pytest.approx(0.0, abs=0.1)
+    assert np.log(found / exact).std() < 0.6 * np.log(exact).std()
+    by_mean_precision = 1 / motion.remaining_variance(1 / np.mean(1 / variance))
+    assert by_mean_precision > 1.1 * np.mean(1 / exact + 1 / variance)
+
+    freedom = np.trace(prior @ inverse) / count
+    even = even_variance(motion, found, variance)
+    assert motion.resolved_per_reading(even) == pytest.approx(freedom, rel=0.06)
+    assert motion.resolved_per_reading(1 / np.mean(1 / variance)) > 1.15 * freedom
 
 
 # --- what is believed ---

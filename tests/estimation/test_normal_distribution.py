@@ -115,7 +115,7 @@ def covariance_of_absolutes(means: np.ndarray, deviations: np.ndarray, correlati
 @pytest.mark.parametrize("correlation", [-0.6, -0.2, 0.0, 0.3, 0.7, 0.95])
 @pytest.mark.parametrize("means", [(0.0, 0.0), (1.0, 1.2), (0.5, -0.8), (3.0, 0.2), (4.0, 5.0)])
 def test_variance_of_a_weighted_pair(correlation: float, means: tuple[float, float]) -> None:
-    """Orders above the second are not told apart: a few per cent, or more where means of unlike sign go together."""
+    """Orders above the second are not distinguished: a few per cent, or more where means of unlike sign go together."""
     mean, deviation, weight = np.array(means), np.array([1.0, 1.4]), np.array([0.6, 0.4])
     variances = mean**2 + deviation**2 - mean_absolute(mean, deviation) ** 2
     exact = weight**2 @ variances + 2 * weight.prod() * covariance_of_absolutes(mean, deviation, correlation)

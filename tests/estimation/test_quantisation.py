@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.quantisation import Readings, bounds, first_guess, improved, unexplained
+from logger.estimation.quantisation import GaussianReadings, bounds, first_guess, improved, unexplained
 from logger.estimation.sensor_noise import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
@@ -117,7 +117,7 @@ def test_a_solution_far_from_the_readings_stays_finite(off: float) -> None:
 def test_the_first_guess_leaves_the_readings_as_they_are() -> None:
     reading = np.array([1.0, 2.0])
     guess = first_guess(reading, COARSE)
-    assert isinstance(guess, Readings)
+    assert isinstance(guess, GaussianReadings)
     assert guess.value_mps2.tolist() == [1.0, 2.0] and guess.value_mps2 is not reading
     assert guess.variance == pytest.approx(0.1**2 + 0.6**2 / 12)
 

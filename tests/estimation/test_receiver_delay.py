@@ -37,7 +37,7 @@ def test_the_delay_and_forward_are_found_at_every_angle(yaw_deg: float, delay_s:
     assert found.gain == pytest.approx(1.0, abs=0.15)  # the body pitches when the car brakes
 
 
-def test_fixes_that_are_later_are_told_to_be_later() -> None:
+def test_fixes_that_are_later_are_reported_to_be_later() -> None:
     seen = town()
     first, later = (fed(each).estimate() for each in (seen, replace(seen, fix_time_s=seen.fix_time_s + 0.07)))
     assert first.delay_s is not None

@@ -12,7 +12,7 @@ from logger.comfort.uncertain_ride import RideFigures
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD
-from logger.estimation.ride_posterior import Place, RidePosterior
+from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.shipped import vehicle_file
@@ -108,7 +108,7 @@ def test_splitting_the_readings_changes_nothing(coarse: list[WindowEstimate]) ->
     assert [one.ride for one in other] == [one.ride for one in coarse]
 
 
-def test_a_ride_far_below_a_step_is_not_told() -> None:
+def test_a_ride_far_below_a_step_is_not_reported() -> None:
     found = later(estimates(1.0, Sensor(0.05, 4 * STEP_MPS2)))
     assert all(isnan(one.ride.a_w.value) for one in found)
 
@@ -121,7 +121,7 @@ def test_an_unsure_noise_widens_the_errors_and_moves_nothing() -> None:
     inside[1000:1060] = True
 
     def figures(noise_log_std: float) -> RideFigures:
-        place = Place(SPEED_MPS, 0.03, COMMON_ROAD, 0.1, Sensor(NOISE_MPS2, STEP_MPS2), noise_log_std)
+        place = RidePlace(SPEED_MPS, 0.03, COMMON_ROAD, 0.1, Sensor(NOISE_MPS2, STEP_MPS2), noise_log_std)
         sums = posterior.sums(weighted, inside, np.zeros(2048, dtype=np.bool_), place)
         assert sums is not None
         return sums.figures(0.01)

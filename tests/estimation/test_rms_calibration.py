@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.estimation.rms_calibration import SPEEDS_MPS, Settings, SpeedCalibration, calibrate, fit, loaded
+from logger.estimation.rms_calibration import SPEEDS_MPS, CalibrationSettings, SpeedCalibration, calibrate, fit, loaded
 from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
 from logger.roads.gd_iri import iri_per_root_gd
@@ -50,7 +50,8 @@ def test_it_agrees_with_the_computed_relation_within_its_standard_error(vehicle:
 
 
 def test_the_standard_error_is_that_of_other_roads() -> None:
-    runs = [calibrate(known_vehicle(RAV4), None, Settings((15.0,), roads=16, seed=seed))[0] for seed in range(60)]
+    runs = [calibrate(known_vehicle(RAV4), None, CalibrationSettings((15.0,), roads=16, seed=seed))[0]
+            for seed in range(60)]
     for name in ("iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri"):
         lines = [getattr(run, name) for run in runs]
         scatter = np.std([line.slope for line in lines])
@@ -61,7 +62,7 @@ def test_the_standard_error_is_that_of_other_roads() -> None:
 @pytest.mark.parametrize("speed_mps", [4.5, 17.9, 31.3])
 def test_lines_and_spread_agree_with_drives_in_the_time_domain(speed_mps: float) -> None:
     """scipy's simulation, the exact IRI of the profile and the weighting of a record, over 16 km of another road."""
-    found = calibrate(known_vehicle(RAV4), None, Settings((speed_mps,)))[0]
+    found = calibrate(known_vehicle(RAV4), None, CalibrationSettings((speed_mps,)))[0]
     elevation = iso8608.generate(100.0, 16_000, SPACING_M, 77)
     accel = drive(elevation, speed_mps)
     weighted = WEIGHTING.weigh(accel, speed_mps / SPACING_M)
@@ -95,14 +96,14 @@ def drive(elevation_m: np.ndarray, speed_mps: float) -> np.ndarray:
 
 def test_one_road_scatters_as_long_and_short_stretches_do() -> None:
     """Scatter falls with the root of the length, as independent pieces do once they are long."""
-    short = calibrate(known_vehicle(RAV4), None, Settings((17.9,), window_m=50.0))[0].window_iri_per_accel_rms
-    long = calibrate(known_vehicle(RAV4), None, Settings((17.9,), window_m=200.0))[0].window_iri_per_accel_rms
+    short, long = (calibrate(known_vehicle(RAV4), None, CalibrationSettings((17.9,), window_m=window_m))[0]
+                   .window_iri_per_accel_rms for window_m in (50.0, 200.0))
     assert short.spread / long.spread == pytest.approx(2, rel=0.2)
     assert short.r2 < long.r2 < 1
 
 
 def test_a_recorder_that_hears_half_doubles_the_iri_per_rms() -> None:
-    settings = Settings((10.0, 20.0), roads=8)
+    settings = CalibrationSettings((10.0, 20.0), roads=8)
     heard = calibrate(known_vehicle(RAV4), None, settings)
     half = calibrate(known_vehicle(RAV4), lambda f_hz: np.full(f_hz.shape, 0.5), settings)
     for one, other in zip(heard, half, strict=True):
@@ -115,7 +116,7 @@ def test_a_recorder_that_hears_half_doubles_the_iri_per_rms() -> None:
 def test_mass_calms_the_body_at_every_speed() -> None:
     """What the dissertation reads off Fig 6.7 and 6.8; and rougher roads shake more at higher speed (Fig 6.4)."""
     empty, people, double = (
-        calibrate(known_vehicle(vehicle), None, Settings(roads=30))
+        calibrate(known_vehicle(vehicle), None, CalibrationSettings(roads=30))
         for vehicle in (RAV4, loaded(RAV4, passengers=2), loaded(RAV4, sprung_mass_factor=2.0)))
 
     def responses(car: tuple[SpeedCalibration, ...]) -> np.ndarray:
@@ -155,4 +156,4 @@ def test_a_line_by_hand() -> None:
 @pytest.mark.parametrize("window_m", [0.0, 1.99, 200.1, float("nan"), float("inf")])
 def test_windows_that_are_no_use(window_m: float) -> None:
     with pytest.raises(ValueError, match="2 to 200 m"):
-        Settings(window_m=window_m)
+        CalibrationSettings(window_m=window_m)

@@ -17,13 +17,13 @@ FAST = 30.0
 
 
 def cut(
-    road: Callable[[np.ndarray], np.ndarray], numbers: range, told: tuple[float, float] = (1.0, 50.0)
+    road: Callable[[np.ndarray], np.ndarray], numbers: range, reported: tuple[float, float] = (1.0, 50.0)
 ) -> list[RoadPiece]:
     """Pieces of a road, each at a height of its own."""
     rng = np.random.default_rng(4)
     return [
         RoadPiece(number * PIECE_M, SPACING_M,
-                  road(number * PIECE_M + SPACING_M * np.arange(POINTS + 1)) + rng.uniform(-9, 9), *told)
+                  road(number * PIECE_M + SPACING_M * np.arange(POINTS + 1)) + rng.uniform(-9, 9), *reported)
         for number in numbers
     ]
 
@@ -76,7 +76,7 @@ def test_a_missing_piece_begins_another_part_and_short_parts_are_left_out() -> N
     assert profile.left_out_m == pytest.approx(3 * PIECE_M)
 
 
-def test_the_range_is_told_over_most_of_the_way() -> None:
+def test_the_range_is_reported_over_most_of_the_way() -> None:
     road = wave(10.0)
     pieces = cut(road, range(70), (0.5, 30.0)) + cut(road, range(70, 100), (0.8, 20.0))
     profile = road_profile(pieces, at(FAST, pieces))
@@ -94,7 +94,7 @@ def test_slow_waves_are_drift_and_very_long_ones_no_road() -> None:
     assert (slow.longest_m, fast.longest_m) == (pytest.approx(32.0), pytest.approx(100.0))
 
 
-def test_no_profile_where_too_little_is_told() -> None:
+def test_no_profile_where_too_little_is_reported() -> None:
     nothing = cut(wave(10.0), range(40), (float("nan"), float("nan")))
     assert road_profile([], np.empty(0)) is None
     assert road_profile(nothing, at(FAST, nothing)) is None

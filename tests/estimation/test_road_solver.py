@@ -147,7 +147,7 @@ def test_the_solution_is_that_of_dense_algebra_with_drift(
     assert found.road == pytest.approx(found.waves * block.wave_factors(ROAD))
 
 
-def test_more_steps_get_nearer_and_going_on_is_no_start_anew() -> None:
+def test_more_steps_get_nearer_and_going_on_is_no_restart() -> None:
     """In the Golden Car's slope on the whole block, against the settled solution."""
     block, _, reading, weight = small_problem()
     exact = block.solve(reading, weight, ROAD, even(block), 200)

@@ -371,4 +371,4 @@ def test_pieces_of_road_join_and_have_the_roads_shape() -> None:
         exact = np.interp(place, 0.05 * np.arange(len(road)) - LEAD_M, road)
         bent = [row - np.polyval(np.polyfit(place, row, 2), place) for row in (exact, piece.elevation_m)]
         correlations.append(np.corrcoef(*bent)[0, 1])
-    assert np.median(correlations) > 0.85  # what is told by less than a half is missing
+    assert np.median(correlations) > 0.85  # what is resolved by less than a half is missing

@@ -94,3 +94,16 @@ def test_a_drive_without_a_distance_has_no_sections(tmp_path: Path, capsys: pyte
         object.__setattr__(row, "distance_end_m", None)
     assert main(["sections", str(write(tmp_path / "logs", rows))]) == 0
     assert "no sections" in capsys.readouterr().out
+
+
+def test_localized_roughness_slides_along_each_drive(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sections", str(logs), "--localized", "2", "--json"]) == 0
+    drives = json.loads(capsys.readouterr().out)["drives"]
+    found = [area for drive in drives for area in drive["localized"]]
+    assert found
+    assert all(one["worst_m_per_km"] > 2 and one["distance_end_m"] >= one["distance_start_m"] for one in found)
+    worst = max(section["worst_m_per_km"] or 0 for drive in drives for section in drive["sections"])
+    assert max(one["worst_m_per_km"] for one in found) == pytest.approx(worst)
+    assert main(["sections", str(logs), "--localized", "900"]) == 0
+    assert "nowhere is the IRI over 25 ft above 900 m/km" in capsys.readouterr().out
+    assert main(["sections", str(logs), "--localized", "0"]) == 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.along_track import Motion, Observations, motion_of, place_std_m
+from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m
 
 NOISE_MPS = 0.08
 
@@ -68,11 +68,11 @@ def test_places_pin_the_distance_down() -> None:
 
 
 def test_the_banded_solution_is_the_dense_one() -> None:
-    """The same posterior by a dense system written out anew."""
+    """The same posterior by a dense system written out."""
     time_s = np.array([0.0, 1.0, 1.5, 3.0, 4.2])
     speeds = Observations(time_s, np.array([1.0, 2.0, 2.2, 3.0, 2.5]), np.ones(5))
     places = Observations(np.array([0.0, 3.0]), np.array([0.0, 6.0]), np.array([0.01, 0.5]))
-    like = Motion(time_s, np.zeros((5, 3)), 0.3, 0.2)
+    like = TrackMotion(time_s, np.zeros((5, 3)), 0.3, 0.2)
     rows, values, weights = [], [], []
 
     def add(row: np.ndarray, value: float, deviation: float) -> None:

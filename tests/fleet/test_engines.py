@@ -15,7 +15,7 @@ from logger.errors import BadInput
 
 from ..support.drives.fleet_town import drives, town, write_logs
 
-NO_SPARK = "needs PySpark (pip install 'ibis-framework[pyspark]') and Java 17, and one of them is not here"
+NO_SPARK = "needs the 'spark' extra and Java 17, and one of them is not here"
 HAS_SPARK = importlib.util.find_spec("pyspark") is not None and shutil.which("java") is not None
 
 
@@ -35,7 +35,7 @@ def test_spark_gives_the_same_figures(dataset: Path) -> None:
     ours, theirs = (fleet_summarise(dataset, by="section", since="2024-03-01", engine=one).found
                     for one in ("duckdb", "spark local-cluster[2,1,1024]"))
     assert (ours.windows, ours.withheld, ours.cars.tolist()) == (theirs.windows, theirs.withheld, theirs.cars.tolist())
-    for name in ("gain", "log_std", "growth_per_year", "pass_std"):
+    for name in ("gain", "log_std", "growth_per_year", "pass_std", "session_std"):
         assert np.allclose(getattr(ours.biases, name), getattr(theirs.biases, name), rtol=1e-9)
     for name in ("iri_m_per_km", "iri_std_m_per_km", "trend_m_per_km_per_year", "trend_std_m_per_km_per_year",
                  "a_w_mps2", "lat_deg", "passes"):
@@ -45,5 +45,5 @@ def test_spark_gives_the_same_figures(dataset: Path) -> None:
 
 @pytest.mark.skipif(HAS_SPARK, reason="PySpark is here")
 def test_spark_that_is_missing_is_asked_for(dataset: Path) -> None:
-    with pytest.raises(BadInput, match="--engine spark: expected PySpark: pip install"):
+    with pytest.raises(BadInput, match="--engine spark: expected the 'spark' extra: pip install"):
         fleet_summarise(dataset, engine="spark local[2]")

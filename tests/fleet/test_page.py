@@ -75,6 +75,7 @@ def test_the_map_loads_its_tiles_from_the_folder_and_answers(report: Path) -> No
             for (let i = 0; i < pixels.length; i += 4) seen.add(pixels[i] << 16 | pixels[i + 1] << 8 | pixels[i + 2]);
             return seen.size; }""")
         assert colours > 20
+        assert "poor, above 2.68 m/km" in tab.inner_text(".legend")
     assert not [one for one in complaints if not one.startswith(f"request: {report.as_uri()}/tiles/")]
 
 
@@ -92,6 +93,7 @@ def test_segments_of_few_cars_are_withheld(dataset: Path, tmp_path: Path, capsys
         assert main(["fleet", "summarise", str(dataset), "--json", "--min-cars", str(least)]) == 0
         found = json.loads(capsys.readouterr().out)
         cars[least] = [one["cars"] for one in found["roads"]]
+        assert all(one["last_utc"].endswith("T00:00:00.000Z") for one in found["roads"])
         assert found["withheld_segments"] == len(cars[1]) - len(cars[least])
     assert min(cars[1]) < 3 <= min(cars[3])
     with pytest.raises(BadInput, match="expected a segment that 100 cars have driven, found none"):

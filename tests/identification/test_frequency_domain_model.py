@@ -87,10 +87,10 @@ def test_a_road_has_the_spectrum_that_the_car_gives_it() -> None:
     segments = model.measured[0][: 512 * 58].reshape(58, 512) * np.hanning(512)
     welch = (np.abs(np.fft.rfft(segments)) ** 2).mean(axis=0) * 2 / (100 * (np.hanning(512) ** 2).sum())
     f_hz = np.arange(257) * 100 / 512
-    told = 64.0 * model.road_spectra(np.empty(0), f_hz)[0]
+    reported = 64.0 * model.road_spectra(np.empty(0), f_hz)[0]
     for low_hz, high_hz in ((0.8, 2), (2, 4), (4, 9), (9, 20), (20, 30)):
         band = (f_hz >= low_hz) & (f_hz < high_hz)
-        assert welch[band].sum() == pytest.approx(told[band].sum(), rel=0.12)
+        assert welch[band].sum() == pytest.approx(reported[band].sum(), rel=0.12)
 
 
 def test_records_that_are_none() -> None:

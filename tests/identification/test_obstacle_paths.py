@@ -38,17 +38,18 @@ def test_against_quadrature(one: Obstacle, patch_m: float) -> None:
     places = np.array([one.start_m - 1, one.start_m - 0.1, one.start_m + 0.02, one.start_m + 0.11, 5.0, 5.2, 7.0])
     elevation, mean = path.step_means(places)
     assert elevation == pytest.approx([averaged(x) for x in places], abs=1e-9)
-    for low, high, told in zip(places[:-1], places[1:], mean, strict=True):
+    for low, high, reported in zip(places[:-1], places[1:], mean, strict=True):
         x = np.linspace(low, high, 2001)
-        assert told == pytest.approx(np.trapezoid([averaged(one) for one in x[::20]], x[::20]) / (high - low), abs=4e-4)
+        assert reported == pytest.approx(np.trapezoid([averaged(one) for one in x[::20]], x[::20]) / (high - low),
+        abs=4e-4)
 
 
 @pytest.mark.parametrize("one", OBSTACLES)
 def test_against_a_dense_profile(one: Obstacle) -> None:
     place = np.arange(-5.0, 12.0, 0.0005)
     dense = Track(0.0005, np.array([height(one, x) for x in place]), place[0]).tire_paths(0.25)[0]
-    for told, expected in zip(one.path(0.25).step_means(WAY), dense.step_means(WAY), strict=True):
-        assert told == pytest.approx(expected, abs=3e-4 * abs(one.height_m) / 0.25)
+    for reported, expected in zip(one.path(0.25).step_means(WAY), dense.step_means(WAY), strict=True):
+        assert reported == pytest.approx(expected, abs=3e-4 * abs(one.height_m) / 0.25)
 
 
 @given(st.floats(-3, 6), st.floats(0.01, 0.3), st.floats(0.3, 5), st.floats(0.01, 0.4))
@@ -60,9 +61,9 @@ def test_slopes_are_those_of_the_path(start_m: float, height_m: float, width_m: 
             step = 1e-5 * (np.arange(len(numbers)) == index)
             ends: list[ObstaclePath] = [kind(*(numbers + sign * step)).path(patch_m) for sign in (-1, 1)]
             pairs = zip(slopes[name].step_means(WAY), ends[1].step_means(WAY), ends[0].step_means(WAY), strict=True)
-            for told, high, low in pairs:
+            for reported, high, low in pairs:
                 difference = (high - low) / 2e-5
-                edge = np.abs(told - difference) > 1e-3 * max(1.0, np.abs(difference).max())
+                edge = np.abs(reported - difference) > 1e-3 * max(1.0, np.abs(difference).max())
                 assert edge.mean() < 0.01
 
 

@@ -84,7 +84,7 @@ def test_errors_are_those_of_the_formats() -> None:
     assert normalised_rms([np.ones(4), np.zeros(2)], [np.ones(4), np.ones(2)]) == pytest.approx(np.sqrt(2 / 3))
 
 
-def test_bounds_hold_and_are_told() -> None:
+def test_bounds_hold_and_are_reported() -> None:
     model = VehicleModel(CAR, [free(CAR, MASS, 600, (500, 700)), free(CAR, RATE)], [BUMP])
     found = fit(model, model.measured)
     assert found.parameters[MASS] == pytest.approx(700)

@@ -72,7 +72,7 @@ def test_one_drive_has_nothing_in_common() -> None:
 
 @pytest.mark.slow
 def test_errors_of_passes_over_one_bump_are_as_large_as_they_are_said_to_be() -> None:
-    told = [fitted((4.5, 4.5), (seed, seed))[1].fit for seed in range(1, 11)]
-    errors = np.array([one.parameters[MASS] / 875 - 1 for one in told])
-    expected = np.array([one.standard_errors[MASS] / 875 for one in told])
+    reported = [fitted((4.5, 4.5), (seed, seed))[1].fit for seed in range(1, 11)]
+    errors = np.array([one.parameters[MASS] / 875 - 1 for one in reported])
+    expected = np.array([one.standard_errors[MASS] / 875 for one in reported])
     assert 0.6 < np.sqrt((errors**2).mean()) / expected.mean() < 1.5

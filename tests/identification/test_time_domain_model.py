@@ -134,7 +134,7 @@ def test_several_effects_at_once() -> None:
     assert np.abs(off(found([run], there, starts), truth)).max() < 3.0
 
 
-def test_a_load_and_the_mass_can_be_told_only_together() -> None:
+def test_a_load_and_the_mass_can_be_estimated_only_together() -> None:
     load = effect("payload", mass_kg=50.0)
     run = recorded(road_record(CAR, 12.0, 14.0, 3), [load])
     with pytest.raises(NotIdentifiable) as refused:

@@ -73,11 +73,11 @@ def found(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **star
 def test_predictions_are_those_of_the_simulation() -> None:
     record = on_flat_road(HALF)
     clean = bump_record(HALF, noise_mps2=0.0).measured_mps2
-    told = model(HALF, [record], RoadInput(bump=Bump(2.0, 0.15, 2.6))).predict(np.empty(0))[0]
-    assert np.sqrt(np.mean((told - clean) ** 2)) < 2e-3 * np.sqrt(np.mean(clean**2))
+    reported = model(HALF, [record], RoadInput(bump=Bump(2.0, 0.15, 2.6))).predict(np.empty(0))[0]
+    assert np.sqrt(np.mean((reported - clean) ** 2)) < 2e-3 * np.sqrt(np.mean(clean**2))
     late = model(HALF, [replace(record, distance_m=1.05 * record.distance_m)],
                  RoadInput(bump=Bump(2.0, 0.15, 2.6), speed_scale=1.05)).predict(np.empty(0))[0]
-    assert late == pytest.approx(told, abs=1e-9)
+    assert late == pytest.approx(reported, abs=1e-9)
 
 
 @pytest.mark.parametrize("car", [HALF, QUARTER], ids=["half", "quarter"])

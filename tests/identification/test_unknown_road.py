@@ -60,8 +60,8 @@ def test_readings_are_those_of_the_simulation(car: Vehicle) -> None:
     elevation = np.interp(place, road.start_m + SPACING_M * np.arange(len(road.elevation_m)), road.elevation_m)
     waves = np.ones(len(grid.wave_number_cpm), complex)
     gains = model.responses(np.array([free(car, MASS).start]), crossing.f_hz)[0]
-    told = crossing.readings(crossing.under_axles(elevation[None], waves), gains)[0]
-    assert np.sqrt(np.mean((told - clean + clean.mean()) ** 2)) < 0.02 * np.sqrt(np.mean(clean**2))
+    reported = crossing.readings(crossing.under_axles(elevation[None], waves), gains)[0]
+    assert np.sqrt(np.mean((reported - clean + clean.mean()) ** 2)) < 0.02 * np.sqrt(np.mean(clean**2))
 
 
 def test_the_way_back_is_the_transposed_way() -> None:

@@ -75,25 +75,25 @@ def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Compar
     residual = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
                            zip(residuals.runs, residuals.predictions, strict=True)])
     measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])
-    told = as_json(lacking)
-    assert told["error"] == pytest.approx(np.sqrt(np.mean(residual**2) / np.mean(measured**2)))
-    assert sum(run["samples"] for run in told["runs"]) == len(residual)
+    reported = as_json(lacking)
+    assert reported["error"] == pytest.approx(np.sqrt(np.mean(residual**2) / np.mean(measured**2)))
+    assert sum(run["samples"] for run in reported["runs"]) == len(residual)
 
 
 def test_json_has_what_the_format_names(lacking: Comparison) -> None:
-    told = json.loads(json.dumps(as_json(lacking), allow_nan=False))
-    assert {"error", "runs", "where", "evidence", "refitted", "marks"} <= told.keys()
-    assert {"run", "error", "samples"} <= told["runs"][0].keys()
-    where = told["where"]
+    reported = json.loads(json.dumps(as_json(lacking), allow_nan=False))
+    assert {"error", "runs", "where", "evidence", "refitted", "marks"} <= reported.keys()
+    assert {"run", "error", "samples"} <= reported["runs"][0].keys()
+    where = reported["where"]
     assert {"from_hz", "to_hz", "error_power_share"} <= where["frequency"][0].keys()
     assert {"from_m", "to_m", "error", "run"} <= where["place"][0].keys()
     for parts in where.values():
         assert sum(part["error_power_share"] for part in parts) == pytest.approx(1.0)
     shares = [part["error_power_share"] for part in where["place"]]
     assert shares == sorted(shares, reverse=True)
-    assert all(isinstance(sentence, str) and sentence.endswith(".") for sentence in told["evidence"])
-    assert told["refitted"]["error"] == lacking.refitted.error
-    assert told["refitted"]["moves"].keys() >= {"sprung_mass_kg"}
+    assert all(isinstance(sentence, str) and sentence.endswith(".") for sentence in reported["evidence"])
+    assert reported["refitted"]["error"] == lacking.refitted.error
+    assert reported["refitted"]["moves"].keys() >= {"sprung_mass_kg"}
 
 
 def test_one_short_run() -> None:

@@ -102,7 +102,7 @@ def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
     assert after == pytest.approx(offset.noise_floor_error, rel=0.06)
 
 
-def test_all_others_are_told_of_the_least_probable_by_chance_first(offset: Diagnosis) -> None:
+def test_all_others_are_named_the_least_probable_by_chance_first(offset: Diagnosis) -> None:
     _, *others = offset.candidates
     assert {one.effect.name for one in others} == {*FEW} - {"sensor_offset"}
     assert [one.p_value for one in others] == sorted(one.p_value for one in others)
@@ -157,15 +157,15 @@ def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: Simula
     assert offset.not_tried == {"roll": why} and "roll" in offset.catalogue
 
 
-def test_effects_that_the_runs_would_hide_are_told_of(flawless: SimulatedRuns) -> None:
+def test_effects_that_the_runs_would_hide_are_reported(flawless: SimulatedRuns) -> None:
     found = diagnosed(flawless, (*FEW, "wheel_lift"))
     hidden_ones = {one.effect.name: one.deviations for one in found.undetectable}
     assert hidden_ones["wheel_lift"] < 0.1 and "sensor_offset" not in hidden_ones
     assert not {*hidden_ones} & {*found.verdict}
 
 
-def test_progress_is_told(flawless: SimulatedRuns) -> None:
-    told: list[str] = []
-    diagnose(posterior_of(flawless), {"sensor_gain": EFFECTS["sensor_gain"]}, progress=told.append)
-    assert told[0] == "refitting the car's own numbers" and "round 1" in told
-    assert told[-1] == "what these runs could not show"
+def test_progress_is_reported(flawless: SimulatedRuns) -> None:
+    reported: list[str] = []
+    diagnose(posterior_of(flawless), {"sensor_gain": EFFECTS["sensor_gain"]}, progress=reported.append)
+    assert reported[0] == "refitting the car's own numbers" and "round 1" in reported
+    assert reported[-1] == "what these runs could not show"

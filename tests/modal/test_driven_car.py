@@ -46,15 +46,15 @@ def found(name: str, run: Run):
 def test_each_mode_is_one_of_the_cars_own(name: str, seed: int, speed_mps: float, iso_class: str, least: int) -> None:
     run, true = drive(name, seed, speed_mps, iso_class)
     own = [(one.frequency_hz, one.damping_ratio) for one in modes(structure_of(true))]
-    told = found(name, run).modes
-    assert len(told) >= least
-    for one in told:
+    reported = found(name, run).modes
+    assert len(reported) >= least
+    for one in reported:
         assert one.damping_ratio > 0
         assert min(max(abs(hz - one.frequency_hz) / one.frequency_std_hz,
                        abs(ratio - one.damping_ratio) / one.damping_std) for hz, ratio in own) < SURE
 
 
-def test_the_pitch_of_a_sensor_amid_an_even_car_is_not_told() -> None:
+def test_the_pitch_of_a_sensor_amid_an_even_car_is_not_reported() -> None:
     model = read_vehicle("rav4-2009")
     run = simulate(model, random_road(iso_class="B", length_m=900.0, seed=4), 15.0, noise_mps2=0.02)
     result = found("rav4-2009", run)

@@ -34,11 +34,11 @@ FOUND = AddedEffects(
     errors=NumberErrors({"sprung_mass_kg": 7.5}))
 
 
-def test_the_errors_are_told_from_the_file_as_it_was_to_the_noise() -> None:
-    told = errors(FOUND)
-    assert [error for _, error, _ in told] == [0.47, 0.43, 0.153, 0.154, 0.15]
-    assert [which for which, _, _ in told] == ["before", "", "after", "", "of noise"]
-    assert "with dry_friction, all refitted" in told[2][2]
+def test_the_errors_are_distinguished_from_the_file_as_it_was_to_the_noise() -> None:
+    reported = errors(FOUND)
+    assert [error for _, error, _ in reported] == [0.47, 0.43, 0.153, 0.154, 0.15]
+    assert [which for which, _, _ in reported] == ["before", "", "after", "", "of noise"]
+    assert "with dry_friction, all refitted" in reported[2][2]
     both = errors(replace(FOUND, names=("dry_friction", "sensor_gain")))
     assert "with dry_friction and sensor_gain" in both[2][2]
 
@@ -52,7 +52,7 @@ def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
 def test_what_is_removed_is_said_before_the_effect() -> None:
     drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
     found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
-    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2): it is no part of the car")
+    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). That has nothing to do")
     assert as_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
@@ -62,7 +62,7 @@ def test_an_effect_that_does_not_help_is_warned_of() -> None:
         "no reason to keep it.")
 
 
-def test_an_effect_without_numbers_is_told_in_words() -> None:
+def test_an_effect_without_numbers_is_reported_in_words() -> None:
     lift = replace(FOUND, effects=(chosen(EFFECTS["wheel_lift"], {}),), names=("wheel_lift",))
     assert judgement(lift)[0] == f"wheel_lift: {EFFECTS['wheel_lift'].title}."
 
@@ -76,12 +76,12 @@ def test_a_number_at_its_bound_was_not_measured() -> None:
     assert not any("bound" in one for one in judgement(FOUND))
 
 
-def test_distances_that_are_off_are_told_of() -> None:
+def test_distances_that_are_off_are_reported() -> None:
     assert any("up to 0.34 m" in one for one in judgement(
         replace(FOUND, removed=replace(AS_USUAL, distance_error_m=0.34))))
 
 
-def test_the_number_that_was_biased_most_is_told_with_how_wrong_it_was() -> None:
+def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> None:
     said = bias(FOUND.names, FOUND.moved)
     assert said == ("Without dry_friction these were biased: rear.tire_stiffness_n_per_m, sprung_mass_kg. "
                     "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors away from what it is "
@@ -105,14 +105,15 @@ def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
 
 
 def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was_added() -> None:
-    told = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
-    assert {"effect", "parameters", "standard_errors", "error_before", "error_after"} <= told.keys()
-    assert told["effect"] == "dry_friction" and told["parameters"]["friction_force_n"] == 84.7
-    assert told["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
-    assert (told["error_before"], told["error_after"]) == (0.47, 0.153)
-    assert (told["error_refitted"], told["error_as_written"], told["noise_floor_error"]) == (0.43, 0.154, 0.15)
-    assert told["helps"] is True and told["p_value"] == 1e-12
-    assert told["biased"] == ["rear.tire_stiffness_n_per_m", "sprung_mass_kg"]
-    assert told["numbers"][1] == {
+    reported = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    assert {"effect", "parameters", "standard_errors", "error_before", "error_after"} <= reported.keys()
+    assert reported["effect"] == "dry_friction" and reported["parameters"]["friction_force_n"] == 84.7
+    assert reported["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
+    assert (reported["error_before"], reported["error_after"]) == (0.47, 0.153)
+    errors = [reported[key] for key in ("error_refitted", "error_as_written", "noise_floor_error")]
+    assert errors == [0.43, 0.154, 0.15]
+    assert reported["helps"] is True and reported["p_value"] == 1e-12
+    assert reported["biased"] == ["rear.tire_stiffness_n_per_m", "sprung_mass_kg"]
+    assert reported["numbers"][1] == {
         "name": "sprung_mass_kg", "nominal": 875.0, "without": 846.0, "without_standard_error": 9.8, "with": 876.0,
         "with_standard_error": 7.5, "shift_standard_errors": 4.0, "written": 874.0}

@@ -98,18 +98,18 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
                                "+24%, sprung_mass_kg by -13%.")
 
 
-def test_distances_that_are_off_are_told_of() -> None:
+def test_distances_that_are_off_are_reported() -> None:
     off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
     assert any("up to 0.34 m. That makes 40% of" in one for one in summary(off))
 
 
-def test_what_explains_as_well_is_named_with_the_drives_that_would_tell() -> None:
+def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them() -> None:
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
     found = replace(FOUND, candidates=(alike, *OTHERS))
     verdict, drives, *_ = summary(found)
-    assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot tell "
-                              "which. The numbers are for dry_friction (")
-    assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain about as much as each other.")
+    assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
+                              "distinguish them. The numbers are for dry_friction (")
+    assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain about as much of the residual as ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives
     assert as_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
@@ -160,11 +160,11 @@ def test_the_table_has_the_candidates_in_order_with_errors_where_they_are_known(
 
 
 def test_the_object_has_what_the_contract_promises() -> None:
-    told = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
-    assert {"baseline_error", "noise_floor_error", "candidates", "verdict", "unexplained"} <= told.keys()
-    assert (told["baseline_error"], told["noise_floor_error"]) == (0.31, 0.15)
-    assert told["verdict"] == ["dry_friction"] and told["unexplained"] is False
-    best, *others = told["candidates"]
+    reported = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    assert {"baseline_error", "noise_floor_error", "candidates", "verdict", "unexplained"} <= reported.keys()
+    assert (reported["baseline_error"], reported["noise_floor_error"]) == (0.31, 0.15)
+    assert reported["verdict"] == ["dry_friction"] and reported["unexplained"] is False
+    best, *others = reported["candidates"]
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= best.keys() == others[0].keys()
     assert best["effect"] == "dry_friction" and best["parameters"] == dict(FRICTION.values)
     assert (best["error"], best["p_value"], best["confused_with"]) == (0.2, 1e-12, [])
@@ -177,14 +177,14 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
     found = replace(FOUND, excess=0.5, shape=shape, conflicts={"sprung_mass_kg": -0.13}, obstacles={
         "roll": "one track is known", "sensor_offset": HAS_IT}, undetectable=(
             Undetectable(EFFECTS["wheel_lift"], 0.1),))
-    told = json.loads(json.dumps(as_json(found), allow_nan=False))
-    assert told["unexplained"] is True and told["left_over_noise"] == 1.5
-    assert told["numbers_off_too_far"] == {"sprung_mass_kg": -0.13}
-    assert told["not_tried"] == {"roll": "one track is known"} and told["hidden"] == {"wheel_lift": 0.1}
-    assert told["judged_on"] == JUDGED_ON
-    assert told["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
-    assert told["sentences"] == [*summary(found), *looks_like(found)]
-    seen = told["unexplained_shape"]
+    reported = json.loads(json.dumps(as_json(found), allow_nan=False))
+    assert reported["unexplained"] is True and reported["left_over_noise"] == 1.5
+    assert reported["numbers_off_too_far"] == {"sprung_mass_kg": -0.13}
+    assert reported["not_tried"] == {"roll": "one track is known"} and reported["hidden"] == {"wheel_lift": 0.1}
+    assert reported["judged_on"] == JUDGED_ON
+    assert reported["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
+    assert reported["sentences"] == [*summary(found), *looks_like(found)]
+    seen = reported["unexplained_shape"]
     assert seen["repeats_every_m"] == pytest.approx(2 * np.pi * 0.31, rel=0.02)
     assert sum(part["error_power_share"] for part in seen["frequency"]) == pytest.approx(1.0, abs=0.05)
     for force, at in (("force_by_rate", "rate_mps"), ("force_by_travel", "travel_m")):
@@ -192,5 +192,5 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
 
 
 def test_a_diagnosis_that_lacks_nothing_has_an_empty_verdict() -> None:
-    told = as_json(NOTHING)
-    assert told["verdict"] == [] and told["unexplained"] is False and told["unexplained_shape"] is None
+    reported = as_json(NOTHING)
+    assert reported["verdict"] == [] and reported["unexplained"] is False and reported["unexplained_shape"] is None

@@ -68,7 +68,7 @@ def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -
 
 
 def test_no_column_of_a_table_is_empty(found: Comparison) -> None:
-    """Bands are told before and after the refit, though it moves their ends."""
+    """Bands are given before and after the refit, though it moves their ends."""
     html = page(found)
     bands, speeds, amplitudes = (html.split(f"<h2>{title}</h2>")[1].split("</table>")[0] for title in
                                  ("By band", "By speed", "By how strongly the road moves the car"))

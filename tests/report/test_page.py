@@ -200,10 +200,10 @@ def test_the_command_reads_a_folder_in_order(drive, tmp_path: Path, capsys: pyte
     (tmp_path / "notes.csv").write_text("mine", encoding="utf-8")
     out = tmp_path / "page.html"
     assert main.main(["report", str(tmp_path), "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["files"] == ["00001-001.csv", "00001-002.csv", "00002-001.csv.part"]
-    assert told["summary"]["windows"] == 12
-    assert told["summary"]["drives"] == 2
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["files"] == ["00001-001.csv", "00001-002.csv", "00002-001.csv.part"]
+    assert reported["summary"]["windows"] == 12
+    assert reported["summary"]["drives"] == 2
     text = out.read_text(encoding="utf-8")
     assert "Road roughness of 2 drives" in text
     assert "1 damaged line was left out" in text
@@ -222,9 +222,9 @@ def test_the_command_finds_the_logs_on_a_stick(drive, tmp_path: Path, capsys: py
     for place, expected in ((tmp_path / "stick", [f"ridelog/{name}" for name in names]),
                             (tmp_path / "stick" / "ridelog", names), (cars[0], ["00001-001.csv"])):
         assert main.main(["report", str(place), "--out", str(out), "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["files"] == expected
-        assert told["summary"]["drives"] == len(expected)
+        reported = json.loads(capsys.readouterr().out)
+        assert reported["files"] == expected
+        assert reported["summary"]["drives"] == len(expected)
 
 
 def test_many_places_are_one_report_and_a_copy_counts_once(drive, tmp_path: Path,
@@ -238,10 +238,10 @@ def test_many_places_are_one_report_and_a_copy_counts_once(drive, tmp_path: Path
     out = tmp_path / "page.html"
     places = [str(one), str(tmp_path / "stick"), str(tmp_path / "00001-001.csv"), str(one / "00001-001.csv")]
     assert main.main(["report", *places, "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["files"] == ["car/00001-001.csv", "stick/ridelog/0123456789ab/00002-001.csv", "00001-001.csv"]
-    assert told["summary"]["windows"] == 16
-    assert told["summary"]["drives"] == 3
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["files"] == ["car/00001-001.csv", "stick/ridelog/0123456789ab/00002-001.csv", "00001-001.csv"]
+    assert reported["summary"]["windows"] == 16
+    assert reported["summary"]["drives"] == 3
 
 
 @pytest.mark.parametrize(("text", "words"), [

@@ -21,7 +21,7 @@ from logger.report.summary import summarise
 from logger.store.log.log_reader import LoggedFile
 
 from ..support.browser import CHROMIUM, NO_BROWSER, browser, opened
-from ..support.drives.logged_rows import rows_of_drive
+from ..support.drives.logged_rows import repeated_drives, rows_of_drive
 from ..support.drives.town import rows_of_town
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_BROWSER)
@@ -331,3 +331,26 @@ def test_places_that_lie_close_together_share_a_mark(open_page: Open) -> None:
     assert len(marks) < 5
     assert sum(map(len, numbers)) + more == tab.locator("#places [data-window]").count()
     assert numbers[-1][0] == "1"
+
+
+def test_repeated_drives_are_one_street_and_each_can_be_looked_at(open_page: Open) -> None:
+    rows = repeated_drives(3, 60, iri=(2.0, 3.0, 4.0))
+    tab = open_page(rows)
+    tab.focus("#curves canvas")
+    tab.keyboard.press("Home")
+    for _ in range(30):
+        tab.keyboard.press("ArrowRight")
+    said = tab.inner_text("#reading")
+    assert "Mean of 3 drives here" in said
+    mean, error = map(float, re.search(r"drives here\n([\d.]+) ± ([\d.]+)", said).groups())  # type: ignore[union-attr]
+    assert mean == pytest.approx(3.0, abs=0.3)  # weighted by errors, which grow with the level
+    assert error > 0.2  # drives differ by as much
+    assert tab.eval_on_selector_all("#only option", "all => all.map(one => one.textContent.slice(0, 7))") == [
+        "all dri", "Drive 1", "Drive 2", "Drive 3"]
+    all_of_them = tab.evaluate("document.querySelector('#map canvas').toDataURL()")
+    tab.select_option("#only", "2")
+    tab.wait_for_timeout(200)
+    assert tab.evaluate("document.querySelector('#map canvas').toDataURL()") != all_of_them
+    tab.mouse.move(*middle_of(tab, "#map", 0.5))
+    tab.wait_for_timeout(100)
+    assert "Drive 3" in tab.inner_text("#reading")

@@ -62,7 +62,7 @@ def test_a_place_driven_twice_is_one_place(drive) -> None:
     assert [place.iri_m_per_km for place in summarise(there + back).roughest][:2] == [20.0, 2.0]
 
 
-def test_without_positions_places_are_told_apart_along_the_way(drive) -> None:
+def test_without_positions_places_are_distinguished_along_the_way(drive) -> None:
     rows = drive(30, {index: {"lat_deg": None, "lon_deg": None, "iri_m_per_km": 3.0 + index} for index in range(30)})
     assert [place.along_m for place in summarise(rows).roughest] == [295.0, 245.0, 195.0, 145.0, 95.0]
 
@@ -87,7 +87,7 @@ def test_an_unsettled_window_is_in_no_mean_and_no_share(drive) -> None:
     assert summarise(drive(1, {0: wild | {"flags": ("unsettled",)}})).mean_iri_m_per_km is None
 
 
-def test_drives_are_told_apart_by_their_number_or_a_new_count(drive) -> None:
+def test_drives_are_distinguished_by_their_number_or_a_new_count(drive) -> None:
     rows = [*drive(3), *drive(2, number=2), *drive(4, number=2)]
     assert summarise(rows).drives == 3
 

@@ -93,13 +93,13 @@ def test_smoothing_bands_of_the_standard() -> None:
 def test_independent_roads_and_the_errors_that_were_promised() -> None:
     """Random walks have no edge at 0.011 cycles per metre and no set amplitudes; errors must be as large as stated."""
     for length_m, count in ((150, 80), (1000, 40)):
-        told = [classify(random_walk(100, length_m, 0.1, seed), 0.1) for seed in range(count)]
-        log_gd = np.log([one.gd_n0_cm3 / 100 for one in told])
-        promised = np.mean([one.gd_n0_std_cm3 / one.gd_n0_cm3 for one in told])
+        reported = [classify(random_walk(100, length_m, 0.1, seed), 0.1) for seed in range(count)]
+        log_gd = np.log([one.gd_n0_cm3 / 100 for one in reported])
+        promised = np.mean([one.gd_n0_std_cm3 / one.gd_n0_cm3 for one in reported])
         assert abs(log_gd.mean()) < 3 * promised / np.sqrt(count) + 0.02
         assert log_gd.std() == pytest.approx(promised, rel=0.25)
-        waviness = np.array([one.waviness for one in told])
-        promised = np.mean([one.waviness_std for one in told])
+        waviness = np.array([one.waviness for one in reported])
+        promised = np.mean([one.waviness_std for one in reported])
         assert abs(waviness.mean() - 2) < 3 * promised / np.sqrt(count) + 0.02
         assert waviness.std() == pytest.approx(promised, rel=0.25)
 
@@ -107,10 +107,10 @@ def test_independent_roads_and_the_errors_that_were_promised() -> None:
 @pytest.mark.parametrize("waviness", [1.5, 2.0, 2.5, 3.0])
 def test_generated_roads_come_back(waviness: float) -> None:
     """Slope and level within 5 %, as a mean over seeds."""
-    told = [classify(iso8608.generate(256, 1000, 0.05, seed, waviness), 0.05) for seed in range(20)]
-    assert np.exp(np.mean([np.log(one.gd_n0_cm3) for one in told])) == pytest.approx(256, rel=0.05)
-    assert np.mean([one.waviness for one in told]) == pytest.approx(waviness, rel=0.02)
-    assert all(one.road_class == "C" for one in told)
+    reported = [classify(iso8608.generate(256, 1000, 0.05, seed, waviness), 0.05) for seed in range(20)]
+    assert np.exp(np.mean([np.log(one.gd_n0_cm3) for one in reported])) == pytest.approx(256, rel=0.05)
+    assert np.mean([one.waviness for one in reported]) == pytest.approx(waviness, rel=0.02)
+    assert all(one.road_class == "C" for one in reported)
 
 
 @pytest.mark.parametrize("letter", ["A", "D", "H"])
@@ -122,11 +122,11 @@ def test_a_class_is_found_again(letter: str) -> None:
 
 def test_coarse_samples_limit_the_line_and_change_little() -> None:
     fine = iso8608.generate(64, 3000, 0.05, 4)
-    told, coarse = classify(fine, 0.05), classify(fine[::5], 0.25)
-    assert (told.lowest_cpm, told.highest_cpm) == pytest.approx((0.011, 2.83), rel=0.005)
+    reported, coarse = classify(fine, 0.05), classify(fine[::5], 0.25)
+    assert (reported.lowest_cpm, reported.highest_cpm) == pytest.approx((0.011, 2.83), rel=0.005)
     assert coarse.highest_cpm == pytest.approx(1.0)
-    assert coarse.gd_n0_cm3 == pytest.approx(told.gd_n0_cm3, rel=0.05)
-    assert coarse.waviness == pytest.approx(told.waviness, abs=0.06)
+    assert coarse.gd_n0_cm3 == pytest.approx(reported.gd_n0_cm3, rel=0.05)
+    assert coarse.waviness == pytest.approx(reported.waviness, abs=0.06)
     assert classify(fine, 0.05, widest_step_m=0.25).highest_cpm == pytest.approx(1.0)
 
 

@@ -1,4 +1,4 @@
-"""Drives laid over each other: beside a town whose truth is known, and beside sums that are done by hand."""
+"""Repeated drives combined: beside a town whose truth is known, and beside sums that are done by hand."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from logger.geodesy import EARTH_RADIUS_M
+from logger.roads.laid_traces import lay
 from logger.roads.linear_reference import AGAINST, ALONG, measures, on_route, route_network
 from logger.roads.repeated_drives import (
     Passes,
@@ -20,7 +21,7 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import NO_WAY, lay
+from logger.roads.road_matching import NO_WAY
 from logger.roads.road_network import RoadNetwork, Trace
 
 from ..support.drives.parallel_town import WINDOW_M, judged, town_drives
@@ -62,8 +63,8 @@ def test_a_drive_that_passes_a_place_twice_is_laid_over_itself() -> None:
     assert np.abs(found.along_m[second] - (at_m[second] - 1000.0 + WINDOW_M / 2)).max() < WINDOW_M
 
 
-def test_lanes_of_a_town_are_told_apart() -> None:
-    drives = town_drives(6, 400, seed=4)
+def test_lanes_of_a_town_are_distinguished() -> None:
+    drives = town_drives(8, 400, seed=4)
     network = RoadNetwork()
     seen = judged(drives, lay(network, [one.trace for one in drives]), network)
     assert len(seen.wrong) > 1000

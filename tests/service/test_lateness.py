@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DrivePlan, simulate_drive
 from logger.service.config import Config, GpsConfig
@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def latest_s(lost: tuple[float, float], first_fix_s: float = 0.0, bridge_s: float = 10.0) -> float:
     """The longest time from the end of a window to its row [s], in a drive of a minute and a half at 12 m/s."""
     reception = Reception(first_fix_s=first_fix_s, lost=(lost,))
-    plan = DrivePlan(speed_knots=((0, 0), (5, 0), (12, 12), (90, 12)), stretches=(Stretch(1200, 60),), seed=7,
+    plan = DrivePlan(speed_knots=((0, 0), (5, 0), (12, 12), (90, 12)), stretches=(RoadStretch(1200, 60),), seed=7,
                      reception=reception)
     drive = simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
     core, rows = core_for(drive.header, Config(gps=GpsConfig(bridge_s=bridge_s)))

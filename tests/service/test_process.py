@@ -157,11 +157,11 @@ def test_kill_loses_no_finished_row_and_the_next_start_repairs(
     write_config(tmp_path, f"'dump:{short_dump}'")
     service = start()
     service.wait_for(lambda status: status["rows_written"] >= 5)
-    rows_told = service.wait_for(lambda status: True)["rows_written"]
+    rows_reported = service.wait_for(lambda status: True)["rows_written"]
     time.sleep(1.2)
     service.kill()
     (part,) = service.log.glob("*.csv.part")
-    assert part.read_text().count("\n") - 1 >= rows_told
+    assert part.read_text().count("\n") - 1 >= rows_reported
     kept = part.read_text().splitlines()[1:]
     second = start()
     second.wait_for(lambda status: status["state"] != "starting")
@@ -202,7 +202,7 @@ def test_accelerometer_missing_at_start_while_the_rest_goes_on(
     assert service.terminate() == 0
 
 
-def test_a_sensor_beside_the_middle_line_is_told_of(start: Callable[[], Service], tmp_path: Path) -> None:
+def test_a_sensor_beside_the_middle_line_is_reported(start: Callable[[], Service], tmp_path: Path) -> None:
     car = vehicle_file("rav4-2009-full").read_text()
     (tmp_path / "car.yaml").write_text(f"{car}\nsensor: {{left_m: -0.3}}\n")
     write_config(tmp_path, "250")
@@ -226,8 +226,8 @@ def test_status_for_a_person_and_for_a_program(
     command = [ridelog, "status", "--config", tmp_path / "ridelog.yaml"]
     screen = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     assert "accelerometer" in screen.lower()
-    told = json.loads(subprocess.run([*command, "--json"], check=True, capture_output=True, text=True).stdout)
-    assert told["accelerometer"]["state"] == "ok"
+    reported = json.loads(subprocess.run([*command, "--json"], check=True, capture_output=True, text=True).stdout)
+    assert reported["accelerometer"]["state"] == "ok"
     assert service.terminate() == 0
     assert subprocess.run(command, capture_output=True, text=True).returncode == 1
 
@@ -309,7 +309,7 @@ def test_a_serial_accelerometer_pulled_and_put_back(
     assert any("gap" in words for words in flags)
 
 
-def test_systemd_is_told(
+def test_systemd_is_reported(
     ridelog: Path, gps: SerialDevice, short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
@@ -319,10 +319,10 @@ def test_systemd_is_told(
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         monkeypatch.setenv("WATCHDOG_USEC", "1000000")
         service = Service(ridelog, tmp_path)
-        told = [manager.recv(1000).decode() for _ in range(6)]
-        assert told[0] == "READY=1"
-        assert told.count("WATCHDOG=1") >= 2
-        assert any(text.startswith("STATUS=accelerometer ok") for text in told)
+        reported = [manager.recv(1000).decode() for _ in range(6)]
+        assert reported[0] == "READY=1"
+        assert reported.count("WATCHDOG=1") >= 2
+        assert any(text.startswith("STATUS=accelerometer ok") for text in reported)
         assert service.terminate() == 0
         while (text := manager.recv(1000).decode()) != "STOPPING=1":
             assert text.startswith(("WATCHDOG", "STATUS"))

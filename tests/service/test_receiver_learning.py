@@ -37,15 +37,15 @@ def config_of(header: DumpHeader, gps: GpsConfig) -> Config:
 
 
 class Told(DriveAlignment):
-    """A drive that told this much."""
+    """A drive that showed this much."""
 
     def __init__(self, found: DelayEstimate, complaints: tuple[str, ...] = ()) -> None:
         super().__init__(2, 1.0)
-        self._told = found
+        self._reported = found
         self._complaints = complaints
 
     def estimate(self) -> DelayEstimate:
-        return self._told
+        return self._reported
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -175,7 +175,7 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
     assert ReceiverLearning(tmp_path, NOTHING, at_start(SET, None), None).words() == "0.25 s by the settings"
 
 
-def test_a_wrong_number_and_a_loose_sensor_are_told(tmp_path: Path) -> None:
+def test_a_wrong_number_and_a_loose_sensor_are_reported(tmp_path: Path) -> None:
     (words,) = ReceiverLearning(tmp_path, FOUND, at_start(SET, None), None).notices()
     assert "latency_s is 0.25 s in the settings" in words
     assert "set latency_s: auto" in words

@@ -133,10 +133,10 @@ def test_status_says_which_rate_was_seen_and_what_to_do(
     car.sample = sample
     status = car.drive(40)
     assert status.accelerometer.state == "doubtful"
-    told = " ".join(advice(status))
+    reported = " ".join(advice(status))
     for words in says:
-        assert words in told
-    assert "baud" in told
+        assert words in reported
+    assert "baud" in reported
     rate_hz, share, lost, sent = 100, 0.0, set(), round(car.now_s * 100)
     status = car.drive(25)
     assert status.accelerometer.state == "ok"
@@ -161,9 +161,9 @@ def test_status_says_that_samples_come_in_bursts(tmp_path: Path, burst: int, say
 
     car.sample = sample
     status = car.drive(40)
-    told = " ".join(advice(status))
-    assert f"{burst / 100:.1g} s at a time" in told
-    assert says in told
+    reported = " ".join(advice(status))
+    assert f"{burst / 100:.1g} s at a time" in reported
+    assert says in reported
     assert status.accelerometer.state == state
     row = status.last_window
     assert row is not None

@@ -16,11 +16,11 @@ from logger.service.listener import HANG_US, Listener, monotonic_us
 from logger.service.shutdown_signals import Stop
 from logger.service.storage import Storage
 from logger.store.export.pairing import Pairing
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 
 
 class Told:
-    """Systemd's side: what it was told."""
+    """Systemd's side: what it was notified of."""
 
     def __init__(self) -> None:
         self.words: list[str] = []
@@ -32,7 +32,7 @@ class Told:
 @pytest.fixture
 def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """The parts of a service that was put together with settings of its own and has ended at once."""
-    parts: dict[str, Any] = {"told": Told()}
+    parts: dict[str, Any] = {"notified": Told()}
 
     class Loop:
         def __init__(self, core: object, storage: Storage, listeners: list[Listener], *rest: Any) -> None:
@@ -42,23 +42,23 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             parts["storage"].close()
 
     def storage(*arguments: Any, pairing: Pairing) -> Storage:
-        parts["limits"] = next(argument for argument in arguments if isinstance(argument, Limits))
+        parts["limits"] = next(argument for argument in arguments if isinstance(argument, QuotaLimits))
         parts["pairing"] = pairing
         return Storage(*arguments, pairing=pairing)
 
     monkeypatch.setattr(serve, "MainLoop", Loop)
     monkeypatch.setattr(serve, "Storage", storage)
-    monkeypatch.setattr(serve, "Notifier", lambda: parts["told"])
+    monkeypatch.setattr(serve, "Notifier", lambda: parts["notified"])
     monkeypatch.setattr(serve, "go_first", lambda: None)
     log = replace(LogConfig(tmp_path / "log"), quota_bytes=123_456_789, keep_free_bytes=987_654)
     pairing = Pairing("first_stick")
     serve.serve(Config(log=log, pairing=pairing, status_file=tmp_path / "status.json"), Stop())
-    parts["told"].words.clear()
+    parts["notified"].words.clear()
     return parts
 
 
 def test_quota_and_floor_and_whose_copies_count_are_those_of_the_settings(built: dict[str, Any]) -> None:
-    assert built["limits"] == Limits(123_456_789, 987_654)
+    assert built["limits"] == QuotaLimits(123_456_789, 987_654)
     assert built["pairing"] == Pairing("first_stick")
 
 
@@ -75,11 +75,11 @@ def test_a_folder_that_is_made_is_on_the_disk_before_anything_in_it(tmp_path: Pa
 
 def test_the_watchdog_is_fed_while_every_device_returns(built: dict[str, Any]) -> None:
     built["beat"](monotonic_us())
-    assert built["told"].words == ["watchdog", "status"]
+    assert built["notified"].words == ["watchdog", "status"]
 
 
 @pytest.mark.parametrize("hanging", [0, 1])
 def test_one_device_that_hangs_stops_the_watchdog(built: dict[str, Any], hanging: int) -> None:
     built["listeners"][hanging].looked_us -= HANG_US + 1_000_000
     built["beat"](monotonic_us())
-    assert built["told"].words == ["status"]
+    assert built["notified"].words == ["status"]

@@ -23,11 +23,11 @@ from ..support.faults.sensors import NOON, Car, checked, epoch
 ROLLOVER = timedelta(weeks=1024)
 
 
-def driven(folder: Path, told_mps: Callable[[float], float], seconds: float = 60) -> Car:
+def driven(folder: Path, reported_mps: Callable[[float], float], seconds: float = 60) -> Car:
     """A car that drives at 15 m/s, by a receiver that says another speed."""
     car = Car(folder)
     car.speed_mps = 15.0
-    car.receiver = lambda second: epoch(second, told_mps(second), car.travelled_m)
+    car.receiver = lambda second: epoch(second, reported_mps(second), car.travelled_m)
     car.drive(seconds)
     return car
 
@@ -37,8 +37,8 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     car = driven(tmp_path, lambda second: 15.0 * factor)
     status = car.drive(1)
     assert status.gps.state == "doubtful"
-    told, *_ = advice(status)
-    assert "speed and its places disagree" in told
+    reported, *_ = advice(status)
+    assert "speed and its places disagree" in reported
     assert "the car stands" not in screen(status, None)[0]
     known_s = 13 if factor < 1 else 0  # a speed that is too small shows after a hundred metres of difference
     rows = [row for row in car.rows.records if row.speed_mps and row.t_us > car.begin_us + known_s * 1e6]
@@ -99,7 +99,7 @@ def test_the_demo_raises_no_doubt() -> None:
     assert not any("speed_doubtful" in row.flags for row in rows.records)
 
 
-def test_a_receiver_that_tells_no_speed_is_told_of(tmp_path: Path) -> None:
+def test_a_receiver_that_tells_no_speed_is_reported(tmp_path: Path) -> None:
     car = Car(tmp_path)
 
     def places_alone(second: float) -> bytes:
@@ -110,19 +110,19 @@ def test_a_receiver_that_tells_no_speed_is_told_of(tmp_path: Path) -> None:
     car.receiver = places_alone
     status = car.drive(30)
     assert status.gps.state == "doubtful"
-    told, *_ = advice(status)
-    assert "RMC" in told
-    assert "no speed" in told
+    reported, *_ = advice(status)
+    assert "RMC" in reported
+    assert "no speed" in reported
 
 
 @pytest.mark.parametrize("turns", [1, 2])
-def test_a_date_that_is_weeks_back_is_told_of_with_the_setting(tmp_path: Path, turns: int) -> None:
+def test_a_date_that_is_weeks_back_is_reported_with_the_setting(tmp_path: Path, turns: int) -> None:
     car = Car(tmp_path)
     car.receiver = lambda second: epoch(second, car.speed_mps, car.travelled_m, NOON - turns * ROLLOVER)
     status = car.drive(30)
     assert status.gps.state == "doubtful"
-    told, *_ = advice(status)
-    assert f"week_rollovers: {turns}" in told
+    reported, *_ = advice(status)
+    assert f"week_rollovers: {turns}" in reported
     decoder = NmeaDecoder(week_rollovers=turns)
     fixes = decoder.feed(0, epoch(0, 1, 1, NOON - turns * ROLLOVER)) + decoder.flush()
     assert [fix.utc_us for fix in fixes] == [round(NOON.timestamp() * 1e6)]

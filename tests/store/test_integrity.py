@@ -156,7 +156,7 @@ def test_rows_that_the_sidecar_tells_of_are_missed(tmp_path: Path) -> None:
     store(tmp_path / "00001-001.csv", lines_of(row(1), row(2)))
     check = found(tmp_path / "00001-001.csv")
     assert counts(check) == (2, 0, 0, 1)
-    assert check.problems == ("gap: expected the 3 rows that the sidecar tells of, found 2",)
+    assert check.problems == ("gap: expected the 3 rows that the sidecar lists, found 2",)
 
 
 def test_damaged_sidecar_is_wrong(tmp_path: Path) -> None:
@@ -221,7 +221,7 @@ def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_p
     writer.close()
 
 
-def test_a_sensor_that_was_silent_is_told_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_silent_sensor_is_reported_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The recording is what was written: a cable that came loose in the drive is no damage."""
     path = a_dump(tmp_path / "a.dump", *SAMPLES, Event(5_000_000, "bma220", b"\x00\x04\x40"))
     check = found(path)
@@ -411,7 +411,7 @@ def test_more_rows_than_the_sidecar_tells_of_are_wrong(tmp_path: Path) -> None:
     with (tmp_path / "00001-001.csv").open("a") as file:
         file.write(f"{format_row(row(4))}\n")
     assert found(tmp_path / "00001-001.csv").problems == (
-        "gap: expected the 3 rows that the sidecar tells of, found 4",)
+        "gap: expected the 3 rows that the sidecar lists, found 4",)
 
 
 @pytest.mark.parametrize("place", [".", "/", "..", "./"])

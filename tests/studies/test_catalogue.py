@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from logger.errors import BadInput
 from logger.report.study_page import page
-from logger.studies.study import Effort, Result, Value, Word, studies, study_of
+from logger.studies.checks import Statement, Value, Word, about, word_of
+from logger.studies.study import DISSERTATION, Effort, Item, Result, alike, studies, study_of
 
 STUDIES = studies()
 
@@ -40,7 +42,16 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
     assert len(result.verdict) > 80
     assert result.verdict.endswith(".")
     assert study.how.endswith(".")
-    assert study.because.endswith(".")
+    assert study.items
+    for item in study.items:
+        assert item.because.endswith(".")
+        assert item.word is Word.NOT_REPRODUCIBLE or study.checks_of(item.name, result), item
+    for check in result.values:
+        assert set(check.of) <= set(study.covers), check
+        assert check.of or len(study.items) == 1, check
+    if study.source == DISSERTATION:
+        assert result.values, "a study without a check"
+        assert all(picture.printed for picture in result.pictures), "a picture without what is printed beside it"
     stands_alone(page(study, result), pictures=len(result.pictures))
 
 
@@ -76,20 +87,57 @@ def test_a_value_stands_as_its_word_says() -> None:
     assert [holds(-6, ours, Word.BETTER) for ours in (-5.4, 5.6, -5.6, 7)] == [True, False, False, False]
 
 
+def test_a_statement_stands_as_its_word_says() -> None:
+    def holds(ours: float, word: Word) -> bool:
+        return Statement("change [%]", "it grows", ours, 1.0, 5.0, word).holds
+
+    assert [holds(ours, Word.AGREES) for ours in (0.9, 1.0, 5.0, 5.1, math.nan)] == [False, True, True, False, False]
+    assert [holds(ours, Word.NOT_REPRODUCIBLE) for ours in (0.9, 3.0)] == [False, True]
+    assert [holds(ours, Word.BETTER) for ours in (0.9, 3.0)] == [False, True]
+    assert [holds(ours, Word.MISPRINT) for ours in (0.9, 3.0)] == [True, False]
+    assert [Statement("", "", 0.0, least, most).bounds for least, most in (
+        (1.0, 5.0), (1.0, math.inf), (-math.inf, 5.0))] == ["1 to 5", "1 or more", "5 or less"]
+
+
+def test_the_word_of_an_item_is_that_of_its_checks() -> None:
+    def of(*words: Word, of_print: bool = False) -> Word:
+        return word_of(Value("", 1.0, 1.0, 0.1, word, of_print=of_print) for word in words)
+
+    assert of(Word.AGREES, Word.BETTER) is Word.BETTER
+    assert of(Word.BETTER, Word.NOT_REPRODUCIBLE) is Word.NOT_REPRODUCIBLE
+    assert of(Word.NOT_REPRODUCIBLE, Word.MISPRINT, Word.AGREES) is Word.MISPRINT
+    assert of() is Word.NOT_REPRODUCIBLE
+    assert of(Word.AGREES, of_print=True) is Word.NOT_REPRODUCIBLE  # the print beside itself shows nothing of ours
+    assert of(Word.MISPRINT, of_print=True) is Word.MISPRINT
+
+
 def test_a_study_that_is_not_as_it_states_says_so() -> None:
     study = STUDIES["table-4-1"]
     good, bad = (Value(name, 1.2, ours, 0.05) for name, ours in (("body [Hz]", 1.21), ("wheel [Hz]", 1.3)))
     assert not study.differs(Result((), "", values=(good,)))
-    told = study.differs(Result((), "", values=(good, bad)))
-    assert "wheel [Hz] (1.3, printed 1.2" in told
-    assert "body" not in told
+    reported = study.differs(Result((), "", values=(good, bad)))
+    assert "wheel [Hz] (1.3, printed 1.2" in reported
+    assert "body" not in reported
+
+
+def test_an_item_whose_checks_come_to_another_word_says_so() -> None:
+    study = replace(STUDIES["table-4-1"], items=(*alike(("Fig 1", "Fig 2"), Word.AGREES, "So."),
+                                                 Item("Fig 3", Word.NOT_REPRODUCIBLE, "No.")))
+    check = Value("mass [kg]", 875.0, 875.0, 1.0)
+    assert study.words == "agrees, not reproducible"
+    assert [names for names, _ in study.groups] == [("Fig 1", "Fig 2"), ("Fig 3",)]
+    assert not study.differs(Result((), "", values=about(("Fig 1", "Fig 2"), [check])))
+    told = study.differs(Result((), "", values=about(("Fig 1", "Fig 3"), [check])))
+    assert "Fig 2 (by its checks: not reproducible, expected: agrees)" in told
+    assert "Fig 3 (by its checks: agrees, expected: not reproducible)" in told
+    assert "Fig 1" not in told
 
 
 def test_effort() -> None:
-    told: list[tuple[int, int]] = []
-    effort = Effort(0.5, lambda done, of: told.append((done, of)))
+    reported: list[tuple[int, int]] = []
+    effort = Effort(0.5, lambda done, of: reported.append((done, of)))
     assert effort.some(range(5), 2) == [0, 4]
     assert effort.some(range(9)) == [0, 3, 5, 8]
     assert (effort.count(200), effort.count(3, 2), Effort(0.001).count(200, 6), Effort().count(7)) == (100, 2, 6, 7)
     assert list(effort.each("ab")) == ["a", "b"]
-    assert told == [(0, 2), (1, 2), (2, 2)]
+    assert reported == [(0, 2), (1, 2), (2, 2)]

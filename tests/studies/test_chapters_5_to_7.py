@@ -112,7 +112,7 @@ def test_the_drift_with_speed_has_the_printed_signs_and_ours_has_none() -> None:
 
 
 def test_comfort_falls_with_roughness_and_speed() -> None:
-    surface = result("fig-6-16").pictures[1]
+    surface = result("fig-6-16").pictures[1].chart
     assert isinstance(surface, Field)
     assert (np.diff(surface.values, axis=0) > 0).all()
     assert (np.diff(surface.values, axis=1) > 0).all()
@@ -126,7 +126,7 @@ def test_the_trendlines_are_those_of_the_integral() -> None:
 
 
 def test_the_maps_hold_every_segment() -> None:
-    roughness, comfort = result("fig-6-23", 0.1).pictures[2:]
+    roughness, comfort = (one.chart for one in result("fig-6-23", 0.1).pictures[2:])
     assert isinstance(roughness, Field)
     assert isinstance(comfort, Field)
     assert roughness.values.shape == comfort.values.shape == (len(roughness.y), len(roughness.x))

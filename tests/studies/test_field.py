@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from logger.studies.checks import Word
 from logger.studies.field import (
     five_modes,
     golden_car_gain,
     iri_check_profile,
+    iso_2631_factors,
     iso_8041_bursts,
     lab_examination,
 )
-from logger.studies.study import DISSERTATION, Effort, Word, studies
+from logger.studies.study import DISSERTATION, Effort, studies
 
-from ..benchmarks.weightings import BURSTS
+from ..benchmarks.weightings import BURSTS, THIRDS
 from ..roads.test_iri import RUNNING_IRI, golden_response
 
 
@@ -23,6 +27,9 @@ def test_the_shelf_is_whole() -> None:
     covered = [item for study in studies("field").values() for item in study.covers]
     assert {"IRI check profile", "ISO 8041 bursts", "Golden Car gain curve", "hidden mass from a bump",
             "five modes at 20 dB", "the lab's examination"} <= set(covered)
+    ours = {item.name: item.word for study in studies("field").values() for item in study.items
+            if "ridelog" in study.source}
+    assert set(ours.values()) == {Word.NOT_REPRODUCIBLE}, "what is our own never agrees with a print"
     assert all(study.source != DISSERTATION for study in studies("field").values())
 
 
@@ -51,14 +58,36 @@ def test_the_gain_is_that_of_the_transfer_function() -> None:
         assert abs(golden_response(np.array([one.ours]))[0]) == pytest.approx(0.5, abs=2e-3)
 
 
-def test_modes_are_better_than_all_packages_that_miss_none() -> None:
-    whole = [one for one in five_modes.PEERS if one[1] == 0]
-    assert min(one[2] for one in whole if one[2] is not None) == five_modes.FREQUENCY
-    assert min(one[3] for one in whole if one[3] is not None) == five_modes.DAMPING
-    assert all(one.holds for one in five_modes.run(Effort(0.01)).values)
+def test_factors_are_those_of_the_benchmark() -> None:
+    for name, printed in iso_2631_factors.PRINTED.items():
+        known = {float(hz): float(one) for hz, one in zip(iso_2631_factors.HZ, printed, strict=True)}
+        assert {hz: known[hz] for hz in THIRDS[name]} == THIRDS[name]
+
+
+def test_the_building_has_the_printed_frequencies() -> None:
+    """A uniform chain of five: 2 w sin((2 k - 1) pi / 22)."""
+    mode = np.arange(1, 6)
+    hz = np.sqrt(10_000 / 25.91) * 2 * np.sin((2 * mode - 1) * np.pi / 22) / (2 * np.pi)
+    assert np.round(hz, 3) == pytest.approx(five_modes.PRINTED_TRUE_HZ, abs=1e-9)
+
+
+def test_counts_of_the_examination_are_those_of_its_page() -> None:
+    counts = lab_examination.examined()
+    page = (Path(__file__).parents[2] / "docs" / "examination.md").read_text("utf-8")
+    assert page.startswith(f"# The lab examined\n\n{counts['cases']} random cases")
+    assert f"seeds {counts['first_seed']} to {counts['last_seed']}" in page
+    asked = [one for one in counts["goals"] if one["of"]]
+    assert asked
+    for goal in asked:
+        sign = "≥" if goal["at_least"] else "≤"
+        assert f"| {goal['name']} | {sign} {goal['goal']:.0%} |" in page
+        assert f"| {goal['count']} of {goal['of']} |" in page
 
 
 def test_intervals_of_the_examination_are_wilson_s() -> None:
-    for _, hits, cases, *_ in lab_examination.PRINTED:
-        theirs = binomtest(hits, cases).proportion_ci(0.95, "wilson")
-        assert lab_examination.interval_percent(hits, cases) == pytest.approx((100 * theirs.low, 100 * theirs.high))
+    for goal in lab_examination.examined()["goals"]:
+        if not goal["of"]:
+            continue
+        theirs = binomtest(goal["count"], goal["of"]).proportion_ci(0.95, "wilson")
+        assert lab_examination.interval_percent(goal["count"], goal["of"]) == pytest.approx(
+            (100 * theirs.low, 100 * theirs.high))

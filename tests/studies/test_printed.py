@@ -75,7 +75,7 @@ def test_a_step_that_is_taken_for_higher_makes_the_car_heavier() -> None:
 
 
 def test_the_valley_of_wrong_bumps_slants() -> None:
-    field = STUDIES["fig-4-27"].run(Effort(0.4)).pictures[0]
+    field = STUDIES["fig-4-27"].run(Effort(0.4)).pictures[0].chart
     assert isinstance(field, Field)
     best = field.x[field.values.argmin(axis=1)]
     assert best[0] < best[-1]

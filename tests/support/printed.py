@@ -1,4 +1,4 @@
-"""What a document says that commands print: read out of it, beside what they do print, and written anew.
+"""What a document says that commands print: read out of it, beside what they do print, and rewritten.
 
 In an indented block of a page a line ``ridelog ...`` is a command, ``\\`` at its end goes on in the next one; what
 follows up to the next command is what it prints, in whole paragraphs, of which some may be left out.
@@ -78,7 +78,7 @@ def most_like(old: list[str], now: list[list[str]]) -> list[str]:
 
 
 def main() -> None:
-    """Write the page anew: each paragraph becomes the printed one that begins with the same two words, or is most like
+    """Rewrite the page: each paragraph becomes the printed one that begins with the same two words, or is most like
     it."""
     page = Path(sys.argv[1])
     lines = page.read_text("utf-8").splitlines()

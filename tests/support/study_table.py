@@ -7,32 +7,36 @@ from pathlib import Path
 from logger.studies.study import SHELVES, studies
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "studies.md"
+_KINDS = ("Table", "Fig", "Eq")
+_LAST = 99
 TITLES = {"dissertation": "The dissertation, item by item", "field": "Other papers",
           "roads": "Public records of roads"}
 
 
 def tables() -> str:
-    """A table for each shelf: a row for each printed item, linked to the file of its study."""
+    """A table for each shelf: a row for each printed item with its word, linked to the file of its study."""
     parts = []
     for shelf, package in SHELVES.items():
-        rows = sorted((_place(item, place), item, study) for place, study in enumerate(studies(shelf).values())
-                      for item in study.covers)
+        rows = sorted(((_place(item.name, place), item, study) for place, study in enumerate(studies(shelf).values())
+                       for item in study.items), key=lambda row: row[0])
         if rows:
             folder = package.replace(".", "/")
             parts += ["", f"## {TITLES[shelf]}", "",
                       "| printed | study | word | because |", "| --- | --- | --- | --- |",
-                      *(f"| {item} | [`{study.called}`](../{folder}/{study.name}.py) | {study.word} | {study.because} |"
-                        for _, item, study in rows)]
+                      *(f"| {item.name} | [`{study.called}`](../{folder}/{study.name}.py) | {item.word} | "
+                        f"{item.because} |" for _, item, study in rows)]
     return "\n".join(parts) + "\n"
 
 
-def _place(item: str, study: int) -> tuple[list[int], str, int]:
-    """Items with a number stand in its order, in a chapter first tables and then figures; others as their studies."""
-    chapter, _, number = next((word for word in item.split() if word[0].isdigit()), "").partition(".")
+def _place(item: str, study: int) -> tuple[int, int, list[int]]:
+    """Chapter by chapter, in each first tables, then figures, equations and statements of sections, by their numbers;
+    items without a number as their studies."""
+    numbered = next((word for word in item.split() if word[0].isdigit()), "")
+    numbers = [int(part) for part in numbered.split(".") if part.isdigit()]
     kind = item.split()[0]
-    if not number or not kind.isalpha():
-        return [int(chapter or 99), study], "", study
-    return [int(chapter), -1, int(number)], {"Table": "1", "Fig": "2"}.get(kind, "3"), study
+    if len(numbers) < 2:
+        return _LAST, 0, [study]
+    return numbers[0], _KINDS.index(kind) if kind in _KINDS else len(_KINDS), [*numbers, study]
 
 
 def written() -> str:

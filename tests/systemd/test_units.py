@@ -166,7 +166,7 @@ def test_it_is_watched_and_never_given_up() -> None:
     assert service["StartLimitIntervalSec"] == settings(EXPORT)["StartLimitIntervalSec"] == ["0"]
 
 
-def test_who_boots_without_memory_limits_is_told() -> None:
+def test_who_boots_without_memory_limits_is_reported() -> None:
     assert "MemoryMax" in settings(SERVICE)
     for place in (shipped("systemd") / SERVICE, Path(__file__).resolve().parents[2] / "docs/installation.md"):
         assert {"cgroup_disable=memory", "cgroup_enable=memory"} <= set(re.findall(r"cgroup_\w+=memory",
@@ -269,7 +269,7 @@ def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_tim
 
 def test_one_stick_at_a_time_gets_the_logs() -> None:
     """A stick may have a hundred partitions of that label. The others wait, in a program that takes no memory. That a
-    stick may be pulled is told at once, and not after the next one's copy."""
+    stick may be pulled is shown at once, and not after the next one's copy."""
     ours = [line for line in command_lines(EXPORT) if inner(line)[0] == str(PROGRAM)]
     assert all(line[0] == ONE_AT_A_TIME for line in ours)
     places = {next(Path(word) for word in line if word.startswith("/run/")): "--to" in line for line in ours}

@@ -6,7 +6,8 @@
     python -m tests.validation.examine --release             what is published
 
 Each case is one line of the results file as soon as it is over: stopped, the examination goes on where it was. Remove
-the file to begin anew, as one should after a change of the program. Writes examination.md, .html and .svg.
+the file to begin again, as one should after a change of the program. Writes examination.md, .html and .svg, and the
+counts that ``ridelog study lab-examination`` shows: with --docs beside these pages, else into the package.
 
 Seeds 2000 to 2099 are for development: the lab may be changed by what comes of them. Seeds 7000 to 7999 are for
 releases: no development run uses them, they are refused without --release, and the report says of which kind its cases
@@ -26,9 +27,11 @@ from .cases.seeds import add_seed_options, first_seed, seeds
 from .marking.marks import hidden, right, said
 from .marking.results import appended, read_results
 from .marking.sitting import Question, Record, sit
+from .report.counts import counts
 from .report.pages import Matrix, markdown, page
 
 ROOT = Path(__file__).resolve().parents[2]
+DOCS, PACKAGED = ROOT / "docs", ROOT / "logger" / "studies" / "field"
 COUNTS = {"none": 40, "one": 100, "two": 40, "three": 40, "outsider": 39, "two_outsider": 0, "wandering": 38}
 """Five of each effect of the list, three of each off it; two of each that distances that wander do not imitate."""
 
@@ -63,6 +66,8 @@ def report(records: Sequence[Record], asked: int, docs: Path) -> None:
     (docs / "examination.md").write_text(markdown(records, asked, "examination.svg"), "utf-8")
     (docs / "examination.html").write_text(page(records, asked), "utf-8")
     (docs / "examination.svg").write_text(Matrix.of(records).figure + "\n", "utf-8")
+    beside = PACKAGED if docs.resolve() == DOCS else docs
+    (beside / "examination.json").write_text(json.dumps(counts(records, asked), indent=1) + "\n", "utf-8")
 
 
 def main() -> None:
@@ -72,7 +77,7 @@ def main() -> None:
                             help=f"how many cases of this kind (default: {COUNTS[kind]})")
     add_seed_options(parser)
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "examination.jsonl")
-    parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where the report goes")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="where the report goes")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--in-process", action="store_true", help="call the commands instead of starting them")
     parser.add_argument("--report-only", action="store_true", help="of the results that are there")

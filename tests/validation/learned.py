@@ -12,7 +12,7 @@ model is on what was kept back, as it stands. Where an effect begins each drive 
 compared after ``compare``'s refit, and with the noise.
 
 Each case is one line of the results file as soon as it is over: stopped, it goes on where it was. Remove the file to
-begin anew, as one should after a change of the program. Seeds as in ``examine``.
+begin again, as one should after a change of the program. Seeds as in ``examine``.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def main() -> int:
                     known[question] = record = put(question)
                     file.write(json.dumps(record) + "\n")
                     file.flush()
-                    print(told(record), flush=True)
+                    print(reported(record), flush=True)
     records = [known[one] for one in questions if one in known]
     if not records:
         parser.exit(1, "no results yet\n")
@@ -199,7 +199,7 @@ def goals(records: Sequence[Record]) -> list[Goal]:
     ]
 
 
-def told(record: Record) -> str:
+def reported(record: Record) -> str:
     """One line of a case."""
     strengths = ", ".join(f"{one['name']} {one['strength']:.1f}" for key in ("effects", "outsiders")
                           for one in record["truth"][key]) or "nothing"

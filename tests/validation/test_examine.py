@@ -15,7 +15,7 @@ from .cases import random_case as cases
 from .cases.random_case import case
 from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS
 from .cases.visibility import UNSEEN, remainders
-from .examine import questions
+from .examine import questions, report
 from .marking.marks import Share, alarm, all_named, first_right, goals, numbers, numbers_right, said, share
 from .marking.results import read_results
 from .marking.sitting import Question, Record, examined
@@ -155,6 +155,18 @@ def test_the_report_says_which_seeds_were_asked() -> None:
     text = markdown(kept_back, 11, "m.svg")
     assert "release seeds 7001 to 7013: no run of the lab's development has used them" in text
     assert "examine --release" in text
+
+
+def test_the_counts_for_the_study_are_those_of_the_pages(tmp_path: Path) -> None:
+    report(RECORDS, 11, tmp_path)
+    found = json.loads((tmp_path / "examination.json").read_text("utf-8"))
+    assert {name: found[name] for name in ("first_seed", "last_seed", "cases", "asked", "release")} == {
+        "first_seed": 1, "last_seed": 13, "cases": len(RECORDS), "asked": 11, "release": False}
+    text = (tmp_path / "examination.md").read_text("utf-8")
+    assert len(found["goals"]) == len(goals(RECORDS))
+    for goal in found["goals"]:
+        assert f"| {goal['name']} | " in text
+        assert f" | {goal['count']} of {goal['of']} | " in text
 
 
 def test_a_line_that_a_stop_has_torn_is_left_out(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from .cases import random_case as cases
 from .cases.kept_back import write_kept_back
 from .cases.random_case import case
 from .cases.seeds import DEVELOPMENT_SEEDS
-from .learned import KINDS, LISTED, NONE, above, goals, planned, right_family, told
+from .learned import KINDS, LISTED, NONE, above, goals, planned, reported, right_family
 from .marking.families import NAMES, PHASES_OF_THEIR_OWN, REMOVED_DRIFT, RIGHT, named
 from .marking.sitting import Record
 from .simulator.newcomers import NEWCOMERS
@@ -73,7 +73,7 @@ def test_goals_count_what_they_say() -> None:
     assert (listed.found.count, listed.found.of) == (1, 1) and listed.met
     failed = {**answer(NONE, None), "said": None, "kept": None, "failed": "learn ended with 2"}
     assert goals([failed])[2].found.count == 1
-    assert "NO ANSWER" in told(failed) and "right" in told(records[0]) and "WRONG" in told(records[1])
+    assert "NO ANSWER" in reported(failed) and "right" in reported(records[0]) and "WRONG" in reported(records[1])
 
 
 def test_kinds_are_mixed_and_their_seeds_kept_apart() -> None:

@@ -16,7 +16,7 @@ from .cases.case_files import write_case
 from .cases.same_road import same_road_case
 
 
-def told_of(seed: int, effect: str | None, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+def reported_of(seed: int, effect: str | None, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     write_case(same_road_case(seed, effect, length_m=110.0, speeds_mps=(9.0, 15.0)), folder)
     for profile in folder.glob("run*/profile.csv"):
         profile.unlink()
@@ -32,20 +32,20 @@ def asked(folder: Path, **more: object) -> Namespace:
 
 @pytest.mark.slow
 def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = told_of(1, "sensor_mount_resonance", tmp_path, capsys)
-    first = next(one for one in told["candidates"] if one["effect"] == told["verdict"][0])
+    reported = reported_of(1, "sensor_mount_resonance", tmp_path, capsys)
+    first = next(one for one in reported["candidates"] if one["effect"] == reported["verdict"][0])
     assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
-    assert told["steps"][-1]["error"] < told["steps"][1]["error"] < told["baseline_error"]
-    assert {"sensor_gain", "tire_enveloping"} <= told["taken_by_road"].keys()
-    assert {"dry_friction", "speed_scale", "roll"} <= told["not_tried"].keys()
-    assert any("share one scale" in one or "only together" in one for one in told["sentences"])
+    assert reported["steps"][-1]["error"] < reported["steps"][1]["error"] < reported["baseline_error"]
+    assert {"sensor_gain", "tire_enveloping"} <= reported["taken_by_road"].keys()
+    assert {"dry_friction", "speed_scale", "roll"} <= reported["not_tried"].keys()
+    assert any("share one scale" in one or "only together" in one for one in reported["sentences"])
 
 
 @pytest.mark.slow
 def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = told_of(2, None, tmp_path, capsys)
-    assert told["verdict"] == []
-    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= told["candidates"][0].keys()
+    reported = reported_of(2, None, tmp_path, capsys)
+    assert reported["verdict"] == []
+    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= reported["candidates"][0].keys()
 
 
 def test_one_drive_is_refused(tmp_path: Path) -> None:

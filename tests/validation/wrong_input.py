@@ -6,8 +6,8 @@ Each case is one to four runs of the examination's simulator, with nothing, one 
 missing, or with distances that wander. As it is it must pass; with the profile of another case, with its own read
 backwards or beginning 50 m later, with elevations in mm or feet, and with accelerations in g or upside down, it must
 not. With the vehicle of the last case of its kind it must not where that model says next to nothing of the record; cars
-that are nearly alike cannot be told from a missing effect, and count as neither. Printed are the shares beside the
-goals. Seeds as in ``examine``.
+that are nearly alike cannot be distinguished from a missing effect, and count as neither. Printed are the shares beside
+the goals. Seeds as in ``examine``.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def main() -> int:
             (refused if complaint else passed)[ANOTHER_CAR] += 1
             print(f"{kind} {seed}, {ANOTHER_CAR}: {complaint or 'not refused'}", flush=True)
         cars[has_two_axles] = model
-    return max(list(_told(refused, passed)))
+    return max(list(_reported(refused, passed)))
 
 
 def says_little(runs: list[Run], model: Model) -> bool:
@@ -113,7 +113,7 @@ def refusal(runs: list[Run], model: Model) -> str | None:
     return None
 
 
-def _told(refused: Counter[str], passed: Counter[str]) -> Iterator[int]:
+def _reported(refused: Counter[str], passed: Counter[str]) -> Iterator[int]:
     """Print the figures; 1 for each goal that is missed."""
     print(f"right: {refused['right']} of {refused['right'] + passed['right']} refused (goal 0)")
     yield int(refused["right"] > 0)

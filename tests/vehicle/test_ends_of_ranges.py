@@ -1,4 +1,4 @@
-"""An effect whose numbers have run to the end of what they may be is told from one that is there."""
+"""An effect whose numbers have run to the end of what they may be is distinguished from one that is there."""
 
 from __future__ import annotations
 

@@ -48,8 +48,8 @@ def test_a_linear_effect_is_exact(name: str) -> None:
     known = known_vehicle(RAV4, [one])
     assert isinstance(known, LinearCar) and not known.depends_on_motion
     factor = complex(known.response(np.array([speed_mps / wave_m]), speed_mps)[0])
-    told = (-1j * 0.005 * factor * np.exp(2j * np.pi * place_m[600:1000] / wave_m)).real
-    assert np.sqrt(np.mean((seen - told) ** 2)) < 0.02 * np.sqrt(np.mean(told**2))
+    reported = (-1j * 0.005 * factor * np.exp(2j * np.pi * place_m[600:1000] / wave_m)).real
+    assert np.sqrt(np.mean((seen - reported) ** 2)) < 0.02 * np.sqrt(np.mean(reported**2))
 
 
 def test_a_mount_is_in_series_with_its_damper_and_a_tire_damps_beside_its_spring() -> None:

@@ -266,7 +266,7 @@ def test_a_compiled_law_answers_as_it_is_written() -> None:
     felt = np.linspace(-0.4, 0.6, law_call.FELT)
     seen = Seen(*felt[: law_call.MEMORY_AT], (felt[law_call.MEMORY_AT],))
     answers = np.zeros(law_call.ANSWERS)
-    given = np.array([9.0, *law_call.numbers_of(law)])
+    given = np.array([9.0, *law_call.numbers_in_order(law)])
     law_call.ask(law_call.address_of(law), given, 1, felt, answers)
     expected = force(values, seen), rates(values, seen)[0]
     assert answers[:2] == pytest.approx(expected, rel=1e-12)
@@ -336,12 +336,12 @@ def test_a_linear_one_moves_as_the_simulation_does(one: Chosen) -> None:
         did = march(car.structure, car.laws, elevation, (elevation[1:] + elevation[:-1]) / 2, step_s).states
         known = at(height, *effects, effect("tire_damping", tire_damping_n_s_per_m=1e-6))
         moves, s = known.waves(N_CPM, speed_mps), 2j * pi * N_CPM * speed_mps
-        told = deviation(s * (moves.height + moves.travel)[:, 0], height)
-        found.append((float(did[5000:, 2].std()), told))
-    (plain, plain_told), (with_it, told) = found
-    assert plain_told == pytest.approx(plain, rel=0.05)
+        reported = deviation(s * (moves.height + moves.travel)[:, 0], height)
+        found.append((float(did[5000:, 2].std()), reported))
+    (plain, plain_reported), (with_it, reported) = found
+    assert plain_reported == pytest.approx(plain, rel=0.05)
     assert abs(with_it / plain - 1) > 0.03
-    assert told == pytest.approx(with_it, rel=0.08)
+    assert reported == pytest.approx(with_it, rel=0.08)
 
 
 def test_modes_ring_as_the_waves_do() -> None:

@@ -71,10 +71,11 @@ def outputs_of(vehicle: Vehicle) -> list:
             tire_deflection(car, -1)]
 
 
-def as_outputs(told: Told, vehicle: Vehicle) -> np.ndarray:
+def as_outputs(reported: Told, vehicle: Vehicle) -> np.ndarray:
     ahead_m, left_m = 0.8 * (vehicle.rear is not None), 0.3 * (vehicle.track_width_m is not None)
-    point = told.body_mps2 + ahead_m * told.pitch_radps2 + left_m * told.roll_radps2
-    return np.stack([told.body_mps2, point, told.wheel_mps2[:, -1], told.travel_m[:, 0], told.tire_m[:, -1]], axis=1)
+    point = reported.body_mps2 + ahead_m * reported.pitch_radps2 + left_m * reported.roll_radps2
+    return np.stack([reported.body_mps2, point, reported.wheel_mps2[:, -1], reported.travel_m[:, 0], reported.tire_m[:,
+    -1]], axis=1)
 
 
 @cache

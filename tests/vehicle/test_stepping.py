@@ -328,7 +328,7 @@ def test_motions_of_a_linear_car_are_stepped_in_blocks(monkeypatch: pytest.Monke
         expected = respond(replace(car, bends_laws=True), passage)
         also = observed(replace(car, bends_laws=True), passage, outputs)
         with monkeypatch.context() as without:
-            without.setattr("logger.vehicle.compose.march", None)
+            without.setattr("logger.vehicle.compose.Stepper", None)
             found = respond(car, passage)
             assert observed(car, passage, outputs) == pytest.approx(also, abs=1e-9)
         for motion in ("accel_z_mps2", "travel_m", "rate_mps", "deflection_m", "deflection_mps"):

@@ -34,9 +34,9 @@ def test_numbers_that_hang_together_move_together() -> None:
 
 
 def test_an_effects_own_errors_count_where_no_others_are_known() -> None:
-    told = chosen(GAIN, {"gain": 1.0}, standard_errors={"gain": 0.05})
-    (alone,) = cars_off(RAV4, (told,), None)
-    (known,) = cars_off(RAV4, (told,), NumberErrors({"sensor_gain.gain": 0.1}))
+    reported = chosen(GAIN, {"gain": 1.0}, standard_errors={"gain": 0.05})
+    (alone,) = cars_off(RAV4, (reported,), None)
+    (known,) = cars_off(RAV4, (reported,), NumberErrors({"sensor_gain.gain": 0.1}))
     gains = [abs(one.sensors[0].values["gain"] - 1) for one in (alone, known) if isinstance(one, LinearCar)]
     assert gains == pytest.approx([0.05, 0.1], rel=0.1)
     assert cars_off(RAV4, (), None) == ()

@@ -19,7 +19,8 @@ from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.iso8608 import iri_class
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.checks import Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 Array = npt.NDArray[np.float64]
 
@@ -46,9 +47,9 @@ def run(folder: Path, effort: Effort) -> Result:
              "shown to be right.")
     speed = _speeds(log, recording)
     if speed is not None:
-        tables.append(Table("The receiver's speed beside the car's", (
+        tables.append(Table("The receiver's speed against the car's", (
             Column("figure"), Column("read before", ".3g"), Column("ours", ".3g")), speed))
-    return Result(tuple(tables), words, (_map(drives),))
+    return Result(tuple(tables), words, (Picture(_map(drives)),))
 
 
 def segment(log: Path) -> Recording:
@@ -123,7 +124,9 @@ STUDY = Study(
     "The segment goes the way of any recording: extract --csv with the receiver's places and speed, then estimate with "
     "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
     "middle, unless --vehicle names another car. This was run on the real minute.",
-    from_folder("comma2k19", _DOWNLOAD, run), ("comma2k19",), Word.NOT_REPRODUCIBLE,
-    "Of this minute no IRI is printed; the receiver's speed is later and faster than the car's, by the figures "
-    "above.",
+    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE, "Of this minute no IRI is "
+                                                                                        "printed; the receiver's "
+                                                                                        "speed is later and faster "
+                                                                                        "than the car's, by the "
+                                                                                        "figures above."),),
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

@@ -2,10 +2,10 @@
 
 Layout as the readers of the set's own users have it (github.com/rreezN/CrackDetect, Apache 2.0; names and columns alone
 were taken from there). ``platoon_CPH1_HH.hdf5``: group GM, below it trips, below those passes, each with signals (n, 2
-or more), seconds in the first column: ``acc.xyz`` [g], ``gps`` (latitude, longitude), ``spd_veh`` [km/h].
-``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for 10 m each, from ``Distance [m]``
-on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of another profiler, ARAN, with
-places. HH and VH are the two carriageways: two roads.
+or more), seconds in the first column: ``acc.xyz`` (gravity in it, whose size tells the unit), ``gps`` (latitude,
+longitude), ``spd_veh`` [km/h]. ``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for
+10 m each, from ``Distance [m]`` on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of
+another profiler, ARAN, with places. HH and VH are the two carriageways: two roads.
 """
 
 from __future__ import annotations
@@ -18,7 +18,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, each_pass, on_line, runs_of, windows_of
+from logger.api.road_passes import (
+    WINDOWS_M,
+    DrivenWindows,
+    Recording,
+    each_pass,
+    on_line,
+    runs_of,
+    unit_by_gravity,
+    windows_of,
+)
 from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
@@ -27,7 +36,8 @@ from logger.roads.agreement import best_shift_m, matching_cells, mean_between
 from logger.shipped import vehicle_path
 from logger.store.formats.semicolon_table import read_semicolons
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.study import Effort, Result, Study, Table, Word
+from logger.studies.checks import Word
+from logger.studies.study import Effort, Item, Picture, Result, Study, Table
 from logger.units import KMH_MPS
 
 Array = npt.NDArray[np.float64]
@@ -78,12 +88,12 @@ def run(folder: Path, effort: Effort) -> Result:
     if not parts:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
     tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
-    tables.append(Table("The profilers beside each other", REPEAT_COLUMNS, tuple(repeats)))
-    pictures = tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
+    tables.append(Table("The profilers against each other", REPEAT_COLUMNS, tuple(repeats)))
+    pictures = tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
     return Result(tuple(tables), verdict_of(parts, refused, _CEILING), pictures)
 
 
-_CEILING = ("The profilers beside each other are the ceiling: no car can agree better with one of them than the other "
+_CEILING = ("The profilers against each other are the ceiling: no car can agree better with one of them than the other "
             "does.")
 
 
@@ -125,7 +135,7 @@ def _recording(name: str, group: Any) -> Recording:
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
     inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
     gps = gps[inside]
-    return Recording(name, accel[:, 0], accel[:, 1:4], "g", gps[:, 0],
+    return Recording(name, accel[:, 0], accel[:, 1:4], unit_by_gravity(accel[:, 1:4]), gps[:, 0],
                      np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
 
 
@@ -207,23 +217,23 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
     left, right = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
                    for one in (road.left_m_per_km, road.right_m_per_km))
-    rows = [repeat_row(road.name, f"P79, right track beside left, {window_m:g} m", right, left)]
+    rows = [repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
     if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
         theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
                                        _MOST_CELLS)
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
         both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
                 mean_between(road.edges_m, known, begin_m, begin_m + window_m))
-        rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", *both, _CELL_M * cells))
+        rows.append(repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, _CELL_M * cells))
     return rows
 
 
 _DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
 STUDY = Study(
-    "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "IRI of P79",
+    "lira_cd", "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
     "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie on the "
     "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
     "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. "
     "The reader is tested on small files of the same layout.",
-    from_folder("LiRA-CD", _DOWNLOAD, run), ("LiRA-CD",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")

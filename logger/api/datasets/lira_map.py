@@ -23,14 +23,17 @@ from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.agreement import best_shift_m, matching_cells, mean_between
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.checks import Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 Array = npt.NDArray[np.float64]
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
 _WINDOWS_M = (10.0, 100.0)
 _CELL_M, _MOST_CELLS = 10.0, 1
+_STRETCH_CELLS, _STRETCH_MOST_M = 20, 4.0
 _MOST_BYTES = 64 << 20
+_PIECEWISE = "laid over, each 200 m moved by up to 4 m"
 
 
 class ProfilerPass:
@@ -65,25 +68,30 @@ def run(folder: Path, effort: Effort) -> Result:
         tables.append(Table(f"Windows of {window_m:g} m", REPEAT_COLUMNS, tuple(rows)))
         ours.append([row[3] for row in rows if isinstance(row[3], float)])
         off_m_per_km.append(max(row[8] for row in rows if isinstance(row[8], float)))
+    squared = [float(np.mean([row[7] for row in table.rows if row[1] == _PIECEWISE])) for table in tables]
     columns = (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f"))
     length = Table("The passes", columns, tuple(
         (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
     spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]
     verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m, the lower "
-               "ones where its cells lie up to 5 m apart; two passes differ by up to "
-               f"{off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than "
-               "that against one pass: it is the ceiling of every comparison on real roads.")
-    return Result((*tables, length), verdict, (_picture(passes),))
+               f"ones where its cells lie up to 5 m apart; two passes differ by up to {off_m_per_km[0]:.2f} and "
+               f"{off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than that against one pass: it "
+               "is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per 100 m "
+               "that are quoted of these files are another thing: the squared correlation, which a pass that reads 4 "
+               "% more does not spoil, and after each stretch of road has been moved along by up to 4 m to where it "
+               f"fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on the mean of the three "
+               "pairs; moving so many pieces fits some of the noise as well.")
+    return Result((*tables, length), verdict, (Picture(_picture(passes)),))
 
 
 def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tuple[str | float | None, ...]]:
-    """The other pass on the distance of the one, in two ways that hold the truth between them."""
+    """The other pass on the distance of the one, in three ways, of ever more freedom."""
     at_m, aside_m = one.line.passed(other.lat_deg, other.lon_deg)
     on = (aside_m <= ASIDE_M) & np.append(True, np.diff(np.maximum.accumulate(at_m)) > 0)
     at_m, values = at_m[on], other.iri_m_per_km[on]
     begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - window_m + 1, window_m)
     ends_m = (begin_m, begin_m + window_m)
-    names = f"{other.name} beside {one.name}"
+    names = f"{other.name} against {one.name}"
     theirs, cells = matching_cells(one.begin_m, one.iri_m_per_km, at_m, values, _MOST_CELLS)
     mine = np.where(np.isfinite(theirs), one.iri_m_per_km, np.nan)
     nearest = (mean_between(one.edges_m, theirs, *ends_m), mean_between(one.edges_m, mine, *ends_m))
@@ -91,8 +99,24 @@ def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tup
     whole = mean_between(one.edges_m, one.iri_m_per_km, *ends_m)
     shift_m = best_shift_m(edges_m, values, *ends_m, whole, _MOST_CELLS * _CELL_M)
     moved = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
+    piecewise, along_m = _moved_piecewise(one, edges_m, values)
+    fitted = mean_between(one.edges_m, piecewise, *ends_m)
     return [repeat_row(names, "nearest cells", *nearest, _CELL_M * cells),
-            repeat_row(names, "laid over", moved, whole, shift_m)]
+            repeat_row(names, "laid over", moved, whole, shift_m),
+            repeat_row(names, _PIECEWISE, fitted, np.where(np.isfinite(fitted), whole, np.nan), along_m)]
+
+
+def _moved_piecewise(one: ProfilerPass, edges_m: Array, values: Array) -> tuple[Array, float]:
+    """The other pass on the cells of the one (k,), each stretch of 200 m moved along to where it fits best; and by how
+    much on the mean [m]."""
+    found, shifts = np.full(len(one.begin_m), np.nan), []
+    for start in range(0, len(found), _STRETCH_CELLS):
+        part = slice(start, start + _STRETCH_CELLS)
+        begin_m = one.begin_m[part]
+        shift_m = best_shift_m(edges_m, values, begin_m, begin_m + _CELL_M, one.iri_m_per_km[part], _STRETCH_MOST_M)
+        found[part] = mean_between(edges_m, values, begin_m + shift_m, begin_m + shift_m + _CELL_M)
+        shifts.append(shift_m)
+    return found, float(np.mean(shifts))
 
 
 def _picture(passes: list[ProfilerPass]) -> Curves:
@@ -108,9 +132,10 @@ _DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is rea
 STUDY = Study(
     "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
     "Three passes over some 26 km of Danish road, by their places. Their cells of 10 m begin at different places. "
-    "Nearest: each beside the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
+    "Nearest: each against the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
     "over: means of two cells' parts, smoother than what was measured, which makes them more alike. The truth lies "
-    "between. This was run on the real files.",
-    from_folder("LiRA-Map", _DOWNLOAD, run), ("LiRA-Map",), Word.NOT_REPRODUCIBLE,
-    "Run on the real files, it gives the ceiling that is printed beside every other set; no paper prints it.",
+    "between. Moved piece by piece they are more alike still, for each piece may follow the noise. This was run on the "
+    "real files.",
+    from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
+    "Run on the real files, it gives the ceiling that is printed with every other set; no paper prints it."),),
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

@@ -15,13 +15,21 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
+from logger.api.road_passes import (
+    WINDOWS_M,
+    DrivenWindows,
+    Recording,
+    driven_windows,
+    each_pass,
+    unit_by_gravity,
+)
 from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.study import Effort, Result, Study, Word
+from logger.studies.checks import Word
+from logger.studies.study import Effort, Item, Picture, Result, Study
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +87,7 @@ def run(folder: Path, effort: Effort) -> Result:
         raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {(refused + elsewhere)[0]}")
     tables = tuple(compared_table(parts, window_m) for window_m in WINDOWS_M)
     return Result(tables, verdict_of(parts, refused, _ceiling()),
-                  tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))
+                  tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1]))
 
 
 def _ceiling() -> str:
@@ -125,12 +133,11 @@ def trip(file: Path) -> Recording:
         raise BadInput(f"{file}: expected {', '.join(_TRIP)} of one length, found "
                        f"{', '.join(str(len(one)) for one in columns)}")
     time_s, x, y, z, speed_mps, lat_deg, lon_deg = columns
-    size = float(np.median(np.sqrt(x**2 + y**2 + z**2)))
-    unit = "g" if size < 5 else "m/s2"  # what gravity is in them
+    accel = np.column_stack([x, y, z])
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
     second = np.floor((time_s - time_s[0]) / _FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
-    return Recording(file.stem, time_s, np.column_stack([x, y, z]), unit, time_s[kept], speed_mps[kept], lat_deg[kept],
+    return Recording(file.stem, time_s, accel, unit_by_gravity(accel), time_s[kept], speed_mps[kept], lat_deg[kept],
                      lon_deg[kept])
 
 
@@ -145,10 +152,10 @@ def _together(road: str, window_m: float, found: list[tuple[str, DrivenWindows]]
 
 _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
 STUDY = Study(
-    "zenodo_4386256", "Phones at 100 Hz beside laser profiles, 10 m and 100 m", "Three roads",
+    "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
     "Each trip goes the way of any recording: extract --csv --profile lays it on the laser profile, by the phone's "
     "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
     "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested "
     "on small files of the same layout.",
-    from_folder("Zenodo 4386256", _DOWNLOAD, run), ("Zenodo 4386256",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    from_folder("Zenodo 4386256", _DOWNLOAD, run), (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")

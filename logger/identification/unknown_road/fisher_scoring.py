@@ -18,8 +18,8 @@ from logger.identification.unknown_road.road_state import (
     OFFSET,
     SCALE,
     WAVINESS,
-    LinearCar,
     Options,
+    ResponseCar,
     RoadState,
     at_n0,
 )
@@ -76,7 +76,7 @@ class RoadFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class LikelihoodScore:
     """A place, the likelihood's slopes there (m,), the information (m, m), how much is left unexplained, and what has
     been learnt of the slopes' change, in standard errors."""
 
@@ -94,7 +94,7 @@ class RoadProblem:
     the first; the noise.
     """
 
-    def __init__(self, car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options) -> None:
+    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options) -> None:
         self.car, self.options, self.free = car, options, list(car.parameters)
         if not self.free or not roads or not all(roads):
             raise ValueError("expected at least one free number, and a drive over every road")
@@ -141,14 +141,14 @@ class RoadProblem:
                         x[part[first + later + number]] = (scale - 1) / HUNDREDTH
         return x
 
-    def beside(self, x: Array) -> Array:
-        """A place a little beside a start, where no symmetry of the start hides anything."""
+    def shifted(self, x: Array) -> Array:
+        """A place a little shifted a start, where no symmetry of the start hides anything."""
         nudge = np.zeros_like(x)
         p = len(self.free)
         nudge[:p] = _NUDGE * np.cos(1.0 + 2.0 * np.arange(p)) * (p > 1)
         return np.clip(x + nudge, self.low, self.high)
 
-    def look(self, x: Array, information: bool) -> Score:
+    def look(self, x: Array, information: bool) -> LikelihoodScore:
         """Slopes at a place and, if asked for, the information."""
         m = len(x)
         slopes, matrix = np.zeros(m), np.zeros((m, m))
@@ -160,9 +160,9 @@ class RoadProblem:
             matrix[np.ix_(part, part)] += known * np.outer(scale[part], scale[part])
             left, whole = left + squares[0], whole + squares[1]
         error = float(np.sqrt(left / whole)) if whole > 0 else float("nan")
-        return Score(x, slopes, matrix, error, np.empty((0, 0)))
+        return LikelihoodScore(x, slopes, matrix, error, np.empty((0, 0)))
 
-    def descend(self, here: Score) -> tuple[Score, bool, int]:
+    def descend(self, here: LikelihoodScore) -> tuple[LikelihoodScore, bool, int]:
         """Steps until they come to rest: the last place, whether they did, and how many."""
         settled, steps = False, 0
         while not settled and steps < self.options.most_steps:
@@ -170,7 +170,7 @@ class RoadProblem:
             steps += 1
         return here, settled, steps
 
-    def step(self, here: Score) -> tuple[Score, bool]:
+    def step(self, here: LikelihoodScore) -> tuple[LikelihoodScore, bool]:
         """Fisher's step, within bounds and not too long; and whether what was left was nothing to the errors.
 
         Near the end the information is kept, and ``correction`` learns from each step how the slopes really change (C.
@@ -194,13 +194,14 @@ class RoadProblem:
         correction = correction + np.outer(missed, along) / (part * float(along @ along))
         return replace(new, information=here.information, correction=correction), False
 
-    def structural(self, here: Score) -> list[Finding]:
-        """What no such drives could tell, of the car and of all else that is not known."""
+    def structural(self, here: LikelihoodScore) -> list[Finding]:
+        """What no such drives could determine, of the car and of all else that is not known."""
         powers, directions = np.linalg.eigh(here.information)
         derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
         return structural(self.names, derivatives, 1.0, _NOTHING)
 
-    def result(self, here: Score, before: float, findings: list[Finding], settled: bool, steps: int) -> RoadFit:
+    def result(self, here: LikelihoodScore, before: float, findings: list[Finding],
+               settled: bool, steps: int) -> RoadFit:
         """All of it."""
         p = len(self.free)
         whiten = whitening(here.information)
@@ -234,7 +235,7 @@ class RoadProblem:
         return RoadFit(numbers, errors, roads, road_errors, relative, self.names, elevations,
                        [road.grid for road in self.roads], before, here.error, findings, settled, steps, at_bound)
 
-    def _apart(self, here: Score) -> list[Finding]:
+    def _apart(self, here: LikelihoodScore) -> list[Finding]:
         """Whether drives that are said to be over one road disagree on it."""
         together = float(np.exp(here.x[-1]))
         for number, (road, part) in enumerate(zip(self.roads, self.places, strict=True), 1):

@@ -6,7 +6,7 @@ it would explain anything. Solution: a road of ISO 8608 is a Gaussian process, s
     y = A(theta) z + noise,   z of the spectrum Gd(n0) (n / n0)^-w,   C = A S A' + sigma^2,
 
 and the numbers are those of the largest likelihood of y with the road integrated out. Several drives over one road
-share z: what one of them says of the road, another one has to agree with at its own speed, and that tells far more of
+share z: what one of them says of the road, another one has to agree with at its own speed, and that says far more of
 the car than the spectrum alone.
 
 C is never formed. A drive is applied to a road, and back, by transforms (``Crossing``), at any speed; the most probable
@@ -18,8 +18,8 @@ The expectation, else a trace of huge matrices, is a mean over ``probes`` simula
 estimate is then a root of a smooth function, unbiased however few they are, and its variance grows by one part in
 ``last_probes``; the way there takes fewer. Steps are Fisher's, whose matrix comes from the same probes.
 
-Nothing here knows a vehicle: ``LinearCar`` is all that is asked for. Numbers that no such drive can tell (masses, rates
-and dampers all larger by one factor) are refused (``identifiability``).
+Nothing here knows a vehicle: ``ResponseCar`` is all that is asked for. Numbers that no such drive can determine
+(masses, rates and dampers all larger by one factor) are refused (``identifiability``).
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from logger.identification.unknown_road.road_equations import MOST_ROUNDS, Drive
 from logger.identification.unknown_road.road_state import (
     GD_N0,
     HUNDREDTH,
-    LinearCar,
     Options,
+    ResponseCar,
     RoadState,
     at_n0,
     by_waviness,
@@ -56,7 +56,7 @@ _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
 class UnknownRoad:
     """One road and the drives over it: what they say of a car's numbers, the road's, their places and the noise."""
 
-    def __init__(self, car: LinearCar, drives: list[Drive], options: Options, generator: np.random.Generator) -> None:
+    def __init__(self, car: ResponseCar, drives: list[Drive], options: Options, generator: np.random.Generator) -> None:
         self._car, self._options = car, options
         highest = max(_highest_cpm(drive) for drive in drives)
         spacing_m = float(np.clip(1 / (_PER_WAVE * min(highest, _SHORTEST_CPM)), *_SPACING_M))
@@ -115,7 +115,7 @@ class UnknownRoad:
                               model.responses[number], self.grid.wave_number_cpm, model.waves[0], white,
                               self._options.place_off_m, self._options.scale_off)
 
-    def with_car(self, car: LinearCar) -> UnknownRoad:
+    def with_car(self, car: ResponseCar) -> UnknownRoad:
         """The same road and drives with another car, whose axles stand where they stood."""
         other = copy(self)
         other._car = car

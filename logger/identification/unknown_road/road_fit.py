@@ -8,10 +8,10 @@ from dataclasses import replace
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.fisher_scoring import RoadFit, RoadProblem
-from logger.identification.unknown_road.road_state import LinearCar, Options
+from logger.identification.unknown_road.road_state import Options, ResponseCar
 
 
-def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options | None = None) -> RoadFit:
+def fit_roads(car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options | None = None) -> RoadFit:
     """Fit a car's free numbers to drives, those over one road together.
 
     Raises NotIdentifiable when the drives cannot tell them, ValueError for no drive or no free number.
@@ -19,7 +19,7 @@ def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options
     options = options or Options()
     problem = RoadProblem(car, roads, options)
     x = problem.start()
-    first = problem.look(problem.beside(x), information=True)
+    first = problem.look(problem.shifted(x), information=True)
     findings = problem.structural(first)
     if findings and options.refuse:
         raise NotIdentifiable(findings)

@@ -1,7 +1,7 @@
 """Numbers of a car, a road and the drives over it: their names, how they are asked for, and the road's spectrum.
 
 The prior of a road is that of ISO 8608, Gd(n0) (n / n0)^-w, flat below the longest waves. Its level is counted at a
-pivot where a car is shaken, so that level and waviness can be told apart.
+pivot where a car is shaken, so that level and waviness can be separated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HUNDREDTH = 0.01
 """A scale of distances moves by hundredths."""
 
 
-class LinearCar(Protocol):
+class ResponseCar(Protocol):
     """A car as far as it is known here."""
 
     @property
@@ -56,7 +56,7 @@ class Options:
     most_steps       of Fisher's
     solved           what is left of a set of equations when it counts as solved, of what it began with
     fisher_probes    simulated drives that the information is a mean over
-    refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` tells
+    refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` says it
     """
 
     waviness: float = STANDARD_WAVINESS

@@ -40,9 +40,9 @@ class Draft:
     shown_by     the drive that would show it best
     method       the function of its class, as its lines stand in the class without their indentation
     functions    what stands before the class: constants, and functions that the method hands on
-    imports      lines beside those of numpy and of the class
+    imports      lines other than those of numpy and of the class
     axle         "front" or "rear": a force at this axle alone; "": at every wheel
-    variant      tells laws of one family from each other
+    variant      distinguishes laws of one family
     at           what a picture draws its force over: "rate", "travel" or "deflection"; "loop": over the travel as it
                  goes to and fro; "": there is no picture
     reference    where a force is what its number says, if there is such a place

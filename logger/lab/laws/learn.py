@@ -2,10 +2,10 @@
 
 Problem: something differs, none of the known effects is it, and the user is left with a shape. Solution: first the
 known effects are searched, as a diagnosis does. Where nothing is missing, nothing is learned. Else families of laws are
-screened beside the model without any effect, the promising ones are fitted, and the same evidence that chooses among
+screened on top of the model without effects, the promising ones are fitted, and the same evidence that chooses among
 effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no law alone explains
-what is missing, laws are tried beside the known effects that were found. Where these leave nothing, a law takes their
-place only by decisive evidence.
+what is missing, laws are tried together with the known effects that were found. Where these leave nothing, a law takes
+their place only by decisive evidence.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from logger.vehicle.effect import Chosen, Effect
 Progress = Callable[[str], None]
 
 DECISIVE = 2 * CONFUSED
-"""What a law has to gain over known effects that explain all: they are told from each other, and that twice."""
+"""What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Effort:
 class LawFit:
     """A law that was fitted.
 
-    base    the model beside which it was
+    base    the model that it was added to
     """
 
     family: Family
@@ -91,7 +91,7 @@ class Nearest:
 
     @property
     def as_good(self) -> bool:
-        """Whether the data do not tell the two apart."""
+        """Whether the data do not distinguish the two."""
         return self.gain > self.law_gain - CONFUSED
 
 
@@ -100,7 +100,7 @@ class Law:
     """A law that was chosen.
 
     one        with the numbers of the search
-    beside     known effects that are missing beside it, with theirs
+    beside     known effects that are missing as well, with theirs
     gain       of minus twice the log of the evidence over the model without it
     listed     what the known effects alone gain over the car without any, and ``with_law`` what the law and those
                beside it gain
@@ -198,7 +198,7 @@ class _Chooser:
         return None if model is None or is_left_over(model) else law
 
     def beside(self) -> Law | None:
-        """A law beside known effects, or one that explains more than they do, though not all."""
+        """A law together with known effects, or one that explains more than they do, though not all."""
         now, before = self.selection.now, self.selection.before
         names = now.state.names[self.search.present:]
         bases = [before, now] if names else [before]
@@ -226,7 +226,7 @@ class _Chooser:
         return law, model
 
     def _fitted_beside(self, base: Baseline) -> list[LawFit]:
-        """Laws fitted beside a model, once."""
+        """Laws fitted on top of a model, once."""
         for known, fits in self.kept:
             if known is base:
                 return fits
@@ -261,7 +261,7 @@ class _Chooser:
 
     def _screened(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
                   ) -> list[tuple[Family, Draft, Screened]]:
-        """Laws with what they promise beside a model, the most promising first."""
+        """Laws with what they promise on top of a model, the most promising first."""
         found = []
         for done, ((family, draft), one) in enumerate(zip(drafted, pool.map(
                 lambda pair: screened_law(base, pair[1], self.search.seen), drafted), strict=True), 1):
@@ -279,8 +279,8 @@ class _Chooser:
                 and not one.fit.hold_out.raises(one.base.hold_out))
 
     def _simplest(self, there: Sequence[LawFit]) -> LawFit:
-        """Of laws that cannot be told from the likeliest, the one with the fewest other effects beside it, and then the
-        fewest numbers."""
+        """Of laws that cannot be distinguished from the likeliest, the one with the fewest other effects with it, and
+        then the fewest numbers."""
         near = [one for one in there if one.score < there[0].score + CONFUSED]
         return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
 

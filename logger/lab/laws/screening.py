@@ -1,4 +1,4 @@
-"""What a drafted law would gain beside a model, by slopes: where a fit of it may begin.
+"""What a drafted law would gain on top of a model, by slopes: where a fit of it may begin.
 
 A law with one strength is tried as an effect of the list is (``selection.screening``). A curve has many: what each of
 them does to the predictions is taken near nothing, and all are solved for together with the car's numbers (one step of
@@ -17,7 +17,7 @@ from logger.vehicle.effect_parameters import Move, coordinates_of, moved
 
 
 def screened_law(base: Baseline, draft: Draft, seen: Misalignment) -> Screened:
-    """Trials of a law beside a model, the most promising first."""
+    """Trials of a law on top of a model, the most promising first."""
     if len(draft.strengths) < 2:
         return screened(base, draft.effect, [seen])
     effect = draft.effect

@@ -30,9 +30,18 @@ class ClockedRecord(RecordError):
         """None: there is no distance."""
         return 0
 
+    @property
+    def trend(self) -> Array:
+        """There is none (2, 0)."""
+        return np.empty((2, 0))
+
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (2, 2)."""
         return np.diag([self.tolerance.gain**-2, self.tolerance.droop**-2])
+
+    def trend_precisions(self, size: ErrorSize) -> Array:
+        """None (0,)."""
+        return np.empty(0)
 
     def log_determinant(self, size: ErrorSize) -> float:
         """Of the precision."""

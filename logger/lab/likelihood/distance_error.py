@@ -105,15 +105,11 @@ class RecordError:
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
         """That of a run."""
-        from scipy.interpolate import BSpline
-
-        lasts_s, cubic = (run.count - 1) / run.rate_hz, 3
+        lasts_s = (run.count - 1) / run.rate_hz
         pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
-        curves = BSpline.design_matrix(np.linspace(0, pieces, run.count), np.arange(-cubic, pieces + cubic + 1.0),
-                                       cubic).toarray()
         late_s = run.facts.delay_std_s or None if run.facts.places_by == "receiver" else None
         late = [run.speed_mps] if late_s else []
-        basis = np.vstack([curves.T, *late, run.distance_m - run.distance_m[0], -_roughness(run)])
+        basis = np.vstack([_curves(pieces, run.count), *late, run.distance_m - run.distance_m[0], -_roughness(run)])
         return RecordError(run, basis, tolerance, lasts_s / pieces, late_s)
 
     @property
@@ -128,13 +124,22 @@ class RecordError:
 
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
-        walk, start = self._precisions
-        start_m, walk_m = self._own(size)
-        found = walk / (walk_m**2 * self.knot_s) + start / start_m**2
-        np.einsum("ii->i", found)[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
+        found = self._walk_precision / (self._own(size)[1] ** 2 * self.knot_s)
+        np.einsum("ii->i", found)[-3:] += 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
         if self.late_s is not None:
             found[self.coefficients, self.coefficients] += self.late_s**-2
+        return found + (self.trend * self.trend_precisions(size)) @ self.trend.T
+
+    @cached_property
+    def trend(self) -> Array:
+        """Start and factor are products of k with these columns (k, t)."""
+        found = np.zeros((self.count, 2))
+        found[: self.coefficients, 0], found[-4, 1] = self.basis[: self.coefficients, 0], 1.0
         return found
+
+    def trend_precisions(self, size: ErrorSize) -> Array:
+        """Of start and factor (t,)."""
+        return np.array([self._own(size)[0], size.scale]) ** -2
 
     def _own(self, size: ErrorSize) -> tuple[float, float]:
         """Start and walk [m] of this run, if those of a good recorder were of a size."""
@@ -142,14 +147,10 @@ class RecordError:
         return size.start_m * (usual.start_m / USUAL.start_m), size.walk_m * (usual.walk_m / USUAL.walk_m)
 
     @cached_property
-    def _precisions(self) -> tuple[Array, Array]:
-        """The precision (k, k) of the walk, if each of its steps had a deviation of one, and that of the start."""
-        walk, start = np.zeros((2, self.count, self.count))
-        count = self.coefficients
-        steps = np.diff(np.eye(count), axis=0)
-        walk[:count, :count] = steps.T @ steps
-        start[:count, :count] = np.outer(self.basis[:count, 0], self.basis[:count, 0])
-        return walk, start
+    def _walk_precision(self) -> Array:
+        """The precision (k, k) of the walk, if each of its steps had a deviation of one."""
+        steps = np.diff(np.eye(self.coefficients, self.count), axis=0)
+        return steps.T @ steps
 
     def log_determinant(self, size: ErrorSize) -> float:
         """Of the precision."""
@@ -223,13 +224,30 @@ def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:
     return found
 
 
+def _curves(pieces: int, count: int) -> Array:
+    """Cubic B-splines with a knot after each of so many pieces, at ``count`` places from end to end (pieces + 3, n)."""
+    place = np.linspace(0, pieces, count)
+    first = np.minimum(place.astype(np.intp), pieces - 1)
+    u = place - first
+    found = np.zeros((pieces + 3, count))
+    for later, weight in enumerate((
+            (1 - u) ** 3, (3 * u - 6) * u**2 + 4, ((3 - 3 * u) * u + 3) * u + 1, u**3)):
+        found[first + later, np.arange(count)] = weight / 6
+    return found
+
+
 def _roughness(run: Run, smooth_s: float = 1.0) -> Array:
     """What of a run's distance (n,) no car drives [m]: within so short a time its speed changes by no more than a cubic
-    curve does."""
-    from scipy.signal import savgol_filter
-
-    size = min(round(smooth_s * run.rate_hz), run.count - 1) // 2 * 2 + 1
-    return np.asarray(run.distance_m - savgol_filter(run.distance_m, size, 3)) if size > 3 else np.zeros(run.count)
+    curve does (A. Savitzky and M. Golay, Analytical Chemistry 36, 1964). The curve at an end serves up to there."""
+    half = min(round(smooth_s * run.rate_hz), run.count - 1) // 2
+    if half < 2:
+        return np.zeros(run.count)
+    powers = np.vander(np.linspace(-1, 1, 2 * half + 1), 4)
+    smooth = powers @ np.linalg.pinv(powers)
+    way = run.distance_m - run.distance_m[0]
+    inside = np.convolve(way, smooth[half], "valid")
+    return np.asarray(way - np.concatenate([smooth[:half] @ way[: 2 * half + 1], inside,
+                                            smooth[half + 1 :] @ way[-2 * half - 1 :]]))
 
 
 def _by_recorder(prediction: Array, rise: Array, run: Run) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,8 @@ from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 
+_LOOSE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
+"""Starts and factors that are as good as free; what a run does not tell of them is not singular yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,24 +43,66 @@ class _Record:
         """Cholesky's factor of the information (k, k), lower."""
         return np.asarray(np.linalg.cholesky(self.gram + self.error.precision(size)), float)
 
-    def lack(self, size: ErrorSize) -> float:
-        """Minus twice the log of the evidence for a size, without its constant."""
+    def lack(self, size: ErrorSize, walks: dict[float, _Walk]) -> float:
+        """Minus twice the log of the evidence for a size, without its constant.
+
+        walks    what is known of sizes of the walk already
+        """
+        if size.walk_m not in walks:
+            walks[size.walk_m] = _Walk.of(self, size)
+        walk, weights = walks[size.walk_m], self.error.trend_precisions(size) - self.error.trend_precisions(_LOOSE)
+        there = self.error.trend.T @ self.here
+        # M. Woodbury's identity: start and factor are two numbers among hundreds.
+        small = np.eye(len(weights)) + weights[:, None] * (walk.trend.T @ walk.trend)
+        grown = walk.grown - walk.trend @ (weights * there)
+        by_trend = walk.trend.T @ grown
+        return float(walk.log_determinant + np.linalg.slogdet(small)[1] - self.error.log_determinant(size)
+                     + walk.cost + weights @ there**2
+                     - grown @ grown + by_trend @ np.linalg.solve(small, weights * by_trend))
+
+
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """The record error of one run whose start and factor may be nearly anything, beside a state: the logarithm of the
+    information's determinant, the cost of the numbers as they are, and their pull (k,) and the trend (k, 2) through
+    its Cholesky factor."""
+
+    log_determinant: float
+    cost: float
+    grown: Array
+    trend: Array
+
+    @staticmethod
+    def of(record: _Record, size: ErrorSize) -> _Walk:
+        """Of a run, if the walk is of this size."""
         from scipy.linalg import solve_triangular
 
-        precision, root = self.error.precision(size), self.root(size)
-        grown = solve_triangular(root, self.pull - precision @ self.here, lower=True)
-        return float(_log_determinant(root) - self.error.log_determinant(size)
-                     + self.here @ precision @ self.here - grown @ grown)
+        precision, here = record.error.precision(replace(_LOOSE, walk_m=size.walk_m)), record.here
+        root, owed = np.asarray(np.linalg.cholesky(record.gram + precision), float), precision @ here
+        both = solve_triangular(root, np.column_stack([record.pull - owed, record.error.trend]), lower=True)
+        return _Walk(_log_determinant(root), float(here @ owed), both[:, 0], both[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Predictions beside a state with the most likely record errors: whitened residuals (kept,) per run, the numbers of
-    the record errors (k,) per run, and the squares of both."""
+    """Predictions beside a state with the most likely record errors.
 
-    residuals: list[Array]
+    record         numbers of the record errors (k,) per run
+    squares        of the whitened residuals and of these numbers
+    left, steps    whitened residuals (kept,) per run before the record errors took these steps (k,) ...
+    slopes         ... along what they do (k, kept)
+    """
+
     record: list[Array]
     squares: float
+    left: list[Array]
+    steps: list[Array]
+    slopes: list[Array]
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Whitened (kept,) per run."""
+        return [white - step @ slopes for white, step, slopes in zip(self.left, self.steps, self.slopes, strict=True)]
 
 
 class LinearModel:
@@ -124,9 +169,11 @@ class LinearModel:
     def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
         """By evidence, from a size or from one whose start and factor are ten times as large as usual: what these
         explain, a walk explains as well, and there may be an optimum at either."""
+        walks: list[dict[float, _Walk]] = [{} for _ in self._records]
+
         def lack(logs: Array) -> float:
             found = ErrorSize.of(logs)
-            return sum(one.lack(found) for one in self._records) + found.cost
+            return sum(one.lack(found, known) for one, known in zip(self._records, walks, strict=True)) + found.cost
 
         here, least = _descended(lack, size.logs)
         trend = USUAL.logs + np.log([10.0, 1.0, 10.0])
@@ -182,16 +229,17 @@ class LinearModel:
         """The same of what predictions leave (n,), per run, that were laid out with record errors (k,)."""
         from scipy.linalg import cho_solve
 
-        absorbed, record, squares = [], [], 0.0
+        record, squares, whites, steps = [], 0.0, [], []
         for left, whitener, root, precision, one, here in zip(
                 residuals, self.whiteners, self._roots, self._precisions, self._records, laid, strict=True):
             white = whitener(left)
             owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)
-            absorbed.append(white - step @ one.white)
+            whites.append(white)
+            steps.append(step)
             record.append(here + step)
             squares += float(white @ white + here @ precision @ here - owed @ step)
-        return Eliminated(absorbed, record, squares)
+        return Eliminated(record, squares, whites, steps, [one.white for one in self._records])
 
     def objective(self, predictions: Sequence[Array], logs: Array, laid: Sequence[Array] | None = None) -> float:
         """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""

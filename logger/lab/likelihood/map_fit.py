@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from logger.fitting.levenberg_marquardt import minimise
 from logger.lab.likelihood.lag import followed_m, shift_m
-from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.linear_model import Eliminated, LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen
@@ -59,9 +59,11 @@ class MapFit:
         """The state that a model is linear beside."""
         return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
 
-    def linear(self) -> LinearModel:
-        """The model beside its state, made anew."""
-        return LinearModel(self.posterior, self.state, self.numbers)
+    def linear(self, as_sized: bool = False) -> LinearModel:
+        """The model beside its state, made anew; ``as_sized``: with distance errors of the size that they have."""
+        residuals = self.posterior.residuals(self.state)
+        whiteners = [one.whitener(residual) for one, residual in zip(self.posterior.bands, residuals, strict=True)]
+        return LinearModel(self.posterior, self.state, self.numbers, whiteners if as_sized else None)
 
 
 def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6,
@@ -168,13 +170,14 @@ def _aligned_from(start: LinearModel, worth: float, most: int = 40) -> LinearMod
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A model beside a linear one: its predictions, laid out with these record errors, and half of what is
-    minimised."""
+    """A model beside a linear one: its predictions, laid out with these record errors, the likeliest ones beside them,
+    and half of what is minimised."""
 
     effects: tuple[Chosen, ...]
     logs: Array
     record: list[Array]
     predictions: list[Array]
+    beside: Eliminated
     cost: float
 
 
@@ -196,20 +199,19 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_ga
             predictions = [one + (x - there)[p:] @ columns for one, columns in zip(at.predictions, slopes, strict=True)]
             record = linear.eliminated(predictions, at.record).record
         predictions = predict(effects, logs, record)
-        return _Point(effects, logs, record, predictions, 0.5 * linear.objective(predictions, logs, record))
+        beside = linear.eliminated(predictions, record)
+        return _Point(effects, logs, record, predictions, beside, 0.5 * (beside.squares + linear.prior.cost(logs)))
 
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal own, known
         if moves and fresh:
             slopes = effect_slopes(linear, at.effects, at.logs, moves, at.record, at.predictions)
             own, known = linear.whitened(slopes), (x.copy(), at, slopes)
-        residuals = linear.eliminated(at.predictions, at.record).residuals
-        return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
+        return linear.gradient(at.beside.residuals, at.logs, own), linear.information(at.logs, own)
 
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS).at
-    record = linear.eliminated(best.predictions, best.record).record
-    return State(best.effects, best.logs, record, linear.size, best.predictions)
+    return State(best.effects, best.logs, best.beside.record, linear.size, best.predictions)
 
 
 def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[Move],

@@ -21,10 +21,9 @@ the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); 
 patch fall less, or come back. So a B of order m = 3 or more is somebody's filter: above it nothing is compared. One
 of lower order is left to the effects: its delay tells whether it is a sensor's.
 
-Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the
-phase of a causal one is off a straight line by half a radian and more. In short windows, each laid on the model as it
-fits best, the mean cross-spectrum tells which of both phases goes better with it, whatever constant delay there is
-besides. Where a filter takes away 5 % of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of
+Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? The phases tell
+(``filter_phase``); and where noise that arose behind a causal one hides what it took away, they alone show it. Where a
+filter takes away 5 % of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of
 one that was run forth and back x^m. What a causal filter does below that, a delay that grows towards the cut-off, is
 ``sensor_bandwidth`` of the order that was found; one without delay leaves nothing there that the lab does not grant
 any recorder (``Tolerance.droop``).
@@ -39,13 +38,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.butterworth import butterworth
-from logger.dsp.pass_band import in_band, reach
-from logger.lab.likelihood.lag import WINDOW_S, lags
+from logger.dsp.pass_band import reach
+from logger.lab.likelihood.filter_phase import causal_low_pass, is_causal
 from logger.runs import NO_READING, READING, LowPass, Run
 
 Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 _BLOCK_S = 3.0
 # Of the loudest power: below that, a spectrum by Hann's windows shows rounding and what leaks from louder frequencies
@@ -73,17 +70,19 @@ _NO_WORSE = 0.9
 # without it, but for a rounding.
 _ALIKE, _SAME = 0.1, 0.02
 _LOSS = 0.05
-_HIGHEST_ORDER = 8
-_REACH = 1.2  # times the cut-off, up to where phases are read
-_DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
 LEAST_WIDTH_HZ = 3.0
 """A narrower band holds the body's bounce at most, and no model of a car can be told from another."""
 _DB = 10 / np.log(10)
 
 
 def is_steep(seen: LowPass) -> bool:
-    """Whether a filter is none that a sensor has."""
-    return seen.order > STEEPEST_EFFECT
+    """Whether spectra show a filter that no sensor has."""
+    return seen.order > STEEPEST_EFFECT and not seen.hidden
+
+
+def _least_order(seen: LowPass) -> int:
+    """The least whole order that a filter may be of, so that it stays steep or not."""
+    return round(STEEPEST_EFFECT) + 1 if is_steep(seen) else 1
 
 
 def whole_below_hz(seen: LowPass, rate_hz: float) -> float:
@@ -102,11 +101,13 @@ def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[L
     fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
     common = _seen(fits, runs[0].rate_hz, common=True)
     if common is not None and all(_goes_with(one, common, runs[0].rate_hz) for one in fits):
-        common = replace(common, causal=_is_causal(runs, predictions, common))
+        common = replace(common, causal=is_causal(runs, predictions, common, _least_order(common)))
         return [common] * len(fits)
     each = [_seen([one], runs[0].rate_hz, common=len(fits) == 1) for one in fits]
-    found = [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
+    found = [None if one is None else replace(one, causal=is_causal([run], [prediction], one, _least_order(one)))
              for one, run, prediction in zip(each, runs, predictions, strict=True)]
+    if not any(found):
+        return [causal_low_pass(runs, predictions)] * len(fits)
     steep = [one for one in found if one is not None and is_steep(one)]
     return [one or next((other for other in steep if _goes_with(fit, other, runs[0].rate_hz)), None)
             for one, fit in zip(found, fits, strict=True)]
@@ -183,54 +184,6 @@ def _seen(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None
     if plain < _BETTER * left or _DB * (plain - left) < _BETTER_DB * size:
         return None
     return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
-
-
-def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass) -> bool:
-    """Whether the phase of the measurement against the model is that of a causal filter rather than a straight line."""
-    rate_hz = runs[0].rate_hz
-    f_hz = np.fft.rfftfreq(_window(rate_hz), 1 / rate_hz)
-    cross, own, other = np.zeros(len(f_hz), complex), np.zeros(len(f_hz)), np.zeros(len(f_hz))
-    for run, prediction in zip(runs, predictions, strict=True):
-        for model, measured in _windows(run, prediction, seen.cutoff_hz):
-            cross += model.conj() * measured
-            own, other = own + np.abs(model) ** 2, other + np.abs(measured) ** 2
-    like = np.divide(np.abs(cross) ** 2, own * other, out=np.zeros(len(f_hz)), where=own * other > 0)
-    inside = (f_hz > _LOWEST_HZ) & (f_hz < _REACH * seen.cutoff_hz)
-    turned = (like * np.exp(1j * np.angle(cross)))[inside]
-    delays = np.exp(2j * np.pi * f_hz[inside] * _DELAYS_S[:, None])
-
-    def goes_with(filtered: Complex) -> float:
-        return float((delays @ (turned * filtered.conj() / np.abs(filtered))).real.max())
-
-    s = np.asarray(2j * np.pi * f_hz[inside], complex)
-    if seen.order > _HIGHEST_ORDER + 1:
-        return False
-    least = round(STEEPEST_EFFECT) + 1 if is_steep(seen) else 1
-    orders = range(max(least, round(seen.order) - 1), min(round(seen.order) + 1, _HIGHEST_ORDER) + 1)
-    causal = max(goes_with(butterworth(order, s, seen.cutoff_hz, sampled)) for order in orders
-                 for sampled in (0.0, rate_hz))
-    return causal > goes_with(np.ones_like(s))
-
-
-def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Complex, Complex]]:
-    """Spectra of the model and of the measurement in windows, the model laid where it fits best."""
-    found = lags([run], [in_band(prediction, run.rate_hz, 0.0, cutoff_hz)])
-    size = _window(run.rate_hz)
-    taper = np.hanning(size + 1)[:-1]
-    f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
-    for middle, lag_s in zip(found.middle, found.lag_s, strict=True):
-        first = int(middle) - size // 2
-        steps = round(lag_s * run.rate_hz)
-        if first < 0 or first - steps < 0 or max(first, first - steps) + size > run.count:
-            continue
-        model = np.fft.rfft(taper * prediction[first - steps : first - steps + size])
-        late = np.exp(2j * np.pi * f_hz * (lag_s - steps / run.rate_hz))
-        yield model, np.fft.rfft(taper * run.measured_mps2[first : first + size]) * late
-
-
-def _window(rate_hz: float) -> int:
-    """Samples in a window in which phases are read."""
-    return round(WINDOW_S * rate_hz)
 
 
 def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:

@@ -1,2 +1,2 @@
-"""What drives would show before anybody drives them: which effects stand out, which can be told apart, and which drive
-would add most."""
+"""What drives would show before anybody drives them: which effects stand out, which can be distinguished, and which
+drive would add most."""

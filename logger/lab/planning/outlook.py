@@ -1,10 +1,10 @@
-"""What drives could show of effects: how far each stands out, and how much of it remains beside each other one.
+"""What drives could show of effects: how far each stands out, and how much of it remains when each other one is fitted.
 
 Problem: an effect that stands out by twenty standard deviations is not named if another one, at a strength of its own,
 does the same; and what another one does depends on its shape (a frequency, a knee). Solution: each effect is looked at
 with its usual values and with some that a search begins at. All changes are whitened, what the car's numbers and the
 records' errors can do is taken out (a Schur complement with their priors), and what remains of one change after
-another one, at any strength, is fitted to it is the deviations by which a search tells the two apart.
+another one, at any strength, is fitted to it is the deviations by which a search distinguishes the two.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL
-from logger.lab.planning.planned_drive import SIZES, Information, larger
+from logger.lab.planning.planned_drive import SIZES, Information, with_larger_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, usual_says_little
 from logger.lab.selection.evidence import CONFUSED
 from logger.vehicle.effect import Chosen, Effect, chosen
@@ -25,16 +25,16 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 ISOLABLE_SIGMA = float(np.sqrt(CONFUSED))
-"""Effects are told apart where so many deviations of the one remain beside the other: their square is the difference of
-the two scores."""
+"""Two effects are distinguishable where so many deviations of the one remain once the other is fitted: their square is
+the difference of the two scores."""
 _MOST_TRIALS = 4
-"""Of an effect, spread over those that a search begins at: beside its usual values, they tell another shape of it from
-another effect; all of them would take three times as long."""
+"""Of an effect, spread over those that a search begins at: in addition to its usual values, they tell another shape of
+it from another effect; all of them would take three times as long."""
 _TINY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class EffectGrid:
     """Effects at the values that are looked at: all columns of one effect in a row, its usual values first.
 
     first    (e,) index of each effect's first column
@@ -45,11 +45,11 @@ class Settings:
     first: Indices
 
     @staticmethod
-    def of(effects: Sequence[Effect]) -> Settings:
+    def of(effects: Sequence[Effect]) -> EffectGrid:
         """Of some effects."""
         each = [_values_of(one) for one in effects]
         columns = tuple(chosen(effect, values) for effect, some in zip(effects, each, strict=True) for values in some)
-        return Settings(tuple(effects), columns, np.cumsum([0, *map(len, each[:-1])]))
+        return EffectGrid(tuple(effects), columns, np.cumsum([0, *map(len, each[:-1])]))
 
     def columns_of(self, index: int) -> range:
         """Of an effect."""
@@ -68,42 +68,42 @@ class Outlook:
     """What some drives could show, in standard deviations.
 
     detectability    (e,) by how much each effect stands out
-    beside           (e, e) what of it remains after another one was fitted; of itself: all
+    pairwise           (e, e) what of it remains after another one was fitted; of itself: all
     """
 
     detectability: Array
-    beside: Array
+    pairwise: Array
 
     def standing_out(self, detectability: Array) -> Outlook:
         """The same with effects that stand out by so much (e,) in truth; what remains of each beside another one is
         less in the same proportion."""
         share = detectability / np.maximum(self.detectability, _TINY)
-        return Outlook(detectability, self.beside * share[:, None])
+        return Outlook(detectability, self.pairwise * share[:, None])
 
     @property
     def isolability(self) -> Array:
-        """(e,) by how much each is told from the effect that is most like it."""
-        return np.asarray(self.beside.min(axis=1))
+        """(e,) how far each is distinguishable from the effect that is most like it."""
+        return np.asarray(self.pairwise.min(axis=1))
 
     @property
     def nearest(self) -> Indices:
         """(e,) which one that is; itself, where it stands alone."""
-        return np.asarray(self.beside.argmin(axis=1))
+        return np.asarray(self.pairwise.argmin(axis=1))
 
     @property
     def chances(self) -> Array:
         """(e,) that a search names each, were it there alone: what it finds is normal around what is expected, with a
-        deviation of one, and has to stand out and to be told from all others."""
+        deviation of one, and has to be detectable and distinguishable from all others."""
         from scipy.special import ndtr
 
         return np.minimum(ndtr(self.detectability - DETECTABLE_SIGMA), ndtr(self.isolability - ISOLABLE_SIGMA))
 
 
-def representatives(settings: Settings, information: Information, precision: Array) -> Indices:
+def representatives(settings: EffectGrid, information: Information, precision: Array) -> Indices:
     """Which column (e,) stands for each effect: its usual values or, where these say little, those by which it stands
     out most.
 
-    information    what some drives tell
+    information    of some drives
     precision      (p,) of the prior of the car's numbers
     """
     marginal, costs = _marginal(information, precision)
@@ -115,15 +115,16 @@ def representatives(settings: Settings, information: Information, precision: Arr
     return found
 
 
-def outlook(settings: Settings, information: Information, precision: Array, columns: Indices) -> Outlook:
-    """What drives that tell so much could show; arguments as of ``representatives``, whose result is ``columns``."""
+def outlook(settings: EffectGrid, information: Information, precision: Array, columns: Indices) -> Outlook:
+    """What drives with this information could show; arguments as of ``representatives``, whose result is
+    ``columns``."""
     marginal, costs = _marginal(information, precision)
     own = np.maximum(np.einsum("sii->si", marginal), 0.0)
     explained = marginal[:, columns] ** 2 / np.maximum(own, _TINY)[:, None]
     most = np.maximum.reduceat(explained, settings.first, axis=2)
     np.einsum("sii->si", most)[:] = 0.0
-    beside = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
-    found = np.sqrt(np.maximum(beside, 0.0))
+    pairwise = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
+    found = np.sqrt(np.maximum(pairwise, 0.0))
     return Outlook(np.diag(found).copy(), found)
 
 
@@ -142,5 +143,5 @@ def _marginal(information: Information, precision: Array) -> tuple[Array, Array]
     mixed = information.products[:, :count, count:]
     known = information.products[:, :count, :count] + np.diag(precision)
     found = information.products[:, count:, count:] - mixed.transpose(0, 2, 1) @ np.linalg.solve(known, mixed)
-    costs = information.costs + [larger(USUAL, size).cost for size in SIZES[: len(information.costs)]]
+    costs = information.costs + [with_larger_errors(USUAL, size).cost for size in SIZES[: len(information.costs)]]
     return np.asarray(found), np.asarray(costs - costs[0])

@@ -1,8 +1,8 @@
-"""Which effects drives could show and tell apart, and which drive would add most: before anybody drives.
+"""Which effects drives could show and distinguish, and which drive would add most: before anybody drives.
 
 Problem: a search that finds nothing may have had drives that show nothing, and one that names two effects that no drive
-of these tells apart has named none. Solution: the information that each drive would give of each effect is computed as
-a search uses it (``planned_drive``, ``outlook``); that of one more drive is added, and drives are ranked by how many
+of these distinguishes has named none. Solution: the information that each drive would give of each effect is computed
+as a search uses it (``planned_drive``, ``outlook``); that of one more drive is added, and drives are ranked by how many
 more effects could be named.
 """
 
@@ -25,9 +25,9 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
 from logger.lab.planning.outlook import (
     ISOLABLE_SIGMA,
+    EffectGrid,
     Indices,
     Outlook,
-    Settings,
     likeliest_sizes,
     outlook,
     representatives,
@@ -52,8 +52,8 @@ _WORTH_TELLING = 1.0
 class NextDrive:
     """What one more drive would add.
 
-    gains         deviations by which effects would be told better from what is most like them: first those that it
-                  makes likelier to be named, then those that it helps most for their size
+    gains         deviations by which effects would be more distinguishable from what is most like them: first those
+                  that it makes likelier to be named, then those that it helps most for their size
     more_named    how many more effects a search would name, were each of them there alone
     """
 
@@ -86,9 +86,9 @@ class Plan:
 
     @property
     def groups(self) -> list[tuple[str, ...]]:
-        """Effects that would stand out, and cannot be told from each other."""
+        """Effects that would stand out, and cannot be distinguished from each other."""
         seen = self.now.detectability >= DETECTABLE_SIGMA
-        alike = (np.minimum(self.now.beside, self.now.beside.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
+        alike = (np.minimum(self.now.pairwise, self.now.pairwise.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
         found: list[set[int]] = []
         for index in np.flatnonzero(seen):
             near = {int(index), *map(int, np.flatnonzero(alike[index]))}
@@ -119,7 +119,7 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     drives = [PlannedDrive(one, there, noise) for one in planned]
     posteriors = [*([fitted.posterior] if fitted is not None else []), *(one.posterior for one in drives)]
     obstacles = {name: why for one in posteriors for name, why in obstacles_of(one, effects, there.effects).items()}
-    settings = Settings.of([one for name, one in effects.items() if name not in obstacles])
+    settings = EffectGrid.of([one for name, one in effects.items() if name not in obstacles])
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
         asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
@@ -162,7 +162,7 @@ class _Shown:
 class _Asked:
     """What is asked of each drive: effects at some values; ``precision`` (p,) of the prior of the car's numbers."""
 
-    settings: Settings
+    settings: EffectGrid
     precision: Array
     pool: ThreadPoolExecutor
 
@@ -171,7 +171,7 @@ class _Asked:
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
     def of_drive(self, drive: PlannedDrive) -> _Shown:
-        """What a planned drive tells, recorded by its sensor alone."""
+        """What a planned drive shows, recorded by its sensor alone."""
         linear, changes = drive.model(), self.changes(drive)
         levels = [np.concatenate(drive.levels(run, bands)) for run, bands in zip(
             linear.posterior.runs.runs, linear.posterior.bands, strict=True)]
@@ -179,7 +179,7 @@ class _Asked:
                       information(linear, [changes]))
 
     def of_runs(self, fitted: LinearModel) -> _Shown:
-        """What runs tell beside a fitted model."""
+        """What runs show about additions to a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
         here = predict(state.effects)
@@ -206,7 +206,7 @@ class _Asked:
         return now.standing_out(np.array(list(self.pool.map(deviations, range(len(columns))))))
 
 
-def _next(option: Option, settings: Settings, now: Outlook, then: Outlook) -> NextDrive:
+def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:
     gained, likelier = then.isolability - now.isolability, then.chances - now.chances
     order = np.lexsort((now.isolability / np.maximum(then.isolability, 1.0), -likelier.round(2)))
     gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _WORTH_TELLING}

@@ -177,9 +177,9 @@ class PlannedDrive:
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What drives tell; that of several adds up. Whitened slopes by the car's numbers and effects' changes, what the
-    records' errors can do taken out of both, no prior of the numbers in it, for each of ``SIZES`` of these errors: an
-    effect that moves runs is taken for larger errors, if these are likely enough.
+    """Information of drives; that of several adds up. Whitened slopes by the car's numbers and effects' changes, what
+    the records' errors can do taken out of both, no prior of the numbers in it, for each of ``SIZES`` of these errors:
+    an effect that moves runs is taken for larger errors, if these are likely enough.
 
     products    (s, p + m, p + m)
     costs       (s,) of so large errors, in minus twice the log of the evidence, without the prior of the size
@@ -193,12 +193,12 @@ class Information:
 
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
-    """Of a model beside its state, by effects' changes (m, n) per run."""
+    """Of a model at its state, by effects' changes (m, n) per run."""
     free = linear.without_wall()
     logs, white = free.state.logs, free.whitened(changes)
     each, costs = [], []
     for size in SIZES:
-        there = free.of_size(larger(free.size, size))
+        there = free.of_size(with_larger_errors(free.size, size))
         found = there.information(logs, white)
         found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
         each.append(found)
@@ -206,6 +206,6 @@ def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
     return Information(np.array(each), np.array(costs))
 
 
-def larger(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
+def with_larger_errors(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
     """Start, walk and factor so many times as far off."""
     return ErrorSize(size.start_m * factors[0], size.walk_m * factors[1], size.scale * factors[2])

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.planning.planned_drive import larger
+from logger.lab.planning.planned_drive import with_larger_errors
 
 Array = npt.NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class DrivesThere:
 
     def of_size(self, factors: tuple[float, float, float]) -> DrivesThere:
         """The same with distance errors so many times as large."""
-        return replace(self, linear=self.linear.of_size(larger(self.linear.size, factors)))
+        return replace(self, linear=self.linear.of_size(with_larger_errors(self.linear.size, factors)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -165,8 +165,8 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     used = np.flatnonzero(_KNOTS)
     coefficients, covariance, p_value, share = regression.fitted(
         _through(residuals, [_hat(knots, int(index), of_rate) for index in used]))
-    # What a straight line through 0 would do is not told apart from a spring or damper a little off: it is taken out,
-    # the middle counting as it is driven.
+    # What a straight line through 0 would do is not distinguished from a spring or damper a little off: it is taken
+    # out, the middle counting as it is driven.
     weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
     line = knots[used]
     straight = np.eye(len(used)) - np.outer(line, weight * line) / float(weight @ line**2)

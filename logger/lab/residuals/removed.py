@@ -18,14 +18,11 @@ import numpy.typing as npt
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.noise_floor import noise_of
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residuals.residual_tests import LEAST_SHARE
 from logger.lab.residuals.sensor_drift import Drift, drifts_of
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
-
-_LEAST_SHARE = 0.02
-"""A drift that makes a smaller share of what the fitted model leaves does not matter (``residual_tests.LEAST_SHARE``).
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,7 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     unmoved = _power(runs, posterior.predict(state.effects, state.logs, in_place))
     drifts = drifts_of(runs, posterior.as_read().residuals(state), noise_of(posterior, state).deviation_mps2)
     cleared = _power(runs, [_drifted(one, drift) for one, drift in zip(state.predictions, drifts, strict=True)])
-    if not left - cleared > _LEAST_SHARE * left:
+    if not left - cleared > LEAST_SHARE * left:
         drifts, cleared = tuple(one.unseen() for one in drifts), left
 
     def share(power: float) -> float:

@@ -105,7 +105,7 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    """The largest correlation of samples; one of 0.1 tells a hundredth of the power from a sample before. What was
+    """The largest correlation of samples; one of 0.1 explains a hundredth of the power from a sample before. What was
     filtered is not white, whatever it was."""
     if not residuals.whole:
         return ResidualTest("whiteness")

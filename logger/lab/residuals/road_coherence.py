@@ -5,7 +5,7 @@ segments of each run the spectrum of the residual is fitted by those of the road
 wheels, frequency by frequency (J. S. Bendat and A. G. Piersol, Random Data, 2010, chapter 7). Without any connection
 the share that q inputs explain of n segments is Beta(q, n - q) at every frequency, so that -ln(1 - share) has a mean
 and a variance from polygamma functions; sums over frequencies are taken as gamma distributed with their mean and
-variance. Neighbouring frequencies of tapered segments tell the same: every other one counts for the test.
+variance. Neighbouring frequencies of tapered segments are correlated: every other one counts for the test.
 """
 
 from __future__ import annotations

@@ -18,16 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.whittle import LOWEST_HZ
+from logger.lab.residuals.residual_tests import DOUBT
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
 NONE, OFFSET, RAMP, STEP, EXPONENTIAL, WANDER = "none", "offset", "ramp", "step", "exponential", "wander"
-_NOISE_HZ = 0.6
-# By how much the criterion has to fall: by chance, it does once in five hundred runs.
-_LEAST_GAIN = 2 * float(np.log(500))
-_SETTLING = 60  # time constants that are tried, from two coefficients' to twice the run's length
-_LEAST_COEFFICIENTS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +65,22 @@ class _Fit:
     curve: Callable[[Array], Array]
 
 
-def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
-    """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2]."""
+def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5 * LOWEST_HZ,
+             fewest_coefficients: int = 8) -> Drift:
+    """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2].
+
+    noise_hz               its noise is no less than the residual between ``LOWEST_HZ`` and this [Hz]
+    fewest_coefficients    fewer do not distinguish a form of three numbers from noise: nothing is found
+    """
     kept, rate = run.count - run.first, run.rate_hz
     time_s = run.time_s
     nothing = Drift(run.name, NONE, 0.0, None, np.zeros(run.count), rate)
     read = run.read[run.first:]
     count = int(2 * LOWEST_HZ * kept / rate)  # of frequencies below the lowest that is judged
     low_hz, _ = run.pass_band_hz
-    if count < _LEAST_COEFFICIENTS or low_hz > 0 or not read.any():
+    if count < fewest_coefficients or low_hz > 0 or not read.any():
         return nothing
-    basis = _Cosines(kept, count, int(2 * _NOISE_HZ * kept / rate))
+    basis = _Cosines(kept, count, int(2 * noise_hz * kept / rate))
     seen = basis.of(np.where(read, residual[run.first:], 0.0))
     level = max(noise_mps2**2, float(np.mean(seen[count:] ** 2)))
     fits = [_white(form, basis, seen[:count], level, time_s[run.first:], shapes)
@@ -87,7 +88,7 @@ def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
     fits.append(_wander(basis, seen[:count], level, run.first))
     nought = float(seen[:count] @ seen[:count]) / level
     best = min(fits, key=lambda one: one.lack)
-    if best.lack > nought - _LEAST_GAIN:
+    if best.lack > nought + 2 * np.log(DOUBT):  # noise lowers the criterion by so much no more often than that
         return nothing
     return Drift(run.name, best.form, best.size_mps2, best.time_s, best.curve(time_s), rate)
 
@@ -98,7 +99,7 @@ def drifts_of(runs: Sequence[Run], residuals: Sequence[Array], noise_mps2: float
 
 
 class _Cosines:
-    """The first orthonormal cosines (k, n) of n samples: those that count, and some more that tell of the noise."""
+    """The first orthonormal cosines (k, n) of n samples: those that count, and some more for the noise."""
 
     def __init__(self, samples: int, count: int, more: int) -> None:
         from scipy.fft import dct, idct
@@ -127,11 +128,12 @@ def _settling(takes_s: float) -> Curve:
     return lambda at: np.asarray(np.exp(-at / takes_s))
 
 
-def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[Shape]]:
-    """What each form adds to a constant: curves by time, each with the time that it is known by."""
+def _shapes(time_s: Array, rate_hz: float, time_constants: int = 60) -> dict[str, list[Shape]]:
+    """What each form adds to a constant: curves by time, each with the time that it is known by. So many time constants
+    are tried, from the shortest wave's to twice the run's length."""
     lasts_s = time_s[-1] + 1 / rate_hz
     steps = np.arange(time_s[0], time_s[-1], 0.1 / LOWEST_HZ)[1:]
-    settling = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, _SETTLING)
+    settling = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, time_constants)
     return {
         OFFSET: [],
         RAMP: [(None, lambda at: at / lasts_s)],
@@ -141,7 +143,7 @@ def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[Shape]]:
 
 
 def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[Shape]) -> _Fit:
-    """A form beside white noise: the likeliest of its shapes, with a constant."""
+    """A form plus white noise: the likeliest of its shapes, with a constant."""
     if not shapes:
         offset = float(seen[0]) / float(np.sqrt(basis.samples))
         lack = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
@@ -161,7 +163,7 @@ def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array,
 
 
 def _wander(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
-    """A random walk beside white noise."""
+    """A random walk plus white noise."""
     numbers = np.arange(1, basis.count)
     powers = seen[1:] ** 2
     walks = np.geomspace(1e-2, 1e8, 81) * level

@@ -47,7 +47,7 @@ class SpatialLine:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run tells)."""
+    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run shows it)."""
 
     residuals: ModelResiduals
     where: Breakdown
@@ -68,8 +68,8 @@ def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
 
 def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
                     per_m: tuple[float, float] = (0.3, 2.2)) -> SpatialLine | None:
-    """What repeats along the way: as for a tone in time, which it is told from where the speed changes or where another
-    run, at another speed, has it too.
+    """What repeats along the way: as for a tone in time, which it is distinguished from where the speed changes or
+    where another run, at another speed, has it too.
 
     slowest_mps    runs that are slower somewhere are not asked
     per_m          asked of these wave numbers [1/m]: one to three times in a turn of a wheel of 0.22 to 0.5 m radius

@@ -36,7 +36,7 @@ class CandidateFit:
     @property
     def hold_out(self) -> HoldOut:
         """The model on what its fit did not see."""
-        linear = self.found.linear()
+        linear = self.found.linear(as_sized=True)
         return held_out(linear, own_slopes(linear))
 
 

@@ -1,8 +1,8 @@
 """The rounds of a diagnosis without a profile: what is missing, and what such drives cannot tell.
 
 Problem: as in ``diagnosis``, but the road is unknown, and part of what an effect does the road takes for itself.
-Solution: in each round every effect that can be tried is tried by the slopes beside the model, the promising ones are
-fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
+Solution: in each round every effect that can be tried is tried by the slopes on top of the model, the promising ones
+are fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
 What cannot be learned is not a list in a text: it is read off the information that these drives hold, with the road
 and without it.
 """
@@ -20,8 +20,8 @@ from logger.lab.likelihood.standard_errors import with_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
 from logger.lab.unknown_road.fisher_scoring import Fitted, fitted, inverse
-from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State
-from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
+from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
+from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
 from logger.lab.unknown_road.screening import Trial, trials
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
 from logger.vehicle.effect_parameters import moves_of
@@ -31,14 +31,14 @@ Progress = Callable[[str], None]
 
 TAKEN_BY_ROAD = 0.02
 """The road takes an effect of whose information it leaves no more than this share: over a road that was measured, the
-same drives would tell seven times as well."""
+same drives would show it seven times as well."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An effect that was tried on the model of its round.
 
-    error          of all drives, each with the road that the others tell
+    error          of all drives, each with the road estimated from the others
     p_value        how often noise alone would gain as much, times the number of candidates
     gain           of minus twice the log of the evidence; where it was not fitted, what its slopes promise
     confused_with  effects that explain about as much
@@ -64,7 +64,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class UnknownRoadDiagnosis:
     """What a diagnosis without a profile found.
 
     candidates    best first, those of the verdict before the others
@@ -98,7 +98,7 @@ class Found:
 
 
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                       progress: Progress = lambda words: None, most_effects: int = 3) -> Found:
+                       progress: Progress = lambda words: None, most_effects: int = 3) -> UnknownRoadDiagnosis:
     """Find the effects that the model, with those that are ``present``, lacks; no more than so many.
 
     ValueError if one that is present leaves the car answering out of proportion to the road; NotOneRoad for drives that
@@ -109,9 +109,9 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     untried = _obstacles(problem, effects, present)
     left = {name: one for name, one in effects.items() if name not in untried}
     alike = likenesses(problem, nominal, _trials(left))
-    if found := apart(alike):
+    if found := surely_two_roads(alike):
         one, other = (problem.runs[run].name for run in found)
-        raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither tells what the "
+        raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
     before = now = fitted(problem.prepared(nominal), nominal)
@@ -138,14 +138,14 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         now.problem, now, [chosen(one, one.usual) for one in left.values()])}
     road = {name: one.beside_road for name, one in usual.items() if one.beside_road < TAKEN_BY_ROAD}
     noise = now.problem.noise(now.state)
-    return Found(
+    return UnknownRoadDiagnosis(
         (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
         _with_errors(now)[len(present):], tuple(errors),
         tuple(zip(now.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         noise.deviation_mps2 / problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
         _together(now), now.state.noise_mps2, _excess(now, noise),
-        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in in_doubt(alike)),
+        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in maybe_two_roads(alike)),
     )
 
 
@@ -187,7 +187,7 @@ def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
 
 def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
           least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, Fitted]:
-    """The most promising effects fitted beside the model, by name; the best of a few steps from each start goes on.
+    """The most promising effects fitted on top of the model, by name; the best of a few steps from each start goes on.
 
     most, share, least    so many at most, of those that promise this share of the best one, and so much
     starts                so many trials as they are; the best one also at the strength that it promises, which holds
@@ -204,7 +204,7 @@ def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progres
     return found
 
 
-def _beside(base: Fitted, one: Chosen) -> State:
+def _beside(base: Fitted, one: Chosen) -> RoadFitState:
     """The model with an effect."""
     effects = (*base.state.effects, one)
     return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
@@ -220,7 +220,7 @@ def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, error: float
                                              and abs(other.gain - one.gain) < CONFUSED)) for one in found]
 
 
-def _candidate(problem: SameRoad, state: State, gain: float, count: int, fitted: bool = True) -> Candidate:
+def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
     """The last effect of a state as one of so many candidates, by its gain in minus twice the log of the likelihood,
     of which the evidence leaves what its numbers do not cost (G. Schwarz 1978)."""
     one = state.effects[-1]
@@ -228,7 +228,7 @@ def _candidate(problem: SameRoad, state: State, gain: float, count: int, fitted:
     return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
 
 
-# --- what is left ---
+# --- the residual ---
 
 
 def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
@@ -239,7 +239,7 @@ def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
 
 
 def _together(model: Fitted) -> tuple[Finding, ...]:
-    """What these drives cannot tell of masses, springs and dampers beside the road, whatever their prior."""
+    """What these drives cannot tell of masses, springs and dampers when the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.moves), len(model.data))

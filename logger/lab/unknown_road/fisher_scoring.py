@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.unknown_road.likelihood import SameRoad, State
+from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
 
@@ -30,18 +30,19 @@ class Fitted:
     problem        quick for states like this one
     """
 
-    state: State
+    state: RoadFitState
     moves: tuple[Move, ...]
     data: Array
     information: Array
     problem: SameRoad
 
 
-def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.1, many_rounds: int = 12) -> Fitted:
+def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: float = 0.1,
+           many_rounds: int = 12) -> Fitted:
     """The most probable state, by so many of Fisher's steps from this one at most.
 
     settled        a step that promises less, in the log of the probability, is the last
-    many_rounds    equations that take more rounds are prepared anew where the fit has come to
+    many_rounds    equations that take more rounds are prepared again where the fit has come to
     """
     moves = moves_of(state.effects)
     p, q = len(state.logs), len(moves)
@@ -56,7 +57,7 @@ def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.
         logs, effects, roads = at(here)
         gains, slopes = sloped(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
-            problem = problem.prepared(State(effects, logs, roads, gains))
+            problem = problem.prepared(RoadFitState(effects, logs, roads, gains))
         score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
         off, precision = problem.prior_terms(logs, q, roads)
         score -= precision * off
@@ -66,7 +67,7 @@ def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
-    found = State(effects, logs, roads, problem.response(effects, logs))
+    found = RoadFitState(effects, logs, roads, problem.response(effects, logs))
     return Fitted(found, tuple(moves), data, information, problem)
 
 
@@ -91,14 +92,14 @@ def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move]
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):
-        beside = logs.copy()
-        beside[index] += step
-        slopes.append((problem.response(effects, beside) - gains) / step)
+        shifted = logs.copy()
+        shifted[index] += step
+        slopes.append((problem.response(effects, shifted) - gains) / step)
     here = coordinates_of(effects, moves)
     for index, own_step in enumerate(steps_of(effects, moves, step, step)):
-        beside = here.copy()
-        beside[index] += own_step
-        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / own_step)
+        shifted = here.copy()
+        shifted[index] += own_step
+        slopes.append((problem.response(moved(effects, moves, shifted), logs) - gains) / own_step)
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 

@@ -10,7 +10,7 @@ The likelihood itself is never computed, only its slopes are. What one model gai
 a straight way from the one response to the other, which is short: the slopes, by a few points, are Gauss's.
 
 Only effects that leave a car answering in proportion to the road can be tried. What a road that is free takes for
-itself (a gain; a longer contact patch) shows in the information that is left of an effect beside it.
+itself (a gain; a longer contact patch) shows in the information that remains of an effect once it is integrated out.
 """
 
 from __future__ import annotations
@@ -41,8 +41,6 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.intp]
 
-_LEAST_S = 3.0
-"""What a drive has to share of a stretch to tell of it: some periods of a body's bounce."""
 PROBES = 8
 """Simulated drives that slopes are compared with: gains are taken for less than they seem by one part in so many."""
 
@@ -52,7 +50,7 @@ class NotOneRoad(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class RoadFitState:
     """A model with all its numbers.
 
     effects    with their values
@@ -94,10 +92,11 @@ class SameRoad:
         structure = compose(stands).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
-        self.stretches = _cut(self.runs)
+        least_s = 3.0  # of a stretch, some periods of a body's bounce, to say anything of it
+        self.stretches = _cut(self.runs, least_s)
         shared = {run for parts in self.stretches for run, _ in parts}
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
-            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
@@ -123,9 +122,9 @@ class SameRoad:
         found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
         return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
 
-    def start(self, effects: Sequence[Chosen] = ()) -> State:
+    def start(self, effects: Sequence[Chosen] = ()) -> RoadFitState:
         """The car as it stands on roads of a likely level."""
-        return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
+        return RoadFitState(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
 
     def scored(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
         """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
@@ -140,7 +139,7 @@ class SameRoad:
             matrix[np.ix_(whole, whole)] += known
         return slopes, matrix
 
-    def prepared(self, state: State) -> SameRoad:
+    def prepared(self, state: RoadFitState) -> SameRoad:
         """The same drives, quick for models that are like this one."""
         other = copy(self)
         other._roads = []
@@ -176,13 +175,13 @@ class SameRoad:
         free = np.zeros(moves)
         return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
 
-    def cost(self, state: State) -> float:
+    def cost(self, state: RoadFitState) -> float:
         """What the state's numbers cost: squares of their deviations."""
         p = len(state.logs)
         off, precision = self.prior_terms(state.logs, 0, state.roads)
         return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
 
-    def gain(self, before: State, after: State) -> float:
+    def gain(self, before: RoadFitState, after: RoadFitState) -> float:
         """By how much minus twice the log-likelihood falls from one state to another, the priors counted in: the
         integral of the slopes between them."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
@@ -194,27 +193,27 @@ class SameRoad:
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
-    def predicted_by_others(self, state: State) -> Iterator[tuple[int, Array, Array]]:
+    def predicted_by_others(self, state: RoadFitState) -> Iterator[tuple[int, Array, Array]]:
         """Of every drive over every stretch: its run, what was read (n,), and what the other drives make one expect
         (n,)."""
         for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, run in enumerate(runs):
                 yield run, road.measured[number], road.predicted(at, number)
 
-    def predicted_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
-        """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
-        the latter alone makes one expect (n,)."""
+    def predicted_by_each(self, state: RoadFitState) -> Iterator[tuple[int, int, Array, Array]]:
+        """Of every two drives over a stretch, either way: the run, the one that predicts it, what was read (n,), and
+        what the latter alone makes one expect (n,)."""
         for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, by in permutations(range(len(runs)), 2):
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
-    def errors(self, state: State) -> list[float]:
+    def errors(self, state: RoadFitState) -> list[float]:
         """Of every run, rms(read - expected) / rms(read), the road being known from the other drives alone; nan for one
         that no other shares a stretch with."""
         drives = list(self.predicted_by_others(state))
         return [_error([one for one in drives if one[0] == run]) for run in range(len(self.runs))]
 
-    def error(self, state: State) -> float:
+    def error(self, state: RoadFitState) -> float:
         """That error of all runs together."""
         return _error(list(self.predicted_by_others(state)))
 
@@ -234,7 +233,7 @@ class SameRoad:
         """How many samples there are, of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
-    def noise(self, state: State) -> Noise:
+    def noise(self, state: RoadFitState) -> Noise:
         """The sensor's noise, under what each drive has that the others do not tell: that is more than noise where the
         road moves the car, so that it is asked only for noise that the recorder filtered."""
         left: dict[int, list[Array]] = {}
@@ -281,9 +280,9 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
     return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
-def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
-    """Stretches of the way, of about so many seconds, that at least two runs share: of each the runs, by number, and
-    their drives."""
+def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
+    """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: of
+    each stretch the runs, by number, and their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
                     for places in ([run.first for run in runs], [-1] * len(runs)))
@@ -298,7 +297,7 @@ def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, D
         for number, (run, way) in enumerate(zip(runs, ways, strict=True)):
             first, last = np.searchsorted(way, (start, end))
             first = max(int(first), run.first)
-            if last - first >= _LEAST_S * run.rate_hz:
+            if last - first >= least_s * run.rate_hz:
                 part = slice(first, int(last))
                 parts.append((number, Drive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
         if len(parts) > 1:

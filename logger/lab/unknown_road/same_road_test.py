@@ -2,10 +2,10 @@
 
 Problem: drives over two roads disagree whatever the car, and a search for what a model lacks then finds effects that
 make up for the disagreement. How much a model leaves does not tell: a car that lacks something leaves much as well.
-Solution: what one drive tells of the road is compared with what another one read. Over one road they go together,
+Solution: what one drive says of the road is compared with what another one read. Over one road they go together,
 through a wrong car as well, if less; over two they do so only as much as chance makes two such records, which is what
 they do shifted against each other by far. Both are weighed by the power that was read at each frequency and around
-each instant, so that neither a resonance of the car nor a bump counts for all. A car that lacks much may tell nothing
+each instant, so that neither a resonance of the car nor a bump counts for all. A car that lacks much may show nothing
 at all: before drives are called apart, the car is tried with each of the effects that it may lack. Where one road would
 not show either, nothing is said.
 """
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.unknown_road.likelihood import SameRoad, State
+from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen
 from logger.vehicle.simulate import PASS_OF_RATE
 
@@ -34,7 +34,7 @@ PLAIN = 2 * SEEN
 
 @dataclass(frozen=True)
 class Likeness:
-    """What one run tells of another one, in standard deviations of chance.
+    """What one run predicts of another one, in standard deviations of chance.
 
     run, by    numbers of the runs: that which is predicted, and that which predicts it
     found      how well what is predicted goes with what was read
@@ -52,12 +52,12 @@ class Likeness:
         return self.found > SEEN
 
 
-def likenesses(problem: SameRoad, state: State, lacking: Sequence[Chosen] = ()) -> list[Likeness]:
+def likenesses(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[Likeness]:
     """Of all pairs of runs that share some of the way, each either way: through the car of a state or, where that shows
     two roads, with one of the effects that it may lack, whichever makes them most alike."""
     found = _likenesses(problem, state)
     for one in lacking:
-        if apart(found) is None:
+        if surely_two_roads(found) is None:
             break
         effects = (*state.effects, one)
         other = _likenesses(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
@@ -65,19 +65,19 @@ def likenesses(problem: SameRoad, state: State, lacking: Sequence[Chosen] = ()) 
     return found
 
 
-def apart(found: Sequence[Likeness]) -> tuple[int, int] | None:
+def surely_two_roads(found: Sequence[Likeness]) -> tuple[int, int] | None:
     """The two runs that are most plainly over two roads; None if no two are."""
     plain = {pair: most for pair, most in _unseen(found).items() if most > PLAIN}
     return max(plain, key=lambda pair: plain[pair]) if plain else None
 
 
-def in_doubt(found: Sequence[Likeness]) -> list[tuple[int, int]]:
+def maybe_two_roads(found: Sequence[Likeness]) -> list[tuple[int, int]]:
     """Pairs of runs that may be over one road or two."""
     return [pair for pair, most in _unseen(found).items() if most <= PLAIN]
 
 
 def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
-    """Pairs of runs of which neither tells the other, and how well one would were they over one road."""
+    """Pairs of runs of which neither predicts the other, and how well one would were they over one road."""
     ways: defaultdict[tuple[int, int], list[Likeness]] = defaultdict(list)
     for one in found:
         ways[min(one.run, one.by), max(one.run, one.by)].append(one)
@@ -85,7 +85,7 @@ def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
             if not any(one.seen for one in both)}
 
 
-def _likenesses(problem: SameRoad, state: State) -> list[Likeness]:
+def _likenesses(problem: SameRoad, state: RoadFitState) -> list[Likeness]:
     parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
     for run, by, read, predicted in problem.predicted_by_each(state):
         parts[run, by].append((read, predicted))
@@ -95,7 +95,7 @@ def _likenesses(problem: SameRoad, state: State) -> list[Likeness]:
 def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
               far_s: float = 1.0) -> Likeness:
     """Of what was read and predicted (n,) of each stretch: together, where places may be a little off yet, over what
-    chance makes, which those tell that are shifted by far."""
+    chance makes, as those show that are shifted by far."""
     near = round(near_s * rate_hz)
     like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:

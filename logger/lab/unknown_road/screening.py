@@ -1,4 +1,4 @@
-"""Effects tried beside a model of drives over an unknown road, by its slopes."""
+"""Effects tried on top of a model of drives over an unknown road, by its slopes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from logger.vehicle.effect import Chosen
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect at some values beside a model.
+    """An effect at some values on top of a model.
 
     gain           what it promises, in minus twice the log-likelihood
     at             the values at which it does
-    deviations     how many standard errors it stands out by at its values beside all that is free
+    deviations     how many standard errors it stands out by at its values, all that is free being fitted
     beside_road    the same share of its information (0 to 1) that roads and places do not take
     """
 
@@ -31,7 +31,7 @@ class Trial:
 
 
 def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
-    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response: a score
+    """Effects tried on top of a fitted model, by its slopes along the change that each makes in the response: a score
     test, the car's numbers and the roads' projected out."""
     state = base.state
     gains, own = sloped(problem, state.effects, base.moves, state.logs)
@@ -60,7 +60,8 @@ def _trial(one: Chosen, slope: float, left: float, alone: float, share: float, w
            strongest: float = 3.0) -> Trial:
     """A trial at the strength that its slope and its information promise, within these bounds.
 
-    left, alone    its information beside all that is free, and by itself; of less than 1e-4 of that rounding is most
+    left, alone    its information with all that is free fitted, and by itself; of less than 1e-4 of that rounding is
+                   most
     """
     if not left > 1e-4 * alone:
         return Trial(one, 0.0, one, 0.0, share)

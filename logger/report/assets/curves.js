@@ -14,7 +14,7 @@ class Curves {
     this.listen();
   }
 
-  // How large the picture is. It is kept, because a browser that is asked may lay out its page anew.
+  // How large the picture is. It is kept, because a browser that is asked may lay out its page again.
   measure() { [this.width, this.height] = [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
   get left() { return 40; }

@@ -20,7 +20,7 @@ class TrackMap {
     this.listen();
   }
 
-  // How large the map is. It is kept, because a browser that is asked may lay out its page anew.
+  // How large the map is. It is kept, because a browser that is asked may lay out its page again.
   measure() { [this.width, this.height] = [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
   // --- where things are ---
@@ -86,7 +86,7 @@ class TrackMap {
   // --- drawing ---
 
   // What is slow to draw is kept as a picture somewhat larger than the view. While the map moves the picture moves; it
-  // is painted anew where it no longer covers the view, and sharp once the map rests at another scale.
+  // is painted again where it no longer covers the view, and sharp once the map rests at another scale.
   drawWay() {
     const {ink, width, height} = sheet(this.canvas);
     if (!this.covers(width, height)) this.paint(width, height);
@@ -144,15 +144,19 @@ class TrackMap {
   }
 
   // Pieces in the box, those whose middles share some pixels together: drives over one street are one mean, drawn once.
+  // Close by, where pixels are smaller than a receiver errs, those that were laid on one place.
   cells(group, [west, north, east, south]) {
     const {windows} = this.report, {first} = group, perMetre = 1 / this.metresPerPixel(), cells = new Map();
     const side = this.cellPx(group);
     for (let g = 0; g < group.count; g++) {
       const from = first[g], to = first[g + 1], middle = (from + to - 1) >> 1;
+      if (!this.report.shows(from)) continue;
       const x = this.left(windows.x[middle]), y = this.top(windows.y[middle]);
       const reach = (windows.end_m[to - 1] - windows.begin(from)) * perMetre + 12;
       if (!(x > west - reach && y > north - reach && x < east + reach && y < south + reach)) continue;
-      const key = Math.floor((x - west + 1e4) / side) * 1e6 + Math.floor((y - north + 1e4) / side);
+      const place = group.k === 0 && this.report.only < 0 ? windows.placeOf(from) : -1;
+      const key = place >= 0 ? -1 - place
+        : Math.floor((x - west + 1e4) / side) * 1e6 + Math.floor((y - north + 1e4) / side);
       const cell = cells.get(key);
       if (cell) cell.groups.push(g); else cells.set(key, {groups: [g]});
     }
@@ -386,7 +390,8 @@ class TrackMap {
   point(px, py, pressed = false) {
     const {width, height} = this;
     const [i, off] = this.report.windows.nearest(this.x + (px - width / 2) / this.scale,
-                                                 this.y + (py - height / 2) / this.scale);
+                                                 this.y + (py - height / 2) / this.scale,
+                                                 one => this.report.shows(one));
     if (i >= 0 && off * this.scale < REACH_PX * (pressed ? 1.5 : 1)) this.report.point(i, this);
   }
 }

@@ -24,8 +24,8 @@ function duration(second) {
 }
 
 class Report {
-  constructor(windows, base, data) {
-    Object.assign(this, {windows, base, data, mode: "iri", at: -1, range: null, page: 0});
+  constructor(windows, base, passed, data) {
+    Object.assign(this, {windows, base, passed, data, mode: "iri", only: -1, at: -1, range: null, page: 0});
     readColours();
     this.views = [];
     if (windows.placed) this.views.push(this.map = new TrackMap(this, byId("map")));
@@ -74,6 +74,20 @@ class Report {
   // The words follow the pictures down the page once there are any.
   follow() { byId("reading").parentElement.classList.toggle("live", this.at >= 0 || this.range !== null); }
 
+  // Whether a window is of the drive that is looked at alone, or all are.
+  shows(i) { return this.only < 0 || this.windows.drive[i] === this.only; }
+
+  // Look at one drive alone; -1: at all.
+  lookAt(drive) {
+    this.only = drive;
+    if (this.at >= 0 && !this.shows(this.at)) this.point(-1);
+    if (this.map) this.map.still = null;
+    if (drive < 0) { this.map?.fit(); this.curves?.fit(); return; }
+    const [from, to] = this.windows.ofDrive(drive);
+    this.map?.fit(from, to);
+    this.curves?.look(this.windows.begin(from), this.windows.end_m[to]);
+  }
+
   // --- words ---
 
   instant(i) {
@@ -97,9 +111,12 @@ class Report {
     } else where.append("place not known");
     const error = way.iri_std_m_per_km[i];
     const iri = number(way.iri_m_per_km[i], 2) + (error >= 0 ? ` ± ${error.toFixed(2)}` : "");
+    const at = way.placeOf(i), {passed} = this;
+    const together = at < 0 ? [] : [this.pair(`Mean of ${passed.drives[at]} drives here`,
+      `${passed.iri_m_per_km[at].toFixed(2)} ± ${passed.iri_std_m_per_km[at].toFixed(2)}`, "m/km")];
     const flags = way.flagsOf(i).map(flag => `${flag}: ${data.meanings[flag] ?? "not explained here"}`);
     return [where,
-      element("dl", {}, this.pair("IRI", iri, `m/km ${data.names.iri[way.iri_rank[i]] ?? "no class"}`),
+      element("dl", {}, this.pair("IRI", iri, `m/km ${data.names.iri[way.iri_rank[i]] ?? "no class"}`), ...together,
               this.pair("a_w", number(way.a_w_mps2[i], 3), `m/s² ${data.names.comfort[way.comfort_rank[i]] ?? ""}`),
               this.pair("Speed", number(way.speed_mps[i] * 3.6, 0), "km/h")),
       element("p", {className: flags.length ? "flagged" : "hint",
@@ -161,6 +178,7 @@ class Report {
         other.setAttribute("aria-pressed", String(other === button));
       this.map?.repaint();
     });
+    byId("only")?.addEventListener("change", event => this.lookAt(Number(event.target.value)));
     on("#range-look", () => {
       this.map?.fit(...this.range);
       this.curves?.look(this.windows.begin(this.range[0]), this.windows.end_m[this.range[1]]);
@@ -197,8 +215,9 @@ class Report {
 
 (async () => {
   const data = JSON.parse(byId("data").textContent), base = await unpacked(data.base);
+  const passed = data.passed && await unpacked(data.passed);
   project(base);
-  const report = new Report(new Windows(await unpacked(data.windows), data), base, data);
+  const report = new Report(new Windows(await unpacked(data.windows), data), base, passed, data);
   for (const view of report.views) view === report.map ? view.drawWay() : view.drawCurves();
   document.documentElement.dataset.shown = "";  // all is in place
   performance.mark("shown");

@@ -148,12 +148,16 @@ class Windows {
     return low;
   }
 
+  // The place of the road that several drives passed there, and which windows one of them has; -1: no other came by.
+  placeOf(i) { return this.place?.[i] >= 0 ? this.place[i] : -1; }
+  ofDrive(drive) { return [this.drive.indexOf(drive), this.drive.lastIndexOf(drive)]; }
+
   // The window nearest to a place of the projected world, and how far that is; -1 where none has a place.
-  nearest(x, y) {
+  nearest(x, y, counts) {
     let best = Infinity, found = -1;
     for (let i = 0; i < this.count; i++) {
       const off = (this.x[i] - x) ** 2 + (this.y[i] - y) ** 2;
-      if (off < best) { best = off; found = i; }
+      if (off < best && counts(i)) { best = off; found = i; }
     }
     return [found, Math.sqrt(best)];
   }

@@ -47,7 +47,7 @@ _LATE_FLAGS = frozenset({"time_unset"})  # goes from the rows when their file is
 
 
 @dataclass(frozen=True)
-class Session:
+class LoggedSession:
     """The rows of one start of the service, in order; ``is_open``: it may still be writing; ``repeated``: so many rows
     stand twice in one file, or in two finished ones."""
 
@@ -58,7 +58,7 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class RowTolerance:
     """How far a quantity may differ: by ``least``, or by a share of ``of`` the expected row where that is more."""
 
     quantity: str
@@ -77,32 +77,32 @@ class Tolerance:
 _COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("VDV", "vdv", "m/s1.75", "mps175"))
 
 TOLERANCES = (
-    Tolerance("start", "s", 0.03, "three steps of the sample grid"),
-    Tolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by"),
-    Tolerance("duration", "s", 0.05, "a start and an end"),
-    Tolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s"),
-    Tolerance("length", "m", 0.75, "as the distance"),
-    Tolerance("place", "m", 1.0, "as the distance, and the digits of the log"),
-    Tolerance("speed", "m/s", 0.1, "0.03 s of braking at 3 m/s2"),
-    Tolerance("a_w", "m/s2", 0.03, "one sample in thirty belongs to the next window", share=0.1, of="a_w_mps2"),
-    Tolerance("accel rms", "m/s2", 0.03, "as a_w", share=0.1, of="accel_rms_mps2"),
-    Tolerance("MTVV", "m/s2", 0.03, "as a_w; its greatest second may end in the next window", share=0.15,
+    RowTolerance("start", "s", 0.03, "three steps of the sample grid"),
+    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by"),
+    RowTolerance("duration", "s", 0.05, "a start and an end"),
+    RowTolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s"),
+    RowTolerance("length", "m", 0.75, "as the distance"),
+    RowTolerance("place", "m", 1.0, "as the distance, and the digits of the log"),
+    RowTolerance("speed", "m/s", 0.1, "0.03 s of braking at 3 m/s2"),
+    RowTolerance("a_w", "m/s2", 0.03, "one sample in thirty belongs to the next window", share=0.1, of="a_w_mps2"),
+    RowTolerance("accel rms", "m/s2", 0.03, "as a_w", share=0.1, of="accel_rms_mps2"),
+    RowTolerance("MTVV", "m/s2", 0.03, "as a_w; its greatest second may end in the next window", share=0.15,
               of="mtvv_mps2"),
-    Tolerance("VDV", "m/s1.75", 0.03, "as a_w", share=0.15, of="vdv_mps175"),
-    *(Tolerance(f"{name} std", unit, 0.03, f"as {name}", share=0.25, of=f"{column}_std_{suffix}")
+    RowTolerance("VDV", "m/s1.75", 0.03, "as a_w", share=0.15, of="vdv_mps175"),
+    *(RowTolerance(f"{name} std", unit, 0.03, f"as {name}", share=0.25, of=f"{column}_std_{suffix}")
       for name, column, unit, suffix in _COMFORT),
-    *(Tolerance(f"{name} raw", unit, 0.03, f"as {name}", share=0.15, of=f"{column}_raw_{suffix}")
+    *(RowTolerance(f"{name} raw", unit, 0.03, f"as {name}", share=0.15, of=f"{column}_raw_{suffix}")
       for name, column, unit, suffix in _COMFORT),
-    Tolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
-    Tolerance("comfort", "", 0, "the words for the row's own a_w"),
-    Tolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
-    Tolerance("IRI std", "m/km", 0.1, "as the IRI", share=0.25, of="iri_std_m_per_km"),
-    Tolerance("IRI rms", "m/km", 0.1, "in proportion to the r.m.s. acceleration", share=0.1, of="iri_rms_m_per_km"),
-    Tolerance("class", "", 0, "that of the row's own IRI"),
-    Tolerance("samples", "", 4, "as the duration, at 100 Hz"),
-    Tolerance("clipped", "", 3, "a start and an end"),
-    Tolerance("segment", "", 0, "counted on"),
-    Tolerance("drive", "", 0, "counted on"),
+    RowTolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
+    RowTolerance("comfort", "", 0, "the words for the row's own a_w"),
+    RowTolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
+    RowTolerance("IRI std", "m/km", 0.1, "as the IRI", share=0.25, of="iri_std_m_per_km"),
+    RowTolerance("IRI rms", "m/km", 0.1, "in proportion to the r.m.s. acceleration", share=0.1, of="iri_rms_m_per_km"),
+    RowTolerance("class", "", 0, "that of the row's own IRI"),
+    RowTolerance("samples", "", 4, "as the duration, at 100 Hz"),
+    RowTolerance("clipped", "", 3, "a start and an end"),
+    RowTolerance("segment", "", 0, "counted on"),
+    RowTolerance("drive", "", 0, "counted on"),
 )
 
 
@@ -111,7 +111,7 @@ class Difference:
     """One quantity over all pairs of rows: 95 of 100 and all differ at most by ``p95`` and ``largest`` (nan: it is in
     none). ``outside`` counts rows beyond the tolerance, and those where only one side knows it."""
 
-    tolerance: Tolerance
+    tolerance: RowTolerance
     compared: int
     p95: float
     largest: float
@@ -124,7 +124,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class LogAgreement:
     """What the comparison found.
 
     session          number of the session that was compared; None: none holds rows of this drive
@@ -157,7 +157,7 @@ class Agreement:
                 and all(difference.ok for difference in self.differences))
 
 
-def read_sessions(directory: Path) -> list[Session]:
+def read_sessions(directory: Path) -> list[LoggedSession]:
     """The sessions whose logs lie in a folder, oldest first. Raises ``OSError``."""
     files: dict[int, list[tuple[int, bool, Path]]] = defaultdict(list)
     for path in directory.iterdir():
@@ -178,7 +178,7 @@ def read_sessions(directory: Path) -> list[Session]:
                 finished_segments |= own
             rows |= {row.segment: row for row in records}
         is_open = not all(finished for _, finished, _ in parts)
-        sessions.append(Session(number, tuple(rows[segment] for segment in sorted(rows)), is_open, repeated))
+        sessions.append(LoggedSession(number, tuple(rows[segment] for segment in sorted(rows)), is_open, repeated))
     return sessions
 
 
@@ -188,13 +188,13 @@ def newest_sidecar(directory: Path) -> dict[str, Any]:
     return sidecar_or_nothing(max(logs)[2]) if logs else {}
 
 
-def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridge_s: float) -> Agreement:
+def compare(expected: Sequence[WindowRecord], sessions: Sequence[LoggedSession], bridge_s: float) -> LogAgreement:
     """Hold the expected rows against those of the session that holds most of them, the latest of several. In an open
     log the last may still be waited for, by a service that bridges losses of fix of ``bridge_s`` [s]."""
     anchors = [(_anchors(expected, rows), session, rows) for session in sessions for rows in [_last_pass(session.rows)]]
     pairs, session, rows = max(anchors, key=lambda found: (len(found[0]), found[1].number), default=([], None, ()))
     if session is None or not pairs:
-        return Agreement(None, len(expected), 0, nan, nan, tuple(row.segment for row in expected), 0, (), 0, 0, ())
+        return LogAgreement(None, len(expected), 0, nan, nan, tuple(row.segment for row in expected), 0, (), 0, 0, ())
     shift_us = round(float(np.median([found.t_us - wanted.t_us for wanted, found in pairs])))
     moved_m = _median([found.distance_start_m - wanted.distance_start_m for wanted, found in pairs
                        if found.distance_start_m is not None and wanted.distance_start_m is not None])
@@ -206,7 +206,7 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridg
     held = {wanted.segment for wanted, _ in matched}
     absent = [row for row in expected if row.segment not in held]
     pending = _pending(expected, absent, longest_wait_us(bridge_s)) if session.is_open else 0
-    return Agreement(
+    return LogAgreement(
         session=session.number,
         expected=len(expected),
         matched=len(matched),
@@ -317,7 +317,7 @@ def _surplus(rows: Sequence[WindowRecord], held: set[int]) -> tuple[int, ...]:
     return tuple(row.segment for row in rows if first < row.segment < last and row.segment not in held)
 
 
-def _difference(tolerance: Tolerance, measure: Measure, pairs: Sequence[Pair]) -> Difference:
+def _difference(tolerance: RowTolerance, measure: Measure, pairs: Sequence[Pair]) -> Difference:
     found = [(measure(wanted, row), tolerance.limit(wanted)) for wanted, row in pairs]
     known = [(value, limit) for value, limit in found if value is not None]
     finite = [value for value, _ in known if value != inf]

@@ -1,7 +1,7 @@
 """A folder that somebody else may have prepared, or may pull out, worked on through its descriptor.
 
 Problem. A stick comes from outside. A name on it may be a link to a file of this machine, a pipe that never answers, or
-a folder where a file belongs; and it may be gone at any call. A path would be looked up anew, and followed, each time.
+a folder where a file belongs; and it may be gone at any call. A path would be looked up, and followed, each time.
 
 Solution. The folder is opened once, and every name in it is reached from its descriptor and never followed. Files are
 read when they are regular files and not else, and written under a new name that nobody could have guessed. What the
@@ -102,7 +102,7 @@ class DirectoryHandle:
         return True
 
     def open_lock_file(self, name: str) -> int:
-        """Descriptor of a file to lock, made when it is not there; readable is enough, whoever owns it."""
+        """Descriptor of a file to lock, made when it is not there; readable is enough, of any owner."""
         self._make_way(name)
         return os.open(name, _READ | os.O_CREAT, 0o644, dir_fd=self._descriptor)
 

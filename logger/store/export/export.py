@@ -40,7 +40,7 @@ from logger.store.log.log_name import OwnFile
 
 FILES_PER_MANIFEST = 32
 GROWTH_PER_MANIFEST = 8
-"""The lists are written anew when an eighth has been added: nine times their last length is written in all, and a stick
+"""The lists are rewritten when an eighth has been added: nine times their last length is written in all, and a stick
 that is pulled has at most a ninth of its files to be read once more, which are there."""
 
 ROOM_FOR_MANIFEST_BYTES = 65_536
@@ -208,7 +208,7 @@ class _Export:
         return missing
 
     def _is_there(self, name: str) -> bool:
-        """True when the stick holds the file as the card does. Both are read, but for what a mark tells of the card."""
+        """True when the stick holds the file as the card does. Both are read, but for what a mark says of the card."""
         try:
             found = self._stick.find(name)
             with self._card.open(name) as file:
@@ -220,7 +220,7 @@ class _Export:
             if self._stick.sha256(name) != mark.sha256:
                 return False
         except OSError:
-            return False  # the copy will meet the same fault, and tell of it
+            return False  # the copy will meet the same fault, and report it
         self._there.append(name)
         self._entries[name] = mark.sha256
         if not is_known or mark.stick != self._name:
@@ -242,7 +242,7 @@ class _Export:
         try:
             found = self._card.find(name)
         except OSError:
-            return 0  # the copy will meet the same fault, and tell of it
+            return 0  # the copy will meet the same fault, and report it
         return found.st_size if found else 0
 
     def _copy_one(self, name: str) -> str | None:
@@ -342,7 +342,8 @@ def _overlap(one: Path, other: Path) -> bool:
 
 
 def _lineage(folder: Path) -> list[tuple[int, int] | None]:
-    """What tells a folder and all that hold it from others, itself first: device and inode; None for what is not."""
+    """What distinguishes a folder and all that hold it from others, itself first: device and inode; None for what is
+    not."""
     resolved = folder.resolve()
     return [_identity(path) for path in (resolved, *resolved.parents)]
 

@@ -7,7 +7,7 @@ off            every stick gets the logs, and every copy counts
 first_stick    the first one that is plugged in gets a random number, which the card remembers; no other stick is served
 key_file       sticks that hold the same key, in the file ``KEY_NAME``, as the logger in a file of its own
 
-Number and key can be read by whoever has such a stick in hand: it is to be kept like a key.
+Number and key can be read by anyone who has such a stick in hand: it is to be kept like a key.
 """
 
 from __future__ import annotations
@@ -123,5 +123,5 @@ def _own_key(path: Path) -> str:
 
 
 def _fingerprint(key: bytes) -> str:
-    """A name made from a key, which does not tell it; empty for one that is too short to be one."""
+    """A name made from a key, which does not reveal it; empty for one that is too short to be one."""
     return hashlib.sha256(b"ridelog stick " + key).hexdigest()[:2 * _ID_BYTES] if len(key) >= LEAST_KEY_BYTES else ""

@@ -1,4 +1,4 @@
-"""What a person at the car is told about the sticks that are plugged in: a note per stick, and a light for all.
+"""What a person at the car sees of the sticks that are plugged in: a note per stick, and a light for all.
 
 Problem. Somebody stands at the car with a hand on the stick. They have no screen, or look once at ``ridelog
 status``; and there may be two sticks. Solution: a small file in memory each time a stick is plugged in, empty until its

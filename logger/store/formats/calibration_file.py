@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalibration
+from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import read_bounded, replace_bytes
 from logger.shipped import shipped
 from logger.store.formats.checksum import json_sha256
@@ -47,12 +47,12 @@ class Found:
     path: Path
 
 
-def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: Settings,
+def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: CalibrationSettings,
                 effects: Sequence[Chosen] = ()) -> str:
     """64 hex digits that change with any number of the vehicle, its effects, the recorder's response, the settings or
     the method.
 
-    Not with the vehicle's name. The recorder's gain is told by its values at 0.01 to 100 Hz.
+    Not with the vehicle's name. The recorder's gain is given by its values at 0.01 to 100 Hz.
     """
     numbers = asdict(vehicle)
     del numbers["name"]
@@ -110,7 +110,7 @@ def _read(path: Path) -> dict[str, tuple[SpeedCalibration, ...]]:
 
 
 def _speed(stored: dict[str, Any]) -> SpeedCalibration:
-    lines = [Line(**stored[field.name]) for field in fields(SpeedCalibration) if field.name != "speed_mps"]
+    lines = [RmsLine(**stored[field.name]) for field in fields(SpeedCalibration) if field.name != "speed_mps"]
     return SpeedCalibration(stored["speed_mps"], *lines)
 
 

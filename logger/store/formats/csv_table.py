@@ -1,7 +1,7 @@
 """Tables of numbers under a header line (CSV), quick for long files and exact about the line at fault.
 
 Problem: a profile or a record is hundreds of thousands of lines, from many hands; reading it line by line is slow, and
-reading it at once tells nothing about the one line that is wrong.
+reading it at once says nothing about the one line that is wrong.
 
 Solution: NumPy reads the table at once, and only when that fails, or a value is not finite, are the lines looked at one
 by one to name the one at fault. No line may be longer than ``LINE_BYTES``: a million columns, or a line without an end,

@@ -36,7 +36,7 @@ COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
 USABLE = "usable"
 MAX_SPEED_MPS = 150.0
-_MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
+_MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
 _LINES_AT_ONCE = 50_000
 _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 

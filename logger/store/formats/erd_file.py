@@ -11,7 +11,7 @@ The format is that of the Engineering Research Division of UMTRI ("The ERD File 
     ...                                 more keywords of 8 columns; a line that starts with & carries on the one before
     END
 
-then the numbers, all channels of the first sample, all of the second and so on. The key tells how they are written:
+then the numbers, all channels of the first sample, all of the second and so on. The key says how they are written:
 0 as 2-byte integers (times GAIN plus OFFSET), 1 as 4-byte and 2 as 8-byte floating point, 5 as text. Text follows the
 header. Binary numbers stand in a file of the same name with ``.bin`` added, or in place of the suffix, or, in the
 oldest files, right behind the END line. The specification names no byte order; little-endian is read here, and numbers
@@ -77,7 +77,7 @@ class ErdFile:
     def wheel_tracks(self) -> tuple[Array, ...]:
         """Elevations (samples,) [m] of one track, or of the left and the right one.
 
-        One channel is one track. Of several, the left and the right one are told by their names (LElev., Right
+        One channel is one track. Of several, the left and the right one are recognised by their names (LElev., Right
         Profile ...); two channels without names are left and right in this order. BadInput otherwise.
         """
         chosen = self._sides()

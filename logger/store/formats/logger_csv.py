@@ -106,8 +106,8 @@ def read_table(header: Header, known: Recognised) -> LoggerTable:
 
 
 def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
-    """The times (n,) of a table [s]. A unit that is not known is told by the size of the numbers, or is that of another
-    table with the same column. BadInput where neither can be."""
+    """The times (n,) of a table [s]. A unit that is not known is taken from the size of the numbers, or is that of
+    another table with the same column. BadInput where neither can be."""
     times, unit = table.columns["t"], table.unit("t")
     if unit is None and same_as is None:
         unit = _stepping_unit(times)

@@ -2,8 +2,8 @@
 
 Problem: a phone's recording says "Acceleration x (m/s^2)", the next one "z" in a file called TotalAcceleration.csv.
 Solution: one table of what is known, each with its source. A file is recognised by all columns that a layout needs, and
-by its name where columns alone do not tell an accelerometer from a gyroscope. Whoever has another recorder names its
-columns (``logger_columns``).
+by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the columns
+are named (``logger_columns``).
 
 Sign: an accelerometer at rest feels gravity as a push upwards (Android), or a program writes all its axes the other way
 round (Apple's Core Motion). Both read the same along the direction in which gravity is felt, so no layout needs a sign.
@@ -15,13 +15,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from logger.units import STANDARD_GRAVITY_MPS2
+
 ROLES = ("t", "x", "y", "z", "up", "gx", "gy", "gz", "lat", "lon", "speed")
 """What a column can be: time; acceleration along the recorder's own axes, or upwards, of a recorder with one axis;
-gravity as the recorder tells it, along its axes; place; speed."""
+gravity as the recorder gives it, along its axes; place; speed."""
 AXES, GRAVITY, PLACE = ("x", "y", "z"), ("gx", "gy", "gz"), ("lat", "lon")
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
-ACCELERATION_UNITS = {"m/s2": 1.0, "g": 9.80665, "mg": 9.80665e-3}
+ACCELERATION_UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": 1e-3 * STANDARD_GRAVITY_MPS2}
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600}
 ANGLE_UNITS = {"deg": 1.0}
 SPELLINGS = {"m/s^2": "m/s2", "mps2": "m/s2", "m/s/s": "m/s2", "mps": "m/s", "kmh": "km/h", "kph": "km/h",
@@ -40,7 +42,7 @@ def units_of(role: str) -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name in the header, and its unit; None: the header or the numbers have to tell."""
+    """A column: its name in the header, and its unit; None: the header or the numbers have to show it."""
 
     header: str
     unit: str | None = None
@@ -49,7 +51,7 @@ class Column:
 @dataclass(frozen=True)
 class Layout:
     """``columns`` by role, all of which must be there; ``stem``: the name that the file must have, without .csv, in
-    small letters; empty: the header tells."""
+    small letters; empty: the header says it."""
 
     name: str
     columns: Mapping[str, Column]

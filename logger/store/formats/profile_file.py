@@ -1,7 +1,7 @@
 """Road profiles as files: CSV of ours and ERD of the profilers, read into evenly spaced elevations.
 
 Problem: a profile is long (400,000 lines for 10 km at 25 mm), comes from many hands, and everything computed from it
-takes for granted that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
+assumes that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
 
 Solution: distances must lie on an even grid, but for the rounding of their digits; anything else is refused with its
 line. Straight lines between the samples are laid through an uneven profile only
@@ -53,7 +53,7 @@ class Profile:
 
 
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
-    """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line).
+    """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line).
 
     resample_m    lay a grid of this spacing [m] over the profile, linearly between its samples
 

@@ -1,8 +1,9 @@
-"""Acceleration records that are not what they seem: recognised, mended where that was asked for, else told or refused.
+"""Acceleration records that are not what they seem: recognised, mended where that was asked for, else reported or
+refused.
 
 Problem: repeated samples, values in g, the end of a sensor's range and a recorder's uneven clock all give figures that
 look like any others. Solution: what makes a result wrong is refused, with the option that mends it; what is doubtful
-is told beside the result.
+is reported with the result.
 """
 
 from __future__ import annotations
@@ -132,8 +133,8 @@ def even_record(
 
 
 def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
-    """A drive's columns (n,) by name (``drive_file.COLUMNS``), as ``even_record``. Repeats are dropped; but what is not
-    in the samples cannot be told a road by, so BadInput where fewer than 80 a second are left."""
+    """A drive's columns (n,) by name (``drive_file.COLUMNS``), as ``even_record``. Repeats are dropped; but what the
+    samples do not hold cannot be estimated, so BadInput where fewer than 80 a second are left."""
     names = [name for name in columns if name not in (TIME, VERTICAL)]
     moving = np.abs(columns[SPEED]) > _MOVING_MPS
     found = even_record(columns[TIME], {VERTICAL: columns[VERTICAL]}, {name: columns[name] for name in names}, file,

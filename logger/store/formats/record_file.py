@@ -1,4 +1,4 @@
-"""Acceleration records as CSV: evenly sampled columns, told by the names in the header.
+"""Acceleration records as CSV: evenly sampled columns, recognised by the names in the header.
 
 Problem: an hour at 1000 Hz is 3.6 million lines, and a record with a hole or an uneven clock gives figures that look
 like any others. Solution: the times must lie on an even grid, but for the rounding of their digits; a record that does

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +77,51 @@ def _line(path: Path | str, points: Any) -> tuple[Array, Array]:
         raise BadInput(f"{path}: expected lines of at least two [longitude, latitude] in degrees, found "
                        f"{json.dumps(points)[:80]}")
     return degrees[:, 1], degrees[:, 0]
+
+
+CAR_ROADS = frozenset({"motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential",
+                       "living_street", "service", "road", "track",
+                       *(f"{one}_link" for one in ("motorway", "trunk", "primary", "secondary", "tertiary"))})
+"""Values of OpenStreetMap's key ``highway`` on which cars drive."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapWay:
+    """A way of OpenStreetMap: its number, its tags, latitudes and longitudes (n,) [degrees]."""
+
+    osm_id: int
+    tags: dict[str, str]
+    lat_deg: Array
+    lon_deg: Array
+
+
+def read_map_ways(path: Path | str) -> list[MapWay]:
+    """Ways on which cars drive, out of an extract that names them: ``@id`` or ``osm_id`` among the properties, or an
+    ``id``, such as way/4711.
+
+    Raises BadInput for a file that cannot be read, is not GeoJSON, or holds no such way.
+    """
+    content = read_geojson(path)
+    features = content.get("features") if content.get("type") == "FeatureCollection" else [content]
+    found: list[MapWay] = []
+    for one in features if isinstance(features, list) else ():
+        named = one.get("properties") if isinstance(one, dict) else None
+        geometry = one.get("geometry") if isinstance(one, dict) else None
+        if not isinstance(named, dict) or not isinstance(geometry, dict) or geometry.get("type") != "LineString":
+            continue
+        number = _osm_id(one, named)
+        if number is not None and named.get("highway") in CAR_ROADS:
+            tags = {key: value for key, value in named.items() if isinstance(value, str)}
+            found.append(MapWay(number, tags, *_line(path, geometry.get("coordinates"))))
+    if not found:
+        raise BadInput(f"{path}: expected ways of OpenStreetMap for cars: LineStrings with a highway and an @id "
+                       "such as way/4711, found none")
+    return found
+
+
+def _osm_id(feature: dict[str, Any], named: dict[str, Any]) -> int | None:
+    for value in (named.get("@id"), named.get("osm_id"), feature.get("id"), named.get("id")):
+        digits = re.fullmatch(r"(?:way/)?([0-9]{1,18})", str(value), re.ASCII)
+        if digits:
+            return int(digits[1])
+    return None

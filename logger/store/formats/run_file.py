@@ -1,6 +1,6 @@
 """``run.yaml``: what the record of a run is, beside the run.
 
-Problem: a model is compared with readings that a sensor rounded, at places that a receiver told; who does so has to
+Problem: a model is compared with readings that a sensor rounded, at places that a receiver gave; to do so one has to
 know how coarse the one is and how far off the other. Solution: a small file says it; what it does not say is not known.
 """
 

@@ -86,8 +86,8 @@ def read_vehicle(path: Path | str) -> Vehicle:
     A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
     has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
     an axle that has an anti-roll bar, ``anti_roll_stiffness_n_m_per_rad``. Any car may say where its accelerometer
-    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference. Numbers that no car has,
-    such as those in other units, are wrong too.
+    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as it makes a difference to its model. Numbers that no car
+    has, such as those in other units, are wrong too.
     """
     vehicle, keys = _read(path)
     if "effects" in keys and keys["effects"].items():

@@ -33,8 +33,8 @@ class Node:
     """One value of a YAML file and the line where it stands (that of its key, inside a mapping).
 
     content is the text of a scalar as written, a tuple of nodes, or a dict from key to node (in the file's
-    order). ``plain`` tells an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``). ``key`` is what it
-    stands under in the file; empty: it is the whole, or one of a list.
+    order). ``plain`` distinguishes an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``). ``key`` is what
+    it stands under in the file; empty: it is the whole, or one of a list.
     Each asking method raises BadInput when the value is something else.
     """
 

@@ -10,8 +10,8 @@ falls below a reserve, in this order and only as far as needed:
 2. no new raw bytes are recorded: the reserve belongs to the logs;
 3. when the reserve is used up too, the oldest dumps go that were not exported, each with a warning and counted;
 4. then nothing is written any more. A log that was not exported is never removed: its drive cannot be driven again,
-   while the drive that is not recorded now is told by ``ridelog status`` and can. The reserve holds the rows of
-   some 1,500 km, so whoever collects logs once a season never gets there.
+   while the drive that is not recorded now is reported by ``ridelog status`` and can. The reserve holds the rows of
+   some 1,500 km, so a car whose logs are collected once a season never gets there.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Limits:
+class QuotaLimits:
     """quota_bytes    most bytes in the folder of the logs; None: no limit
     floor_bytes      free space on its disk that is left to others
     """
@@ -63,7 +63,7 @@ class DiskQuota:
     exported_removed, dumps_lost    files removed to make room: exported ones, and dumps that were not
     """
 
-    def __init__(self, directory: Path, limits: Limits, exported: Callable[[Path], set[str]],
+    def __init__(self, directory: Path, limits: QuotaLimits, exported: Callable[[Path], set[str]],
                  files: FileSystem) -> None:
         self._directory = directory
         self._limits = limits

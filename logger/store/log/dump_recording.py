@@ -60,7 +60,7 @@ class Recording:
         self._holds_events = self._writer is not None
 
     def hold(self, why: str) -> None:
-        """Record nothing more until told an empty ``why``: there is no room that may be used."""
+        """Record nothing more until called with an empty ``why``: there is no room that may be used."""
         if why and not self._held:
             self.close()
             log.warning("recording stopped: %s", why)

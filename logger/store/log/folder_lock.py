@@ -1,6 +1,6 @@
 """One writer to a folder of logs. A second service, or a replay into the same folder, would finish the open files of
-the first; so whoever writes holds a lock on the folder for as long as the process lives. The kernel lets go of it
-when the process ends, however it ends."""
+the first; so a process that writes holds a lock on the folder for as long as the process lives. The kernel lets go of
+it when the process ends, however it ends."""
 
 from __future__ import annotations
 

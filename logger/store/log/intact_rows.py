@@ -3,7 +3,7 @@
 Problem. A cut can leave a part beside the finished file that was made of it, and a card can damage either. What is
 intact in one of them is not lost. Solution. Both are read at once and merged by segment. Where damaged lines stand
 before a row that does not follow the one before it, and they are long enough, rows are lost there: a ``Hole``, by which
-a reader can tell what was damaged from what was never written.
+a reader can distinguish what was damaged from what was never written.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
     found: list[tuple[Path, Path | None]] = []
     seen: set[object] = set()
     for place in places:
-        # With one place its own name says nothing; among several it tells them apart.
+        # With one place its own name says nothing; among several it distinguishes them.
         shown_from = place if len(places) == 1 else place.parent
         marks = {log: {log.resolve(), _copied(log) if len(places) > 1 else None} - {None} for log in find_logs(place)}
         found += [(log, shown_from) for log, its in marks.items() if not seen & its]
@@ -118,7 +118,7 @@ def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:
 
 
 def split_drives(records: Iterable[WindowRecord]) -> list[list[WindowRecord]]:
-    """Rows drive by drive. A new drive begins where its number changes or the rows are counted anew."""
+    """Rows drive by drive. A new drive begins where its number changes or the count of rows restarts."""
     drives: list[list[WindowRecord]] = []
     last: WindowRecord | None = None
     for record in records:

@@ -133,7 +133,7 @@ class SegmentLog:
 
     def go_on(self, unsynced: Iterable[WindowRecord]) -> None:
         """After an ``OSError``: leave the part as it stands, open the next, and put the rows there that were not
-        synced. A part that was opened here and has taken no row is begun anew: a disk that refuses for a day leaves
+        synced. A part that was opened here and has taken no row is begun again: a disk that refuses for a day leaves
         no more files than one that refuses once. Raises ``OSError``: not yet."""
         self._let_go()
         if self._is_retry:
@@ -215,7 +215,7 @@ class SegmentLog:
 
     def _do(self, act: Callable[..., None], *what: bytes) -> None:
         """Write to or sync the part. One that failed at it is never tried again: the system may by then have thrown
-        away what it could not write, and tell of success."""
+        away what it could not write, and report success."""
         if self._descriptor is None:
             raise ValueError("expected an open log: go_on() after an error, and nothing after close()")
         try:

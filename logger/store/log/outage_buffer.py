@@ -94,7 +94,7 @@ class BufferedLog:
         self._try(lambda segment_log: segment_log.set_clock_map(clock))
 
     def hold(self, why: str) -> None:
-        """Write nothing more until told an empty ``why``: there is no room that may be used."""
+        """Write nothing more until called with an empty ``why``: there is no room that may be used."""
         if why and not self._held:
             self.sync()
             self._fail(why)

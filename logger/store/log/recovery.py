@@ -262,7 +262,7 @@ def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
 def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: Tally,
                  clock: ClockMap | None, limit: int | None) -> Path:
     """Put the intact rows of a part, or of the part and the finished file that is there, into a finished file; the part
-    is still there. They are written anew: of a part that was found open nobody knows whether the disk holds what the
+    is still there. They are rewritten: of a part that was found open nobody knows whether the disk holds what the
     system shows."""
     finished = finished_path(part)
     filled = tally if clock is None else replace(tally, unset=0)

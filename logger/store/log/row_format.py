@@ -32,7 +32,8 @@ LARGEST = 1e9
 """Beyond any quantity of a row in the unit of its column; what is larger is not known, and not read."""
 
 _EPOCH = datetime(1970, 1, 1)
-_LATEST_US = (datetime(2200, 1, 1) - _EPOCH) // timedelta(microseconds=1)
+LATEST_US = (datetime(2200, 1, 1) - _EPOCH) // timedelta(microseconds=1)
+"""From here on no instant is written or read [us since 1970]."""
 _MICROSECOND = timedelta(microseconds=1)
 _UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
 _SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,9})\.([0-9]{6})")
@@ -59,7 +60,7 @@ class Column:
 
 def write_utc(utc_us: int | None) -> str:
     """An instant [us since 1970] as ISO 8601 with milliseconds; nothing where it is not known, or from 2200 on."""
-    if utc_us is None or not 0 <= utc_us < _LATEST_US:
+    if utc_us is None or not 0 <= utc_us < LATEST_US:
         return ""
     return (_EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds") + "Z"
 
@@ -70,7 +71,7 @@ def _read_utc(text: str) -> int | None:
     if not _UTC.fullmatch(text):
         raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text[:_SHOWN]!a}")
     utc_us = (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
-    if not 0 <= utc_us < _LATEST_US:
+    if not 0 <= utc_us < LATEST_US:
         raise BadRow(f"expected UTC from 1970 to 2199, found {text!a}")
     return utc_us
 
@@ -175,7 +176,7 @@ COLUMNS = (
     _number("vdv_raw_mps175", 4),
 )
 _OLD_COUNT = 23
-"""Columns of logs that did not tell the ride from the noise yet."""
+"""Columns of logs that did not separate the ride from the noise yet."""
 
 
 def _header(columns: Sequence[Column]) -> str:

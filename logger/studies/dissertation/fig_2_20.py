@@ -4,7 +4,8 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.comfort.exposure import S_PER_HOUR, caution_zone
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 PRINTED_UPPER_VDV, PRINTED_LOWER_VDV = 8.5, 17.0
 PRINTED_SHADED_HOURS = (4.0, 8.0)
@@ -33,19 +34,20 @@ def run(effort: Effort) -> Result:
                f"two schools, a^2 t and a^4 t constant, cross at {crossing:.1f} hours and lie within "
                f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
                "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
-               f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high. "
-               "The text has dashed lines for n = 2 in the printed figure and dotted ones for "
-               "n = 4.")
+               f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high.")
     hours = np.geomspace(1 / 60, 24, 60)
     lines = tuple(Line(f"n = {exponent}, {bound}", hours, np.array([
         getattr(caution_zone(hour, exponent), bound) for hour in hours.tolist()]))
                   for exponent in (2, 4) for bound in ("lower", "upper"))
-    return Result((table,), verdict, (Curves("The caution zone", "hours a day", "weighted r.m.s. [m/s2]", lines,
-                                             log_x=True, log_y=True),), values)
+    picture = Picture(Curves("The caution zone", "hours a day", "weighted r.m.s. [m/s2]", lines, log_x=True,
+                             log_y=True),
+                      "two dashed lines for n = 2 and two dotted ones for n = 4, shaded between 4 and 8 hours")
+    return Result((table,), verdict, (picture,), values)
 
 
 STUDY = Study("fig_2_20", "The health guidance caution zone", "Fig 2.20, section 2.3.5",
               "The zone's bounds as ridelog has them for an exposure of a minute to a day; the doses of its lines are "
               "those of ISO 2631-1 Eq B.3.", run,
-              covers=("Fig 2.20",), word=Word.MISPRINT,
-              because="The text has the doses of the two lines the wrong way round: 17 is the upper, 8.5 the lower.")
+              items=(Item("Fig 2.20", Word.MISPRINT,
+                          "The text has the doses of the two lines the wrong way round: 17 is the upper, 8.5 the "
+                          "lower."),))

@@ -3,8 +3,9 @@
 import numpy as np
 
 from logger.chart_data import Curves, Line
+from logger.studies.checks import Statement, Word
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 from logger.units import STANDARD_GRAVITY_MPS2
 
 HEIGHTS_M = (0.1016, 0.1270, 0.1524, 0.1778, 0.2032)
@@ -27,10 +28,16 @@ def run(effort: Effort) -> Result:
                f"bump of 5.5.2 the model peaks at {own / STANDARD_GRAVITY_MPS2:.2f} g, the record on a row of speed "
                "bumps at 0.87 g: the real bumps, tires or bump stops are harder than the model's, and the text "
                "cannot tell which.")
-    picture = Curves("Largest acceleration over a bump", "width of the bump [m]", "peak [m/s2]", tuple(
-        Line(f"{1000 * height:.0f} mm", np.array(widths), row) for height, row in zip(heights, peaks, strict=True)))
+    picture = Picture(Curves("Largest acceleration over a bump", "width of the bump [m]", "peak [m/s2]", tuple(
+        Line(f"{1000 * height:.0f} mm", np.array(widths), row) for height, row in zip(heights, peaks, strict=True))),
+        "peaks for heights of 101.6 to 203.2 mm and widths of 1.83 to 3.35 m: the higher the larger, the wider the "
+        "smaller")
+    values = (Statement("least change of the peak from one height to the next higher [m/s2]", "the larger the height, "
+                        "the larger the peak", float(np.diff(peaks, axis=0).min()), least=1e-3),
+              Statement("most change of the peak from one width to the next larger [m/s2]", "the larger the width, the "
+                        "smaller the peak", float(np.diff(peaks, axis=1).max()), most=-1e-3))
     return Result((Table("Largest acceleration, either way (printed as a picture only)", columns, rows), one), verdict,
-                  (picture,))
+                  (picture,), values)
 
 
 def _peak(height_m: float, width_m: float) -> float:
@@ -40,6 +47,6 @@ def _peak(height_m: float, width_m: float) -> float:
 
 STUDY = Study("fig_4_25", "Peak acceleration by height and width of a bump", "Fig 4.25, section 4.4.2",
               "Simulated as in the source: half car of Table 4.2, 16.1 km/h, no roughness, no noise.", run,
-              covers=("Fig 4.25",), word=Word.AGREES,
-              because="A higher bump gives a larger peak, a wider one a smaller, as printed; the figure has no numbers "
-                      "in the text.")
+              items=(Item("Fig 4.25", Word.AGREES,
+                          "A higher bump gives a larger peak, a wider one a smaller, as printed; the figure has no "
+                          "numbers in the text."),))

@@ -5,13 +5,16 @@ from itertools import pairwise
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.comfort.iso2631 import a_w, comfort_word
+from logger.comfort.iso2631 import COMFORT_WORDS, a_w, comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.runs import Run
+from logger.studies.checks import Statement, Value, Word, about
 from logger.studies.drives import BRIDGE_MPS, RATE_HZ, STEP_M, Array, Conditions, bridge, record_of
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 PRINTED_PEAK_MPS2 = 1.5
+UNCOMFORTABLE = (0.8, 2.5)
+"""From the lower end of uncomfortable to the upper end of very uncomfortable, Table 2.5 [m/s2]."""
 SECTIONS_M = (1.0, 10.0)
 OF_ONE_SIZE = 0.4  # a metre is a thirteenth of a second: where it begins moves its a_w by 0.2; as much for "close to"
 _STEP_AT_M, _SECONDS, _LENGTH_M = 50.0, 8.0, 100.0
@@ -33,10 +36,22 @@ def run(effort: Effort) -> Result:
                "second; over 10 m what a person feels is already half of that.")
     lines = tuple(Line(f"{section:g} m sections", np.arange(section / 2, _LENGTH_M, section), one)
                   for section, one in zip(SECTIONS_M, found[0], strict=True))
-    return Result((table,), verdict, (Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m",
-                                             "distance [m]", "a_w [m/s2]", lines),), (
-        Value("largest a_w of a metre, nearly [m/s2]", PRINTED_PEAK_MPS2, float(found[0][0].max()), OF_ONE_SIZE,
-              Word.NOT_REPRODUCIBLE),))
+    picture = Picture(Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m", "distance [m]",
+                             "a_w [m/s2]", lines),
+                      "a_w of each metre, up to nearly 1.5 m/s2 (Fig 4.34), and of each 10 m, in which the step is "
+                      "still clear (Fig 4.35)")
+    each, tens = (float(one.max()) for one in found[0])
+    quiet = float(np.delete(found[0][1], int(found[0][1].argmax())).max())
+    return Result((table,), verdict, (picture,), (
+        *about("Fig 4.34", [Value("largest a_w of a metre, nearly [m/s2]", PRINTED_PEAK_MPS2, each, OF_ONE_SIZE,
+                                  Word.NOT_REPRODUCIBLE)]),
+        *about("Fig 4.34", [Statement("largest a_w of a metre [m/s2]", "uncomfortable to very uncomfortable", each,
+                                      UNCOMFORTABLE[0], UNCOMFORTABLE[1], Word.NOT_REPRODUCIBLE)]),
+        *about("Fig 4.35", [
+            Statement("largest a_w of 10 m [m/s2]", "still clear that the bump causes a discomfort", tens,
+                      COMFORT_WORDS[-2][0], word=Word.NOT_REPRODUCIBLE),
+            Statement("that over the largest of the other sections", "still clear", tens / quiet, 2.0,
+                      word=Word.NOT_REPRODUCIBLE)])))
 
 
 def _sections(seed: int) -> list[Array]:
@@ -55,6 +70,9 @@ def per_section(record: Run, section_m: float, length_m: float) -> Array:
 STUDY = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m", "Fig 4.34 (and 4.35), section 4.4.6",
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
               run,
-              covers=("Fig 4.34", "Fig 4.35"), word=Word.NOT_REPRODUCIBLE,
-              because="Road and filter of the figure are not printed; simulated under its conditions the discomfort "
-                      "per metre is of the printed size.")
+              items=(Item("Fig 4.34", Word.NOT_REPRODUCIBLE,
+                          "Road and filter of the figure are not printed; simulated, the discomfort per metre is of "
+                          "the printed size."),
+                     Item("Fig 4.35", Word.NOT_REPRODUCIBLE,
+                          "Road and filter of the figure are not printed; simulated, the step is still clear over 10 "
+                          "m.")))

@@ -12,9 +12,10 @@ from logger.identification.unknown_road.road_fit import fit_roads
 from logger.identification.unknown_road.road_state import Options
 from logger.profiles.track import Track
 from logger.runs import Run
+from logger.studies.checks import Statement, Word
 from logger.studies.drives import PS_2119, RATE_HZ, Array, drive_over, places_m, random_road, rav4
 from logger.studies.fit_methods import MASS, TRUTH
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Cell, Column, Effort, Item, Picture, Result, Study, Table
 from logger.units import WINDOW_M
 from logger.vehicle.frequency_response import AxleResponse
 from logger.vehicle.linearise import known_vehicle
@@ -51,10 +52,20 @@ def run(effort: Effort) -> Result:
                "speed changes is the car. The source finds such results poor, having nothing to tell road from car.")
     drive, start_m, spacing_m, true, ours, _ = profiles[-1]
     place_m = np.asarray(start_m + spacing_m * np.arange(len(true)), float)
-    return Result((table, mass), verdict, (
-        Curves(f"The road from the response at {drive.speed_mps[0]:g} m/s. Printed: nothing, future work",
-               "distance [m]", "elevation in the band [mm]", (Line("true", place_m, 1000 * true),
-                                                              Line("from the response", place_m, 1000 * ours))),))
+    picture = Picture(Curves(f"The road from the response at {drive.speed_mps[0]:g} m/s", "distance [m]",
+                             "elevation in the band [mm]", (Line("true", place_m, 1000 * true),
+                                                            Line("from the response", place_m, 1000 * ours))),
+                      "nothing: future work")
+    error, std = last.parameters[MASS] - TRUTH[MASS], last.standard_errors[MASS]
+    return Result((table, mass), verdict, (picture,), (
+        Statement("correlation of the profile found with the true one, the lesser drive", "further research: the input "
+                  "from what is found in the response", min(float(str(row[-1])) for row in table.rows), 0.9,
+                  word=Word.BETTER),
+        Statement("error of the mass from two drives without any input, over its standard error", "an unknown input "
+                                                                                                  "gives "
+                  "poor results", error / std, -3.0, 3.0, Word.BETTER),
+        Statement("that standard error [%]", "an unknown input gives poor results", 100 * std / TRUTH[MASS], 0.0, 10.0,
+                  Word.BETTER)))
 
 
 def _mass(drives: list[Run], probes: int) -> RoadFit:
@@ -69,7 +80,7 @@ def _row(what: str, found: RoadFit) -> tuple[Cell, ...]:
 
 
 def _profile(drive: Run, road: Track) -> tuple[float, float, Array, Array, RoadProfile]:
-    """Start and spacing [m], the true road in the band that is told, and that of the estimate [m]."""
+    """Start and spacing [m], the true road in the band that is known, and that of the estimate [m]."""
     sensor = Sensor(PS_2119.noise_mps2, PS_2119.step_mps2)
     _, found = estimated(known_vehicle(rav4()), sensor, WINDOW_M, drive.measured_mps2, drive.distance_m)
     assert found is not None
@@ -90,6 +101,6 @@ def _of_profile(drive: Run, _start_m: float, _spacing_m: float, true: Array, our
 STUDY = Study("section_7_2_input", "The input found from the response", "Section 7.2, first item",
               "Nothing is printed: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 "
               "over 300 m of random road of IRI 4 m/km at 10 and 20 m/s.", run,
-              covers=("7.2 input from response",), word=Word.BETTER,
-              because="The profile comes out of the response of a known car, and the mass out of two drives over one "
-                      "road that nobody measured.")
+              items=(Item("7.2 input from response", Word.BETTER,
+                          "The profile comes out of the response of a known car, and the mass out of two drives over "
+                          "one road that nobody measured."),))

@@ -6,8 +6,9 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.estimation.rms_relation import rms_relation
+from logger.studies.checks import Statement, Word
 from logger.studies.drives import PS_2119, drive_over, random_road, rav4
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 from logger.studies.windows import per_window
 from logger.units import MPH_MPS
 from logger.vehicle.linearise import known_vehicle
@@ -46,12 +47,17 @@ def run(effort: Effort) -> Result:
                f"feels, and is off by up to {worst:.0f} %; one that has the place in the vehicle's file (sensor: "
                f"ahead_m) by {max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, ridelog "
                "diagnose finds sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
-    return Result((table, biases), verdict, (
-        Curves("What a sensor reads by its place. Printed: nothing, future work", "speed [mph]",
-               "change of the r.m.s. acceleration [%]",
-               tuple(Line(f"{place:+g} m ahead", np.array(SPEEDS_MPH, dtype=float), row)
-                     for place, row in zip(PLACES_M, change, strict=True) if place),
-               level=(0.0, "at the centre")),))
+    picture = Picture(Curves("What a sensor reads by its place", "speed [mph]", "change of the r.m.s. acceleration [%]",
+                             tuple(Line(f"{place:+g} m ahead", np.array(SPEEDS_MPH, dtype=float), row)
+                                   for place, row in zip(PLACES_M, change, strict=True) if place),
+                             level=(0.0, "at the centre")), "nothing: future work")
+    return Result((table, biases), verdict, (picture,), (
+        Statement("least change of the r.m.s. a metre ahead or behind [%]", "a further look can demonstrate the effect "
+                                                                            "of "
+                  "pitch", float(change[[0, -1]].min()), 10.0, word=Word.BETTER),
+        Statement("largest bias of the IRI with the place in the vehicle's file [%]", "the sensor is assumed at the "
+                                                                                      "centre "
+                  "of gravity", max(abs(float(row[3])) for row in rows), 0.0, 5.0, Word.BETTER)))
 
 
 def _at(ahead_m: float) -> Vehicle:
@@ -61,5 +67,5 @@ def _at(ahead_m: float) -> Vehicle:
 STUDY = Study("section_7_2_sensor_position", "A sensor away from the centre of gravity", "Section 7.2, third item",
               "Nothing is printed: the source names it as future work. Computed for the half car of Table 4.2 on roads "
               "of ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.", run,
-              covers=("7.2 sensor position",), word=Word.BETTER,
-              because="The place of the sensor is part of the vehicle, and with it the pitch that it feels.")
+              items=(Item("7.2 sensor position", Word.BETTER,
+                          "The place of the sensor is part of the vehicle, and with it the pitch that it feels."),))

@@ -9,7 +9,8 @@ from logger.dsp.weightings.weighting import Weighting
 from logger.dsp.weightings.wf import WEIGHTING as WF
 from logger.dsp.weightings.wj import WEIGHTING as WJ
 from logger.dsp.weightings.wk import WEIGHTING as WK
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word, about
+from logger.studies.study import Cell, Column, Effort, Item, Result, Study, Table
 
 NAMES = ("f1", "f2", "f3", "f4", "Q4", "f5", "Q5", "f6", "Q6")
 PRINTED: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
@@ -24,14 +25,16 @@ PRINTED: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    rows, values = [], []
+    rows: list[tuple[Cell, ...]] = []
+    values: list[Value] = []
     for weighting, printed in effort.each(PRINTED):
         ours = (weighting.f1_hz, weighting.f2_hz, weighting.f3_hz, weighting.f4_hz, weighting.q4, weighting.f5_hz,
                 weighting.q5, weighting.f6_hz, weighting.q6)
         for name, said, mine in zip(NAMES, printed, ours, strict=True):
             unit = "" if name.startswith("Q") else " [Hz]"
             if said is not None and isfinite(said):
-                values.append(Value(f"{weighting.name}, {name}{unit}", said, mine, 0.0))
+                table = "Table 2.7" if weighting in (WK, WD, WF) else "Table 2.8"
+                values += about(table, [Value(f"{weighting.name}, {name}{unit}", said, mine, 0.0)])
             else:
                 rows.append((weighting.name, name, "infinite" if said else "none",
                              "without effect" if said is None else "infinite" if mine == inf else f"{mine:g}"))
@@ -44,4 +47,5 @@ def run(effort: Effort) -> Result:
 
 STUDY = Study("table_2_7", "Parameters of the six frequency weightings", "Table 2.7, section 2.3.4.1",
               "Ridelog's weightings, each as its file has it, parameter by parameter.", run,
-              covers=("Table 2.7", "Table 2.8"), word=Word.AGREES, because="Every parameter agrees.")
+              items=(Item("Table 2.7", Word.AGREES, "Every parameter of Wk, Wd and Wf agrees."),
+                     Item("Table 2.8", Word.AGREES, "Every parameter of Wc, We and Wj agrees.")))

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word
+from logger.studies.study import Cell, Column, Effort, Item, Result, Study, Table
 from logger.vehicle.modes import modes, undamped_frequencies_hz
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
 from logger.vehicle.structure import Structure
@@ -55,5 +56,5 @@ def quoted(car: Structure, names: tuple[str, ...], printed_hz: tuple[float | Non
 
 STUDY = Study("table_4_1", "Natural frequencies of the quarter car (the Golden Car)", "Table 4.1, section 4.3.3",
               "The eigenvalues of Table 4.1's car.", run,
-              covers=("Table 4.1",), word=Word.AGREES,
-              because="The frequencies agree to their last printed figure, the damping ratio within 0.005.")
+              items=(Item("Table 4.1", Word.AGREES,
+                          "The frequencies agree to their last printed figure, the damping ratio within 0.005."),))

@@ -1,8 +1,9 @@
 """Table 4.2: the half car, and its natural frequencies (4.3.3)."""
 
+from logger.studies.checks import Value, Word
 from logger.studies.dissertation.table_4_1 import COLUMNS, quoted, quoted_values
 from logger.studies.drives import rav4
-from logger.studies.study import Effort, Result, Study, Table, Value, Word
+from logger.studies.study import Effort, Item, Result, Study, Table
 from logger.vehicle.models import structure_of
 
 PRINTED_HZ, PRINTED_DAMPING = (1.1, 11.0), 0.30
@@ -22,12 +23,13 @@ def run(effort: Effort) -> Result:
                "m2, not kg/m2; and the pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are "
                "right.")
     values = (*quoted_values(rows, damping_within=0.015),
-              Value("half of the car with two people, Eq 4.36 [kg]", PRINTED_MASS_KG, by_eq, 1.0, Word.MISPRINT))
+              Value("half of the car with two people, Eq 4.36 [kg]", PRINTED_MASS_KG, by_eq, 1.0, Word.MISPRINT,
+                    of_print=True))
     return Result((Table("Vibrations of the half car", COLUMNS, rows),), verdict, (), values)
 
 
 STUDY = Study("table_4_2", "Natural frequencies of the half car (RAV4)", "Table 4.2, section 4.3.3",
               "The eigenvalues of Table 4.2's car.", run,
-              covers=("Table 4.2",), word=Word.MISPRINT,
-              because="Frequencies and damping agree; the mass does not follow from Eq 4.36, and the inertia's unit is "
-                      "kg m2.")
+              items=(Item("Table 4.2", Word.MISPRINT,
+                          "Frequencies and damping agree; the mass does not follow from Eq 4.36, and the inertia's "
+                          "unit is kg m2."),))

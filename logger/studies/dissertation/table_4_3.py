@@ -6,7 +6,8 @@ from logger.chart_data import Curves, Line
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD, generate
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 PRINTED = (("A", 32.0, 3.05), ("B", 128.0, 6.09), ("C", 512.0, 12.19), ("D", 2048.0, 24.37))
 _ROADS, _LENGTH_M, _SPACING_M = 60, 1000.0, 0.05
@@ -36,8 +37,9 @@ def run(effort: Effort) -> Result:
                "because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 to "
                "2.83 cycle/m the factor is 0.543. It holds for a waviness of 2 and long roads only; 100 m scatter by "
                "a tenth about it.")
-    picture = Curves("IRI of roads by degree of roughness", "root of Gd(n0) [cm^1.5]", "IRI [m/km]", (
-        Line("Eq 4.39", np.sqrt(gds), IRI_PER_ROOT_GD * np.sqrt(gds)), Line("ours", np.sqrt(gds), mean, dots=True)))
+    picture = Picture(Curves("IRI of roads by degree of roughness", "root of Gd(n0) [cm^1.5]", "IRI [m/km]", (
+        Line("Eq 4.39", np.sqrt(gds), IRI_PER_ROOT_GD * np.sqrt(gds)), Line("ours", np.sqrt(gds), mean, dots=True))),
+        "no figure, a table of the upper limits of classes A to D")
     # Sixty roads leave an average in doubt by half a per cent, a few by more; the choice of waves makes one per cent.
     within = 0.01 + 3 * iri_of_road(1.0, _LENGTH_M).std / iri_of_road(1.0, _LENGTH_M).value / roads**0.5
     values = (*(Value(f"class {name}, upper limit [m/km]", limit, float(one), within * limit)
@@ -49,5 +51,4 @@ def run(effort: Effort) -> Result:
 
 STUDY = Study("table_4_3", "Degree of roughness and IRI, and Eq 4.39", "Table 4.3, section 4.3.4",
               "Random roads of ISO 8608 as in the source, of 1 km; exact IRI of ASTM E1926.", run,
-              covers=("Table 4.3",), word=Word.AGREES,
-              because="The relation agrees within the choice of random roads.")
+              items=(Item("Table 4.3", Word.AGREES, "The relation agrees within the choice of random roads."),))

@@ -4,7 +4,8 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.roads.wavelength import slope_gain
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 PRINTED_PEAKS_CPM = (0.065, 0.42)
 PRINTED_HALVES_CPM = (0.033, 0.8)
@@ -35,16 +36,15 @@ def run(effort: Effort) -> Result:
     verdict = ("Peaks and halves lie within 5 % of where they are printed, as near as they are read off a figure. "
                f"At its peaks the gain is {gain[slow].max():.2f} and {gain[~slow].max():.2f}; waves shorter than "
                f"{1 / falling:.2f} m or longer than {1 / rising:.0f} m count for less than half.")
-    picture = Curves("Gain of the IRI's car at 80 km/h, for slopes",
-                     "logarithm to base 10 of the wave number [cycle/m]", "gain", (
-                         Line("ours", np.log10(wave_number), gain),
-                         Line("printed, half", np.log10(PRINTED_HALVES_CPM), np.full(2, 0.5), dots=True)))
+    picture = Picture(Curves("Gain of the IRI's car at 80 km/h, for slopes", "wave number [cycle/m]", "gain", (
+        Line("ours", wave_number, gain),
+        Line("printed, half", np.array(PRINTED_HALVES_CPM), np.full(2, 0.5), dots=True)), log_x=True),
+        "the gain for slopes by wave number, two humps at 0.065 and 0.42 cycle/m, down to 0.5 at 0.033 and 0.8")
     return Result((table,), verdict, (picture,), values)
 
 
 STUDY = Study(
     "golden_car_gain", "To which waves the IRI listens", "Response of the IRI filter",
     "Computed for the Golden Car as a continuous system, without the moving average.", run,
-    covers=("Golden Car gain curve",), word=Word.AGREES,
-    because="Peaks and half gains lie where they are printed, within 5 %.",
+    items=(Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie where they are printed, within 5 %."),),
     source="Sayers and Karamihas, The Little Book of Profiling, University of Michigan, 1998")

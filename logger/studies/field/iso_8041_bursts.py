@@ -7,7 +7,8 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.dsp.weightings.wd import WEIGHTING as WD
 from logger.dsp.weightings.wk import WEIGHTING as WK
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Value, Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
 TEETH = (1, 2, 4, 8, 16, inf)
 PRINTED_MPS2 = {"wk": (0.0299, 0.0411, 0.0577, 0.0814, 0.115, 0.362),
@@ -44,17 +45,18 @@ def run(effort: Effort) -> Result:
     worst = {name: max(abs(row[4]) for row in rows if row[1] == name) for name in found}
     verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. The weighting is the formula of the "
                "standard itself on the whole record; a plain bilinear transform at 100 Hz is off by more above 8 Hz.")
-    at = np.arange(1.0, len(TEETH) + 1)
-    lines = [Line(f"{name}, {who}", at, np.log10(one), dots=who == "printed") for name in found
-             for who, one in (("ours", np.array(found[name])), ("printed", np.array(PRINTED_MPS2[name])))]
-    picture = Curves("Weighted r.m.s. of bursts of 1, 2, 4, 8, 16 teeth and of teeth without end",
-                     "number of the signal", "logarithm to base 10 of the r.m.s. [m/s2]", tuple(lines))
+    at = np.array(TEETH[:-1], dtype=float)
+    lines = [Line(f"{name}, {who}", at, np.array(one[:-1]), dots=who == "printed") for name in found
+             for who, one in (("ours", found[name]), ("printed", PRINTED_MPS2[name]))]
+    picture = Picture(Curves("Weighted r.m.s. of bursts by their teeth", "teeth in 10 s", "weighted r.m.s. [m/s2]",
+                             tuple(lines), log_x=True, log_y=True),
+                      "a table of responses to bursts of 1 to 16 teeth, and to teeth without end")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
 STUDY = Study(
     "iso_8041_bursts", "Weighted r.m.s. of saw-tooth bursts", "Response to signal bursts",
     "Saw teeth of 1 m/s2 with a period of 2 pi/100 s, for 60 s, at 20,000 samples a second.", run,
-    covers=("ISO 8041 bursts",), word=Word.AGREES,
-    because="Wk agrees within 0.25 % and Wd within 1.5 % of the printed three figures.",
+    items=(Item("ISO 8041 bursts", Word.AGREES,
+                "Wk agrees within 0.25 % and Wd within 1.5 % of the printed three figures."),),
     source="ISO 8041:2005, Human response to vibration: measuring instrumentation")

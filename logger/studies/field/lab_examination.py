@@ -1,24 +1,29 @@
-"""The lab's examination: what it said of cars with a hidden effect, and how sure those shares are."""
+"""The lab's examination: what it said of cars with a hidden effect, and how sure those shares are.
+
+The counts are those of the last examination that was published. ``python -m tests.validation.examine`` writes them to
+``examination.json`` beside this file, when it writes docs/examination.md.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
 
 from logger.chart_data import Curves, Line
-from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
+from logger.studies.checks import Word
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
 
-SEEDS = "7300 to 7358"
-PRINTED = (
-    ("one effect: right first, or named as what cannot be told from it", 54, 59, 82.0, 96.0, ">= 90 %"),
-    ("nothing missing: anything said to be missing", 0, 28, 0.0, 12.0, "<= 5 %"),
-    ("two effects: both named", 24, 26, 76.0, 98.0, ">= 75 %"),
-    ("off the list: unexplained", 20, 20, 84.0, 100.0, ">= 80 %"),
-    ("distances that wander: rightly, nothing unexplained", 21, 21, 85.0, 100.0, ">= 80 %"),
-    ("error after adding: within 10 % of the noise floor", 77, 77, 95.0, 100.0, ">= 85 %"),
-    ("numbers after adding: within 10 % or three standard errors", 76, 77, 93.0, 100.0, ">= 85 %"),
-)
-"""What was asked, cases of which it is true, cases, the ends of the 95 % interval [%], the goal."""
+COUNTS = Path(__file__).with_name("examination.json")
 _SURE = 0.95
-_ROUNDING = 0.5
+
+
+def examined() -> dict[str, Any]:
+    """``{"first_seed", "last_seed", "cases", "asked", "release", "goals": [{"name", "goal", "at_least", "count",
+    "of"}]}``; a goal is a share."""
+    found: dict[str, Any] = json.loads(COUNTS.read_text("utf-8"))
+    return found
 
 
 def interval_percent(hits: int, cases: int) -> tuple[float, float]:
@@ -32,30 +37,35 @@ def interval_percent(hits: int, cases: int) -> tuple[float, float]:
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    rows, values = [], []
-    for name, hits, cases, low, high, goal in effort.each(PRINTED):
-        ends = interval_percent(hits, cases)
-        rows.append((name, f"{hits} of {cases}", 100 * hits / cases, goal, *ends))
-        values += [Value(f"{name.split(':')[0]}, {words} end [%]", printed, ours, _ROUNDING)
-                   for words, printed, ours in zip(("lower", "upper"), (low, high), ends, strict=True)]
-    table = Table(f"Printed shares, release seeds {SEEDS}", (
-        Column("asked"), Column("printed"), Column("share [%]", ".1f"), Column("goal"), Column("at least [%]", ".1f"),
+    counts = examined()
+    rows, met, surely = [], 0, 0
+    for goal in effort.each([one for one in counts["goals"] if one["of"]]):
+        hits, cases, wanted, at_least = goal["count"], goal["of"], 100 * goal["goal"], goal["at_least"]
+        low, high = interval_percent(hits, cases)
+        share = 100 * hits / cases
+        met += share >= wanted if at_least else share <= wanted
+        surely += low >= wanted if at_least else high <= wanted
+        rows.append((goal["name"], f"{'>=' if at_least else '<='} {wanted:.0f} %", f"{hits} of {cases}", share, low,
+                     high))
+    seeds = f"{'release' if counts['release'] else 'development'} seeds {counts['first_seed']} to {counts['last_seed']}"
+    table = Table(f"Counts of the examination (printed in docs/examination.md), {seeds}", (
+        Column("asked"), Column("goal"), Column("true of"), Column("share [%]", ".1f"), Column("at least [%]", ".1f"),
         Column("at most [%]", ".1f")), tuple(rows))
-    verdict = (f"154 of 200 cases were put before the lab, of release seeds {SEEDS} that its development never used, "
-               "made by a simulator that shares nothing with it. Every goal is met by the share; by the far end of its "
-               "interval only some are, and that nothing is said where nothing is missing is sure to 12 % alone. Shown "
-               "are counts of that examination; it takes hours, and was not repeated here.")
+    verdict = (f"{counts['cases']} of {counts['asked']} cases were put before the lab, {seeds}, made by a simulator "
+               f"that shares nothing with it. By their shares {met} of {len(rows)} goals are met; by the far end of "
+               f"the 95 % interval, {surely} are. It is our own examination: nobody else has printed one, and as it "
+               "takes hours it was not repeated here, so nothing is compared with a print.")
     at = np.arange(1.0, len(rows) + 1)
-    shares, lows, highs = (np.array([row[place] for row in rows], dtype=np.float64) for place in (2, 4, 5))
-    picture = Curves("Shares with their 95 % intervals", "row of the table", "cases [%]", (
+    shares, lows, highs = (np.array([row[place] for row in rows], dtype=np.float64) for place in (3, 4, 5))
+    picture = Picture(Curves("Shares with their 95 % intervals", "row of the table", "cases [%]", (
         Line("share", at, shares, dots=True), Line("at least", at, lows, dots=True), Line("at most", at, highs,
-                                                                                          dots=True)))
-    return Result((table,), verdict, (picture,), tuple(values))
+                                                                                          dots=True))))
+    return Result((table,), verdict, (picture,))
 
 
 STUDY = Study(
     "lab_examination", "The lab's examination", "The table of goals",
-    "Counts of cases as the examination's report had them for these seeds; the intervals are computed anew.", run,
-    covers=("the lab's examination",), word=Word.AGREES,
-    because="The intervals of the printed counts agree; the examination itself was not repeated.",
-    source="ridelog's docs/examination.md, release seeds 7300 to 7358")
+    "Counts of cases as the last published examination had them; the intervals are computed from them.", run,
+    items=(Item("the lab's examination", Word.NOT_REPRODUCIBLE,
+                "It is our own, takes hours and was not repeated here; its counts are shown with their intervals."),),
+    source="ridelog's own examination, docs/examination.md")

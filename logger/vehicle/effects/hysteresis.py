@@ -8,7 +8,7 @@ stiffness F / y, and n the sharpness of the yield,
 which is the law of Bouc and Wen with A = 1 and equal shares of both its shapes: it is let go along its first stiffness,
 and after a long way it is Coulomb friction. Without a yield travel it is ``dry_friction`` from the beginning.
 
-A search tries it only where it is asked for by name: it makes a quick search half as long again. One that was not told
+A search tries it only where it is asked for by name: it makes a quick search half as long again. One that was not asked
 to try it finds the residual of such a car unexplained.
 """
 

@@ -23,7 +23,7 @@ Complex = npt.NDArray[np.complex128]
 _HIGHEST = 8
 # Of the sample rate, where a filter that was run on the samples is tried: below about a fifth a sensor's does as well.
 _ON_SAMPLES = 0.33
-# A cut-off that a spectrum tells and one that a delay tells differ by no larger factor: of a filter run on 100 samples
+# A cut-off that a spectrum shows and one that a delay shows differ by no larger factor: of a filter run on 100 samples
 # a second with 30 Hz, by tan(0.3 pi) / (0.3 pi) = 1.46.
 _NEAR = 1.5
 

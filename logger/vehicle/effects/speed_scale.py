@@ -14,7 +14,7 @@ from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
 
 Array = npt.NDArray[np.float64]
 
-# So little moves all waves alike: a search can tell from it how much it takes. Runs lie wrong from the second on.
+# So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE, _WRONG = 1e-5, 0.0005
 
 

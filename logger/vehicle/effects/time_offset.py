@@ -12,7 +12,7 @@ from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 
 Complex = npt.NDArray[np.complex128]
 
-# So little moves all waves alike: a search can tell from it how much it takes. Runs lie wrong from the second on.
+# So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE_S, _WRONG_S = 2e-4, 0.002
 _THIRD = 1 / 3
 

@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import Self
 
 from drivers.dump import DumpHeader, DumpWriter, Event, open_dump
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -37,7 +37,7 @@ def make_drive(path: Path, seconds: float) -> None:
     while knots[-1][0] < seconds:
         t_s, speed = knots[-1]
         knots.append((t_s + SPEED_CHANGE_S, FAST_MPS if speed == SLOW_MPS else SLOW_MPS))
-    plan = DrivePlan(speed_knots=knots, stretches=(Stretch(500, 60), Stretch(500, 200)), seed=18)
+    plan = DrivePlan(speed_knots=knots, stretches=(RoadStretch(500, 60), RoadStretch(500, 200)), seed=18)
     record(simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009"))), path)
 
 

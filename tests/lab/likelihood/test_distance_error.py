@@ -7,6 +7,8 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
+from scipy.signal import savgol_filter
 
 from logger.lab.likelihood.distance_error import (
     USUAL,
@@ -57,7 +59,7 @@ def test_the_rate_of_change_of_a_wave_is_its_derivative(at_hz: float, within: fl
     assert np.abs(found - turn * np.cos(turn * time_s + 0.4))[INNER].max() < within * turn
 
 
-def test_a_recorder_that_averages_over_its_samples_is_granted_its_droop() -> None:
+def test_a_recorder_that_averages_over_its_samples_is_allowed_its_droop() -> None:
     wave = np.sin(2 * np.pi * 20.0 * RUN.time_s)
     k = np.zeros(ERROR.count)
     k[-2:] = 0.01, np.pi**2 / 6  # sin(x) / x is 1 - x^2 / 6 with x = pi f / rate
@@ -67,7 +69,7 @@ def test_a_recorder_that_averages_over_its_samples_is_granted_its_droop() -> Non
 
 
 def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
-    """A prediction at a place farther by d is that of d / speed later; waves here are slow enough to be told so."""
+    """A prediction at a place farther by d is that of d / speed later; waves here are slow enough for that."""
     time_s = RUN.time_s
     k = 1e-3 * np.sin(np.arange(ERROR.count))
     k[-4] *= 0.01  # the factor, by which a whole run is multiplied
@@ -84,6 +86,15 @@ def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
 def test_the_curve_goes_through_a_straight_line() -> None:
     line_m = 0.3 - 0.002 * np.arange(RUN.count)
     assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
+
+
+def test_the_basis_is_that_of_splines_and_of_what_a_smoothing_filter_leaves() -> None:
+    count = ERROR.coefficients
+    splines = BSpline.design_matrix(np.linspace(0, count - 3, RUN.count), np.arange(-3, count + 1.0), 3).toarray().T
+    assert ERROR.basis[:count] == pytest.approx(splines, abs=1e-12)
+    rough = replace(RUN, distance_m=np.round(RUN.distance_m, 2))
+    left = rough.distance_m - savgol_filter(rough.distance_m, 101, 3)
+    assert RecordError.of(rough, Tolerance()).basis[-1] == pytest.approx(-left, abs=1e-9)
 
 
 @pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 63), (100.0, 303), (150.0, 363), (400.0, 363)])
@@ -122,7 +133,7 @@ def test_sizes_are_kept_as_logarithms_and_the_usual_ones_cost_nothing() -> None:
     assert USUAL.cost == 0.0 < ErrorSize(walk_m=0.01).cost < ErrorSize(start_m=0.01).cost
 
 
-def test_more_than_a_good_recorder_is_off_by_is_told_and_no_less() -> None:
+def test_more_than_a_good_recorder_is_off_by_is_reported_and_no_less() -> None:
     usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * 20.0 + (USUAL.scale * np.ptp(RUN.distance_m)) ** 2)
     for factor, expected in ((2.5, 0.0), (4.0, 4.0 * usual_m)):
         k = ERROR.through(np.full(RUN.count, -factor * usual_m))

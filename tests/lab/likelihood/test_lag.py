@@ -1,5 +1,5 @@
-"""Lags of a measurement behind a model, window by window: a late clock, a wrong place and a wrong speed are told apart,
-with the numbers that they have."""
+"""Lags of a measurement behind a model, window by window: a late clock, a wrong place and a wrong speed are
+distinguished, with the numbers that they have."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def test_where_no_fit_was_made_only_flat_noise_is_taken_for_noise_that_was_filte
 
 
 @pytest.mark.parametrize(("share", "unexplained"), [(0.0, False), (0.3, False), (0.8, True), (2.0, True)])
-def test_what_is_above_the_noise_is_told_by_its_share(share: float, unexplained: bool) -> None:
+def test_what_is_above_the_noise_is_recognised_by_its_share(share: float, unexplained: bool) -> None:
     """White noise and more of it in the bands below 20 Hz, about half of them."""
     more = in_band(white(6000, 2, share * LEVEL), 0.5, 20.0)
     posterior, state = leaving(white() + more)

@@ -103,7 +103,7 @@ def test_readings_that_never_change_say_nothing() -> None:
     assert Readings.of(run).beside(np.zeros(run.count)).as_read
 
 
-def test_noise_is_told_without_rounding_and_as_it_was_read() -> None:
+def test_noise_is_reported_without_rounding_and_as_it_was_read() -> None:
     runs = noisy_runs(lasts_s=30.0, noise_mps2=0.1)
     coarse = [replace(measuring(one, STEP * np.round(one.measured_mps2 / STEP)), facts=RecordFacts(step_mps2=STEP))
               for one in runs]

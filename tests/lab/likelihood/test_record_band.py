@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import butter, firwin, sosfilt, sosfiltfilt
 
+from logger.lab.likelihood.filter_phase import causal_low_pass
 from logger.lab.likelihood.noise_floor import sensor_noise
 from logger.lab.likelihood.record_band import (
     compared_band,
@@ -154,3 +155,29 @@ def test_noise_of_a_filtered_record_is_found_below_the_filter() -> None:
     cut = replace(cut, measured_mps2=cut.in_band(noise.measured_mps2))
     assert sensor_noise([Bands(noise)], [noise.measured_mps2], 0.0).deviation_mps2 < 0.01
     assert sensor_noise([Bands(cut)], [cut.measured_mps2], 0.0).deviation_mps2 == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.parametrize(("order", "cutoff_hz"), [(3, 24.0), (4, 30.0), (6, 28.0), (8, 20.0)])
+def test_a_filter_that_noise_behind_it_hides_is_found_by_its_delay(order: int, cutoff_hz: float) -> None:
+    """Of a car whose readings above the cut-off are weaker than the noise; scipy's filter is the truth."""
+    runs, predictions = driven(lasts_s=120.0)
+    rng = np.random.default_rng(5)
+    behind = [through(run, sosfilt, order, cutoff_hz) for run in runs]
+    behind = [replace(run, measured_mps2=run.measured_mps2 + rng.normal(0, 0.05, run.count)) for run in behind]
+    found = [causal_low_pass(behind, predictions), *seen_low_passes(behind, predictions)]
+    for seen in found:
+        assert seen is not None and seen.causal
+        assert seen.cutoff_hz == pytest.approx(cutoff_hz, rel=0.15) and abs(seen.order - order) <= 1
+    assert all(run.facts.pass_band_hz is None or run.low_pass != found[0]
+               for run in with_pass_bands(behind, predictions))
+
+
+@pytest.mark.parametrize("effects", [(), ("dry_friction",), ("body_bending",), ("sensor_offset",), ("cg_shift",),
+                                     ("tire_enveloping",), ("time_offset",), ("top_mount_compliance",)])
+def test_what_a_car_does_delays_nothing_as_a_filter_does(effects: tuple[str, ...]) -> None:
+    assert causal_low_pass(*driven(effects)) is None
+
+
+def test_a_filter_without_delay_leaves_the_phases_as_they_were() -> None:
+    runs, predictions = driven()
+    assert causal_low_pass([through(run, sosfiltfilt, 4, 20.0) for run in runs], predictions) is None

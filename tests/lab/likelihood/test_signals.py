@@ -120,7 +120,7 @@ def test_residuals_by_signal_and_their_errors(run: Run) -> None:
 
 
 def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:
-    """A start that is off moves every signal: slopes against differences of predictions that are laid out anew."""
+    """A start that is off moves every signal: slopes against differences of predictions that are laid out again."""
     posterior = Posterior(SimulatedRuns([run], FINE_HZ), CAR, Tolerance())
     state = posterior.start()
     error = posterior.record_errors[0]

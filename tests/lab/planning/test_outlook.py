@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.planning.outlook import Settings, outlook, representatives
+from logger.lab.planning.outlook import EffectGrid, outlook, representatives
 from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, at_speed
 from logger.profiles.track import Track
 from logger.roads import iso8608
@@ -29,7 +29,7 @@ def left_by(columns: Array, deviations: Array, change: Array) -> float:
 
 def test_what_remains_is_what_least_squares_leave() -> None:
     rng = np.random.default_rng(3)
-    settings = Settings.of([shipped_effects()[name] for name in NAMES])
+    settings = EffectGrid.of([shipped_effects()[name] for name in NAMES])
     numbers, changes = rng.standard_normal((4, 60)), 5 * rng.standard_normal((len(settings.columns), 60))
     deviations = np.array([0.1, 0.3, 1.0, 3.0])
     every = np.vstack([numbers, changes])
@@ -40,15 +40,15 @@ def test_what_remains_is_what_least_squares_leave() -> None:
     assert list(shown) == list(settings.first)
     for row, column in enumerate(shown):
         alone = left_by(numbers, deviations, changes[column])
-        assert found.detectability[row] == pytest.approx(alone) == pytest.approx(found.beside[row, row])
+        assert found.detectability[row] == pytest.approx(alone) == pytest.approx(found.pairwise[row, row])
         for other in set(range(len(NAMES))) - {row}:
             beside = [left_by(np.vstack([numbers, changes[one]]), np.append(deviations, np.inf), changes[column])
                       for one in settings.columns_of(other)]
-            assert found.beside[row, other] == pytest.approx(min(beside))
+            assert found.pairwise[row, other] == pytest.approx(min(beside))
 
 
 def test_an_effect_is_as_likely_named_as_not_where_it_just_stands_out() -> None:
-    settings = Settings.of([shipped_effects()["wheel_lift"]])
+    settings = EffectGrid.of([shipped_effects()["wheel_lift"]])
     found = outlook(settings, Information(np.diag([1.0, 36.0])[None], np.zeros(1)), np.array([1.0]), settings.first)
     assert found.chances[0] == pytest.approx(0.5)
 
@@ -61,7 +61,7 @@ def planned(noise_mps2: float, speed_mps: float = 12.0) -> PlannedDrive:
     return PlannedDrive(at_speed("planned", road, vehicle, speed_mps), there, SensorNoise(noise_mps2))
 
 
-def of_drive(drive: PlannedDrive, settings: Settings) -> Array:
+def of_drive(drive: PlannedDrive, settings: EffectGrid) -> Array:
     changes = np.array([drive.change(one) for one in settings.columns])
     precision = drive.posterior.prior.without_wall().curvature(np.zeros(13))
     total = drive.information(changes, ())
@@ -70,13 +70,13 @@ def of_drive(drive: PlannedDrive, settings: Settings) -> Array:
 
 def test_a_gain_stands_out_by_no_more_than_the_recorders_own_gain_allows() -> None:
     """A recorder's gain is known to 0.5 %: one of 5 % is ten deviations of it, however quiet the sensor is."""
-    settings = Settings.of([shipped_effects()[name] for name in NAMES])
+    settings = EffectGrid.of([shipped_effects()[name] for name in NAMES])
     quiet, loud = (of_drive(planned(noise), settings) for noise in (0.005, 0.5))
     assert 5.0 < quiet[0] < 10.0
     assert (loud < quiet).all()
 
 
 def test_noise_ten_times_as_loud_hides_ten_times_as_much_where_nothing_else_is_unknown() -> None:
-    settings = Settings.of([shipped_effects()["dry_friction"]])
+    settings = EffectGrid.of([shipped_effects()["dry_friction"]])
     found = [of_drive(planned(noise), settings)[0] for noise in (1.0, 10.0)]
     assert found[0] == pytest.approx(10 * found[1], rel=0.15)

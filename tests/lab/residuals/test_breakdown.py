@@ -1,4 +1,4 @@
-"""Where what is left sits: shares that add up, and bands around the car's own vibrations."""
+"""Where the residual is: shares that add up, and bands around the car's own vibrations."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     assert removed.drift_share == pytest.approx(drift / (drift + NOISE_MPS2**2), rel=0.03)
     assert removed.error == pytest.approx(clean.plain.error * clean_size(clean, found), rel=0.03)
     said = " ".join(headline(found))
-    assert "The sensor drifts (exponential, " in said and "it is no part of the car" in said
+    assert "The sensor drifts (exponential, " in said and "That has nothing to do with the car" in said
     assert evidence(found) == ["No test finds more than noise in the residual."] and not found.missing
     assert conclusion(found).startswith("Nothing else is missing")
     shown = as_json(found)
@@ -71,4 +71,4 @@ def test_what_lies_outside_of_the_pass_band_has_its_share() -> None:
     found = compare(SimulatedRuns(runs), CAR)
     # The model is right: noise alone differs, white up to half the sample rate, half of it above 25 Hz.
     assert found.removed.filter_share == pytest.approx(0.5, abs=0.03)
-    assert "What lies outside makes" in " ".join(headline(found))
+    assert "Outside of that lies" in " ".join(headline(found))

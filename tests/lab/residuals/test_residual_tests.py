@@ -59,14 +59,14 @@ def test_noise_of_another_colour_is_not_tied_to_the_road() -> None:
     assert not [one.name for one in found.found if one.road]
 
 
-def test_a_gain_is_told() -> None:
+def test_a_gain_is_reported() -> None:
     found = mark(marks(beside_with(plus_noise(lambda run, prediction, rng: 0.1 * prediction))), "gain")
     assert found.found
     assert found.value == pytest.approx(1.1, abs=4 * (found.standard_error or 0.0) + 1e-6)
     assert found.standard_error is not None and found.standard_error < 0.01
 
 
-def test_what_follows_the_road_is_told_from_noise() -> None:
+def test_what_follows_the_road_is_distinguished_from_noise() -> None:
     """Half of the power is the road's slope under the front wheel, filtered: the coherence says half."""
     def half(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
         slope = np.gradient(run.track.averaged(run.distance_m, CAR.contact_patch_m)) * RATE_HZ
@@ -80,7 +80,7 @@ def test_what_follows_the_road_is_told_from_noise() -> None:
     assert p_value < 1e-12
 
 
-def test_a_late_clock_is_told_from_a_wrong_place() -> None:
+def test_a_late_clock_is_distinguished_from_a_wrong_place() -> None:
     def shifted(seconds: float, metres: float) -> Residual:
         def residual(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
             time_s = np.arange(len(prediction)) / RATE_HZ
@@ -94,7 +94,7 @@ def test_a_late_clock_is_told_from_a_wrong_place() -> None:
         assert found.found
         assert found.unit == unit
         assert found.value == pytest.approx(value, rel=0.05)
-        assert "behind the model" in sentence(found)
+        assert "lags the model" in sentence(found)
 
 
 def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
@@ -128,7 +128,7 @@ def test_the_curve_of_a_cubic_spring() -> None:
     k3 = 3.0e7
     found = force_map(beside_with(recorded_by([("progressive_spring", {"cubic_stiffness_n_per_m3": k3})], NOISE_MPS2)))
     at, force, error = found.by_travel.at, found.by_travel.force_n, found.by_travel.error_n
-    # A straight spring takes a part of it: what bends is told.
+    # A straight spring takes a part of it: what bends is reported.
     cubic = np.linalg.lstsq(np.stack([at, at**3], axis=1), force, rcond=None)[0][1]
     assert cubic == pytest.approx(k3, rel=0.3)
     assert found.hardening.value == pytest.approx(k3, rel=0.25)
@@ -154,7 +154,7 @@ def test_an_answer_out_of_proportion() -> None:
     assert found.value == pytest.approx(0.3, abs=0.08)
 
 
-def test_excitation_and_speed_are_told_apart() -> None:
+def test_excitation_and_speed_are_distinguished() -> None:
     def by_level(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
         level = np.sqrt(np.convolve(prediction**2, np.full(100, 1 / 100), mode="same"))
         return rng.normal(0, 0.2, len(prediction)) * level

@@ -23,7 +23,7 @@ def test_noise_of_any_colour_is_no_tone() -> None:
     assert heard < 0.05 * 300 + 3 * np.sqrt(0.05 * 300)
 
 
-def test_only_what_is_asked_is_told() -> None:
+def test_only_what_is_asked_is_reported() -> None:
     sine = np.sin(2 * np.pi * 0.123 * np.arange(2000))
     high = np.arange(1001) > 500
     found = loudest(periodogram(sine + np.random.default_rng(3).normal(0, 1, 2000)), high)

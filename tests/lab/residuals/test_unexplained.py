@@ -1,4 +1,4 @@
-"""What repeats along the way is found, told from what hums in time, and described."""
+"""What repeats along the way is found, distinguished from what hums in time, and described."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def test_effects_that_are_there_stay_and_are_fitted_too(runs: SimulatedRuns) -> 
     assert not found.helps
 
 
-def test_distances_are_told_of_only_where_they_are_off_by_more_than_usual(runs: SimulatedRuns,
+def test_distances_are_reported_only_where_they_are_off_by_more_than_usual(runs: SimulatedRuns,
                                                                           added: AddedEffects) -> None:
     assert added.removed.distance_error_m == 0
     off = [replace(one, distance_m=one.distance_m + 0.3) for one in runs.runs]
@@ -125,7 +125,7 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     runs = secret_runs([friction, offset], lasts_s=20.0)
     first = add(posterior_of(runs), [], [friction])
     bent = max(abs(one.written / one.nominal - 1) for one in first.numbers)
-    assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to what was granted
+    assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to its prior
     assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
     second = add(posterior_of(runs, stands=first.vehicle), first.effects, [offset])
     assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)

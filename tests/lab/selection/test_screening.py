@@ -1,4 +1,4 @@
-"""What an effect would gain is told without a fit, and as dense algebra over all unknowns would tell it."""
+"""What an effect would gain is computed without a fit, and agrees with dense algebra over all unknowns."""
 
 from __future__ import annotations
 

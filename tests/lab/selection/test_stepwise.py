@@ -177,7 +177,7 @@ def test_people_are_found_beside_tires_that_damp() -> None:
 
 
 @pytest.mark.slow
-def test_a_bracket_and_a_bending_body_are_told_apart_though_one_can_take_the_others_place() -> None:
+def test_a_bracket_and_a_bending_body_are_distinguished_though_one_can_take_the_others_place() -> None:
     bracket = hidden("sensor_mount_resonance", frequency_hz=29.6, damping_ratio=0.05)
     bending = hidden("body_bending", frequency_hz=14.7, damping_ratio=0.057, participation=-0.15)
     selection = search(("sensor_mount_resonance", "body_bending", "sensor_gain")).run(

@@ -11,10 +11,10 @@ import pytest
 
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import Candidate, Found, diagnose_same_road
+from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.fisher_scoring import fitted as fit
-from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State
-from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
+from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
+from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
 from logger.lab.unknown_road.screening import trials
 from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.profiles.track import Track
@@ -70,9 +70,9 @@ def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
     table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
     response = table.responses(np.zeros(0), crossing.f_hz)[0]
     waves = np.ones(len(grid.wave_number_cpm), complex)
-    told = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
+    reported = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
     read = run.measured_mps2 - run.measured_mps2.mean()
-    assert np.mean((told - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
+    assert np.mean((reported - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
 
 
 @pytest.mark.parametrize("effect", [
@@ -85,8 +85,8 @@ def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
         response_of(compose(CAR, [effect]), RATE_HZ)
 
 
-def deviance(problem: SameRoad, state: State) -> float:
-    """Minus twice the log-likelihood of all drives by their covariance, written out, and what is granted."""
+def deviance(problem: SameRoad, state: RoadFitState) -> float:
+    """Minus twice the log-likelihood of all drives by their covariance, written out, and the priors."""
     total = problem.cost(state)
     for road, part, parts in zip(problem._roads, problem._parts, problem.stretches, strict=True):
         own, grid = state.roads[part], road.grid
@@ -113,7 +113,7 @@ def test_gains_are_those_of_dense_likelihoods() -> None:
     start = problem.start()
     before = replace(start, roads=start.roads + 0.02 * np.cos(np.arange(len(start.roads))))
     logs = 0.02 * np.cos(np.arange(len(start.logs)))
-    after = State((), logs, start.roads, problem.response((), logs))
+    after = RoadFitState((), logs, start.roads, problem.response((), logs))
     own = deviance(problem, before) - deviance(problem, after)
     found = problem.prepared(before).gain(before, after) * (1 + 1 / 8)
     assert found == pytest.approx(own, abs=max(4.0, 0.15 * abs(own)))
@@ -141,19 +141,20 @@ def test_drives_over_other_roads_are_refused() -> None:
 
 
 @pytest.mark.parametrize("effects", [[], [named("sensor_bandwidth", cutoff_hz=4.0)]], ids=["right", "lacking"])
-def test_one_road_is_told_from_two(effects: list[Chosen]) -> None:
+def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
     here = run_of(effects, 9.0, 85.0, 1)
     one = SameRoad([here, run_of(effects, 15.0, 85.0, 2)], CAR, Tolerance())
     assert all(found.seen for found in likenesses(one, one.start()))
     two = SameRoad([here, run_of(effects, 15.0, 85.0, 2, OTHER)], CAR, Tolerance())
     assert not any(found.seen for found in likenesses(two, two.start()))
-    assert apart(likenesses(two, two.start())) == (0, 1)
+    assert surely_two_roads(likenesses(two, two.start())) == (0, 1)
 
 
 def test_the_one_drive_over_another_road_is_named() -> None:
     runs = [run_of([], 9.0, 85.0, 1), run_of([], 14.0, 85.0, 2, OTHER), run_of([], 15.0, 85.0, 3)]
     bandwidth = shipped_effects()["sensor_bandwidth"]
-    with pytest.raises(NotOneRoad, match=r"run2: expected drives .* neither tells what the other met|run2 and run3: "):
+    with pytest.raises(NotOneRoad, match=r"run2: expected drives .* neither predicts what the other met|run2 and "
+                                         "run3: "):
         diagnose_same_road(SameRoad(runs, CAR, Tolerance()), {bandwidth.name: bandwidth})
 
 
@@ -169,8 +170,8 @@ def test_drives_that_drown_in_noise_are_not_refused() -> None:
     problem = SameRoad([run_of([], speed, 85.0, seed, noise_mps2=8.0) for seed, speed in ((1, 9.0), (2, 15.0))], CAR,
                        Tolerance())
     found = likenesses(problem, problem.start())
-    assert apart(found) is None
-    assert in_doubt(found) == [(0, 1)]
+    assert surely_two_roads(found) is None
+    assert maybe_two_roads(found) == [(0, 1)]
 
 
 def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
@@ -178,8 +179,8 @@ def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
     problem = SameRoad([run_of([soft], speed, 85.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))],
                        CAR, Tolerance())
     trials_of_it = [chosen(soft.effect, values) for values in soft.effect.trials()]
-    assert apart(likenesses(problem, problem.start())) == (0, 1)
-    assert apart(likenesses(problem, problem.start(), trials_of_it)) is None
+    assert surely_two_roads(likenesses(problem, problem.start())) == (0, 1)
+    assert surely_two_roads(likenesses(problem, problem.start(), trials_of_it)) is None
 
 
 def test_errors_and_floor_are_over_the_same() -> None:
@@ -200,12 +201,12 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
 
 def test_what_was_not_fitted_says_so() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
-    found = Found((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
+    found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
-    told = as_json(found)
-    assert told["candidates"][0]["error"] == 0.28 and told["candidates"][0]["fitted"] is False
-    assert told["maybe_over_two_roads"] == [["slow", "brisk"]]
-    assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
+    reported = as_json(found)
+    assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
+    assert reported["maybe_over_two_roads"] == [["slow", "brisk"]]
+    assert any(words.startswith("Whether slow and brisk are over one road") for words in reported["sentences"])
 
 
 @pytest.mark.slow
@@ -257,7 +258,7 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
 
 
 def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:
-    """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be told."""
+    """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be estimated."""
     rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
     runs = [run_of([rubbing], speed, 110.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))]
     gain = shipped_effects()["sensor_gain"]

@@ -162,11 +162,11 @@ def test_what_a_cut_export_left_is_cleaned_and_nothing_else(logs: Path, stick: P
 
 
 def test_progress_goes_from_nothing_to_all(logs: Path, stick: Path) -> None:
-    told: list[Progress] = []
-    export(logs, stick, False, told.append)
-    assert told[0] == Progress(0, len(NAMES))
-    assert told[-1] == Progress(len(NAMES), len(NAMES))
-    assert [progress.done for progress in told] == sorted(progress.done for progress in told)
+    reported: list[Progress] = []
+    export(logs, stick, False, reported.append)
+    assert reported[0] == Progress(0, len(NAMES))
+    assert reported[-1] == Progress(len(NAMES), len(NAMES))
+    assert [progress.done for progress in reported] == sorted(progress.done for progress in reported)
 
 
 MOST_MEMORY_BYTES = 60_000_000

@@ -104,7 +104,7 @@ def test_the_identity_stays_and_two_folders_have_two(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"../../../../etc\n", b"0123456789AB\n", b"0" * 5000])
-def test_a_damaged_identity_is_made_anew(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_identity_is_made_again(tmp_path: Path, content: bytes) -> None:
     (tmp_path / IDENTITY_NAME).write_bytes(content)
     with DirectoryHandle.at(tmp_path) as folder:
         assert logger_identity(folder) == logger_identity(folder)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from logger.estimation import rms_calibration
-from logger.estimation.rms_calibration import Line, Settings, SpeedCalibration
+from logger.estimation.rms_calibration import CalibrationSettings, RmsLine, SpeedCalibration
 from logger.shipped import shipped, vehicle_file
 from logger.store.formats import calibration_file
 from logger.store.formats.calibration_file import KEPT, MAX_BYTES, find, fingerprint, keep, places
@@ -17,7 +17,7 @@ from logger.vehicle.vehicle import SensorPlace
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 SPEEDS = tuple(
-    SpeedCalibration(speed, *(Line(speed * number / 7, 0.1 / 3, 1e-300, -0.5) for number in range(1, 5)))
+    SpeedCalibration(speed, *(RmsLine(speed * number / 7, 0.1 / 3, 1e-300, -0.5) for number in range(1, 5)))
     for speed in (4.4704, 31.2928)
 )
 
@@ -106,22 +106,22 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
 def test_a_fingerprint_of_every_number(monkeypatch: pytest.MonkeyPatch) -> None:
     assert RAV4.rear is not None
     keys = [
-        fingerprint(RAV4, half, Settings()),
-        fingerprint(RAV4, None, Settings()),
-        fingerprint(RAV4, lambda f_hz: 0.5 + 1e-4 * (f_hz > 14), Settings()),
-        fingerprint(replace(RAV4, sprung_mass_kg=875.001), half, Settings()),
-        fingerprint(replace(RAV4, rear=replace(RAV4.rear, unsprung_mass_kg=56.0)), half, Settings()),
-        fingerprint(replace(RAV4, sensor=SensorPlace(0.1, 0.0)), half, Settings()),
-        fingerprint(RAV4, half, Settings(window_m=7.63)),
-        fingerprint(RAV4, half, Settings(seed=2)),
-        fingerprint(RAV4, half, Settings(roads=121)),
-        fingerprint(RAV4, half, Settings((10.0,))),
+        fingerprint(RAV4, half, CalibrationSettings()),
+        fingerprint(RAV4, None, CalibrationSettings()),
+        fingerprint(RAV4, lambda f_hz: 0.5 + 1e-4 * (f_hz > 14), CalibrationSettings()),
+        fingerprint(replace(RAV4, sprung_mass_kg=875.001), half, CalibrationSettings()),
+        fingerprint(replace(RAV4, rear=replace(RAV4.rear, unsprung_mass_kg=56.0)), half, CalibrationSettings()),
+        fingerprint(replace(RAV4, sensor=SensorPlace(0.1, 0.0)), half, CalibrationSettings()),
+        fingerprint(RAV4, half, CalibrationSettings(window_m=7.63)),
+        fingerprint(RAV4, half, CalibrationSettings(seed=2)),
+        fingerprint(RAV4, half, CalibrationSettings(roads=121)),
+        fingerprint(RAV4, half, CalibrationSettings((10.0,))),
     ]
     monkeypatch.setattr(calibration_file, "METHOD", rms_calibration.METHOD + 1)
-    keys.append(fingerprint(RAV4, half, Settings()))
+    keys.append(fingerprint(RAV4, half, CalibrationSettings()))
     assert len(set(keys)) == len(keys)
     monkeypatch.undo()
-    assert fingerprint(replace(RAV4, name="another name"), half, Settings()) == keys[0]
+    assert fingerprint(replace(RAV4, name="another name"), half, CalibrationSettings()) == keys[0]
 
 
 def test_beside_the_vehicle_or_in_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

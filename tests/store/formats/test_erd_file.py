@@ -79,7 +79,7 @@ def test_records_may_be_padded(tmp_path: Path) -> None:
 @pytest.mark.parametrize("names", [
     "SHORTNAMLElev.  RElev.", "SHORTNAMLeft    Right", "SHORTNAML Prof  R Prof", "SHORTNAMLWP RWP",
     "LONGNAMELeft Elevation                  Right Elevation", "SHORTNAMLElev.\n&1000   RElev.", "TITLE   none"])
-def test_tracks_are_told_by_their_names(tmp_path: Path, names: str) -> None:
+def test_tracks_are_recognised_by_their_names(tmp_path: Path, names: str) -> None:
     text = header("2, 2, -1, 1, 5, 0.25, -1", names, "UNITSNAMm       m", "XUNITS  m") + "1 2\n3 4\n"
     profile = read(tmp_path, text)
     assert profile.elevation_m.tolist() == [1, 3]

@@ -196,7 +196,7 @@ WRONG_UNITS = {
 
 
 @pytest.mark.parametrize("name", vehicle_names())
-def test_other_units_are_told_from_those_of_the_format(tmp_path: Path, name: str) -> None:
+def test_other_units_are_distinguished_from_those_of_the_format(tmp_path: Path, name: str) -> None:
     """Every number of every car that comes with ridelog, in g, t, mm, cm, kN/m, kN s/m."""
     lines = vehicle_file(name).read_text("utf-8").splitlines()
     tried = 0

@@ -27,7 +27,7 @@ def test_another_drive_is_not_joined() -> None:
     assert [len(piece) for piece in joined(rows)] == [5, 5]
 
 
-def test_drives_are_told_apart_by_their_number_or_a_new_count() -> None:
+def test_drives_are_distinguished_by_their_number_or_a_new_count() -> None:
     rows = [*rows_of_drive(3), *rows_of_drive(2, number=2), *rows_of_drive(4, number=2)]
     assert [len(drive) for drive in split_drives(rows)] == [3, 2, 4]
 

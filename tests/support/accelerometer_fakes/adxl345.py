@@ -11,7 +11,7 @@ import numpy as np
 from drivers.accelerometers.adxl345 import Adxl345Config
 from drivers.machine import Machine
 
-from .fake import Clock, Fake
+from .fake import Clock, DataSheet, Example, Fake
 
 RESET = {0x00: 0xE5, 0x2C: 0x0A, **dict.fromkeys((0x1E, 0x1F, 0x20, 0x2D, 0x2E, 0x2F, 0x31, 0x38), 0)}
 READ_ONLY = (0x00, 0x2B, 0x30, *range(0x32, 0x38), 0x39)
@@ -117,11 +117,19 @@ class FakeAdxl345(Fake):
     """The chip on its bus."""
 
     name = "adxl345"
-    saturates_mps2 = 16 * 9.80665
+    variants = (Adxl345Config(), Adxl345Config(rate_hz=800))
     wrong = r"0x53 has id 0xDD, an ADXL345 has 0xE5"
+    examples = (  # data sheet, Table 1 and registers 0x32 to 0x37: 256 counts per g, least significant byte first
+        Example(Adxl345Config(), bytes.fromhex("8001" "0001" "00ff" "0100"),
+                (9.80665, -9.80665, 9.80665 / 256), interval_us=5000),
+        Example(Adxl345Config(), bytes.fromhex("8001" "ff0f" "0000" "0000"), (4095 / 256 * 9.80665, 0.0, 0.0),
+                clipped=True, interval_us=5000),
+        Example(Adxl345Config(), bytes.fromhex("8001" "0000" "00f0" "0000"), (0.0, -16 * 9.80665, 0.0),
+                clipped=True, interval_us=5000),
+    )
 
-    def __init__(self, folder: Path, clock: Clock) -> None:
-        super().__init__(folder, clock)
+    def __init__(self, folder: Path, clock: Clock, settings: Any = None) -> None:
+        super().__init__(folder, clock, settings)
         self.chip = Adxl345Chip(lambda t_us: self.accel(t_us))
         self.bus = Bus(self)
         self.unplugged = False
@@ -129,8 +137,15 @@ class FakeAdxl345(Fake):
         self.steps: list[int | None] = []
 
     @property
-    def settings(self) -> Adxl345Config:
-        return Adxl345Config()
+    def sheet(self) -> DataSheet:
+        return DataSheet(self.settings.rate_hz, 0.0, (0.8 / 256 * 9.80665, 1.5 / 256 * 9.80665), 16 * 9.80665,
+                         self.settings.rate_hz / 2)
+
+    @property
+    def state(self) -> dict[Any, Any]:
+        """Bandwidth and rate (Table 7), and the registers of power, format and buffer."""
+        rate_hz = 1e6 / self.chip.interval_us * (1 + self.chip.clock_error)
+        return {"filter_hz": rate_hz / 2, **{one: self.chip.registers[one] for one in (0x2D, 0x31, 0x38)}}
 
     def machine(self) -> Machine:
         def opened(number: int, register_step: int | None) -> Any:
@@ -147,6 +162,9 @@ class FakeAdxl345(Fake):
 
     def plug(self) -> None:
         self.unplugged = False
+        self.chip.lose_power(self.clock.now_us)
+
+    def lose_settings(self) -> None:
         self.chip.lose_power(self.clock.now_us)
 
     def replace_by_another(self) -> None:

@@ -5,21 +5,32 @@ What a write does is done when time passes: the kernel's side looks at the files
 
 from __future__ import annotations
 
+import json
 import os
 import select
 import shutil
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from drivers.accelerometers.iio import IioConfig
 from drivers.machine import Machine
 
-from .fake import Clock, Fake
+from .fake import Clock, DataSheet, Example, Fake
 
 SCALE = 0.009580  # +-2 g with 12 bits
 BITS, SHIFT = 12, 4
+
+
+def described(kind: str, polled: bool = False) -> bytes:
+    """What the kernel says of a device whose x, y, z are of one kind (``scan_elements/in_accel_x_type``)."""
+    return json.dumps({
+        "begins": True, "name": "fakecel", "polled": polled, "scale": dict.fromkeys("xyz", f"{SCALE:.6f}"),
+        "channels": [] if polled else [[f"in_accel_{axis}", index, kind] for index, axis in enumerate("xyz")],
+        "offset": dict.fromkeys("xyz", "0"), "matrix": "", "clock": "", "rate_hz": "100", "buffer": "1",
+    }).encode()
 
 
 class FakeIio(Fake):
@@ -30,11 +41,19 @@ class FakeIio(Fake):
     """
 
     name = "iio"
-    saturates_mps2 = 2 * 9.80665
+    variants = (IioConfig(device="fakecel"), IioConfig(device="fakecel", rate_hz=100, scale_mps2=0.038320))
     wrong = r"no IIO accelerometer is called 'fakecel'; there are: bmi999 \(iio:device1\)"
 
-    def __init__(self, folder: Path, clock: Clock, buffered: bool = True) -> None:
-        super().__init__(folder, clock)
+    examples = (  # Documentation/ABI/testing/sysfs-bus-iio: (raw >> shift) times scale, least significant byte first
+        Example(IioConfig(), b"s" + bytes.fromhex("0010" "00f0" "f07f"), (256 * SCALE, -256 * SCALE, 2047 * SCALE),
+                clipped=True, first=described("le:s12/16>>4")),
+        Example(IioConfig(), b"s" + bytes.fromhex("0100" "ff00" "fff0"), (256 * SCALE, -256 * SCALE, -16 * SCALE),
+                first=described("be:s16/16>>0")),
+        Example(IioConfig(), b"p1 -2 1024", (SCALE, -2 * SCALE, 1024 * SCALE), first=described("", polled=True)),
+    )
+
+    def __init__(self, folder: Path, clock: Clock, settings: Any = None, buffered: bool = True) -> None:
+        super().__init__(folder, clock, settings)
         self.root = folder / "root"
         self.device = self.root / "sys/bus/iio/devices/iio:device1"
         self.node = self.root / "dev/iio:device1"
@@ -64,8 +83,16 @@ class FakeIio(Fake):
         self.is_there = False
 
     @property
-    def settings(self) -> IioConfig:
-        return IioConfig(device="fakecel")
+    def sheet(self) -> DataSheet:
+        """A step that the settings do not name is finer than the noise; one that several readings blur is noise."""
+        step_mps2, each = self.settings.scale_mps2 or 0.0, self.settings.rate_hz // 100
+        noise_mps2 = float(np.hypot(self.settings.noise_mps2, step_mps2 / (12 * each) ** 0.5 if each > 1 else 0.0))
+        return DataSheet(self.settings.rate_hz, 0.0 if each > 1 else step_mps2, (0.99 * noise_mps2, 1.01 * noise_mps2),
+                         (1 << (BITS - 1)) * (self.settings.scale_mps2 or SCALE))
+
+    @property
+    def state(self) -> dict[Any, Any]:
+        return {name: self.text(name) for name in ("in_accel_scale", "sampling_frequency", "buffer/enable")}
 
     def machine(self) -> Machine:
         if not self.is_there:
@@ -110,6 +137,11 @@ class FakeIio(Fake):
 
     def plug(self) -> None:
         self._appear()
+
+    def lose_settings(self) -> None:
+        """The kernel binds its driver again, and another program reads it."""
+        self._put("in_accel_scale", f"{SCALE:.6f}")
+        self._put("sampling_frequency", "50")
 
     def replace_by_another(self) -> None:
         self.tree["name"] = "bmi999"

@@ -1,4 +1,4 @@
-"""A bridge that sends a line ``x,y,z`` in g per sample, a hundred a second, over a serial line."""
+"""A bridge that sends a line ``x,y,z`` per sample, in g or in m/s2, a hundred a second, over a serial line."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import errno
 from pathlib import Path
 from typing import Any
 
-from drivers.accelerometers.pasco import ACCELEROMETER, PascoConfig
+from drivers.accelerometers.pasco import PascoConfig
 from drivers.machine import Machine
 
-from .fake import Clock, Fake
+from .fake import Clock, DataSheet, Example, Fake
 
 INTERVAL_US = 10_000
 
@@ -40,19 +40,29 @@ class FakeLines(Fake):
     """The bridge."""
 
     name = "pasco"
-    saturates_mps2 = 16 * 9.80665
+    variants = (PascoConfig(), PascoConfig(profile="lines_mps2"))
     wrong = r"bytes arrive, but none that can be read"
+    examples = (
+        Example(PascoConfig(), b"1.0,-0.5,.25\r\n", (9.80665, -4.903325, 2.4516625)),
+        Example(PascoConfig(), b"0,0,16.0\n", (0.0, 0.0, 156.9064), clipped=True),
+        Example(PascoConfig(profile="lines_mps2"), b"1.5,-0.5,9.80665*06\n", (1.5, -0.5, 9.80665)),
+    )
 
-    def __init__(self, folder: Path, clock: Clock) -> None:
-        super().__init__(folder, clock)
+    def __init__(self, folder: Path, clock: Clock, settings: Any = None) -> None:
+        super().__init__(folder, clock, settings)
         self.waiting = bytearray()
         self.next_us = clock.now_us
         self.unplugged = False
         self.garbled = False
 
     @property
-    def settings(self) -> PascoConfig:
-        return PascoConfig()
+    def sheet(self) -> DataSheet:
+        saturates_mps2 = 16 * 9.80665 if self.settings.profile == "lines" else 160.0
+        return DataSheet(100.0, 0.0, (0.02, 0.15), saturates_mps2)
+
+    @property
+    def state(self) -> dict[Any, Any]:
+        return {}
 
     def machine(self) -> Machine:
         def opened(path: str, baud: int) -> Any:
@@ -66,7 +76,8 @@ class FakeLines(Fake):
 
     def advance(self, now_us: int) -> None:
         while self.next_us <= now_us:
-            line = ACCELEROMETER.simulated(self.settings, self.accel(self.next_us)[None, :])[0]
+            unit_mps2 = 9.80665 if self.settings.profile == "lines" else 1.0
+            line = ",".join(f"{value / unit_mps2:.5f}" for value in self.accel(self.next_us)).encode() + b"\n"
             self.waiting += line.translate(bytes(range(128, 256)) * 2) if self.garbled else line
             self.next_us += INTERVAL_US
         if self.unplugged:
@@ -77,6 +88,9 @@ class FakeLines(Fake):
 
     def plug(self) -> None:
         self.unplugged = False
+
+    def lose_settings(self) -> None:
+        """It has none."""
 
     def replace_by_another(self) -> None:
         self.garbled = True

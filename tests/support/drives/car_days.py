@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.dump import DumpHeader, Event
 from logger.demo.make import PLAN
-from logger.demo.motion import STEP_S, Motion
+from logger.demo.motion import STEP_S, DriveMotion
 from logger.demo.receiver import Reception, transmit
 from logger.demo.simulated_drive import GPS_BAUD, simulate_drive
 from logger.shipped import vehicle_file
@@ -96,7 +96,7 @@ class CarDay:
                 standing = _parked(motion, min(MINUTE_S, self._cycle_s - since_s))
                 yield from self._piece(begin_s + since_s, standing, self._standing, reception, rng)
 
-    def _piece(self, begin_s: int, motion: Motion, readings: list[tuple[int, bytes]], reception: Reception,
+    def _piece(self, begin_s: int, motion: DriveMotion, readings: list[tuple[int, bytes]], reception: Reception,
                rng: np.random.Generator) -> Iterator[Event]:
         begin_us = START_US + round(begin_s * 1e6 * CLOCK_RATE)
         length_us = round(len(motion.time_s) * STEP_S * 1e6)
@@ -118,15 +118,15 @@ def _at_rest(count: int) -> list[tuple[int, bytes]]:
     return [(10_000 * n, registers[3 * n:3 * n + 3]) for n in range(count)]
 
 
-def _back(motion: Motion) -> Motion:
+def _back(motion: DriveMotion) -> DriveMotion:
     """The same drive from where it ended, in the opposite direction."""
     return replace(motion, lat_deg=motion.lat_deg[-1] + motion.lat_deg[0] - motion.lat_deg,
                    lon_deg=motion.lon_deg[-1] + motion.lon_deg[0] - motion.lon_deg,
                    course_deg=(motion.course_deg + 180.0) % 360.0)
 
 
-def _parked(motion: Motion, seconds: int) -> Motion:
+def _parked(motion: DriveMotion, seconds: int) -> DriveMotion:
     """Standing where ``motion`` begins."""
     time_s = np.arange(0.0, seconds, STEP_S)
     still = np.zeros_like(time_s)
-    return Motion(time_s, still, still, still + motion.lat_deg[0], still + motion.lon_deg[0], still, still, still)
+    return DriveMotion(time_s, still, still, still + motion.lat_deg[0], still + motion.lon_deg[0], still, still, still)

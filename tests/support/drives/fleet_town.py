@@ -23,7 +23,8 @@ YEAR_S = 365.25 * 86400
 BLOCK_M = 100.0
 START_US = 1_704_067_200_000_000  # 2024-01-01
 PLACE_STD_M = 1.5
-WINDOW_STD = 0.15
+WINDOW_STD, DRIVE_STD = 0.15, 0.05
+"""Of the error of a window, and of what all windows of a drive share, relative."""
 STREET_IRI = (1.5, 4.0)
 
 
@@ -75,12 +76,14 @@ class Drives:
     speed_mps: float = 12.0
 
 
-def drives(place: Town, count: int, seed: int | tuple[int, int] = 2) -> Drives:
-    """Drives at random times, cars and streets, in either direction."""
+def drives(place: Town, count: int, seed: int | tuple[int, int] = 2, within: tuple[float, float] = (0.0, 1.0)
+           ) -> Drives:
+    """Drives at random times ``within`` a part of the town's, with random cars and streets, in either direction."""
     rng = np.random.default_rng(seed)
     windows = place.iri.shape[1]
     car, street = rng.integers(len(place.log_gain), size=count), rng.integers(place.streets, size=count)
-    when_s = np.sort(rng.uniform(0.0, place.years * YEAR_S - 3600.0, count))
+    first_s, last_s = (part * (place.years * YEAR_S - 3600.0) for part in within)
+    when_s = np.sort(rng.uniform(first_s, last_s, count))
     back = rng.random(count) < 0.5
     along_m = (np.arange(windows) + 0.5) * WINDOW_M
     along_m = np.where(back[:, None], along_m[::-1], along_m) + _wander(rng, count, windows)
@@ -94,7 +97,7 @@ def drives(place: Town, count: int, seed: int | tuple[int, int] = 2) -> Drives:
     true = np.where(back[:, None], true[:, ::-1], true)
     age = when_s / YEAR_S - place.years / 2
     true = true * (1.0 + place.decay[street] * age)[:, None] * np.exp(place.log_gain[car])[:, None]
-    error = WINDOW_STD * rng.normal(size=true.shape) + 0.05 * rng.normal(size=(count, 1))
+    error = WINDOW_STD * rng.normal(size=true.shape) + DRIVE_STD * rng.normal(size=(count, 1))
     return Drives(car, street, START_US + (when_s * 1e6).astype(np.int64), place.lat0_deg + north_m * per_m,
                   place.lon0_deg + east_m * per_m / np.cos(np.radians(place.lat0_deg)),
                   np.maximum(true * (1.0 + error), 0.05))
@@ -105,13 +108,10 @@ def _wander(rng: np.random.Generator, count: int, windows: int) -> Array:
     return PLACE_STD_M * (0.9 * rng.normal(size=(count, 1)) + 0.3 * rng.normal(size=(count, windows)))
 
 
-def write_logs(found: Drives, folder: Path) -> None:
-    """A folder for each car with a log for each drive, named as a logger does."""
-    sessions: dict[int, int] = {}
+def write_logs(found: Drives, folder: Path, first_session: int = 1) -> None:
+    """A folder for each car with a log for each drive, named as a logger does; sessions count over all cars."""
     for number in range(len(found.car)):
-        car = int(found.car[number])
-        sessions[car] = sessions.get(car, 0) + 1
-        log = folder / f"car{car:03d}" / f"{sessions[car]:05d}-001.csv"
+        log = folder / f"car{found.car[number]:03d}" / f"{first_session + number:05d}-001.csv"
         log.parent.mkdir(parents=True, exist_ok=True)
         rows = [format_row(record) for record in records(found, number)]
         log.write_text("\n".join([HEADER, *rows, ""]), "ascii")

@@ -1,7 +1,7 @@
 """Drives of known truth, made on a path of their own: nothing here comes from the models that they are to judge.
 
 Problem: an estimator that is tried on what it was built with shows its best side. These roads are drawn with random
-amplitudes and not only of ISO 8608; the car's equations are written out and solved anew (in the frequency domain for
+amplitudes and not only of ISO 8608; the car's equations are written out and solved (in the frequency domain for
 a steady speed, mode by mode in time for any other); the readings are rounded with gravity at a random place within a
 step, and clipped; the receiver is late and wanders.
 

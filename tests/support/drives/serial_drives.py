@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from drivers.dump import Event
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -23,7 +23,7 @@ SPEED_MPS = 15.0
 def drive_at(rate_hz: int) -> Drive:
     """A class B road at 15 m/s; noise in proportion to the root of the rate, as one and the same sensor has it."""
     knots = ((0, 0), (BEGIN_S, 0), (BEGIN_S + 10, SPEED_MPS), (SECONDS, SPEED_MPS))
-    plan = DrivePlan(knots, (Stretch(5000, 64),), sensor="lines", rate_hz=rate_hz, seed=7,
+    plan = DrivePlan(knots, (RoadStretch(5000, 64),), sensor="lines", rate_hz=rate_hz, seed=7,
                      noise_mps2=0.05 * (rate_hz / 100) ** 0.5)
     return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
 

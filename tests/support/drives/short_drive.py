@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from logger.demo.motion import Bump, Stretch
+from logger.demo.motion import RoadStretch, SpeedBump
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DrivePlan
 
 SHORT_PLAN = DrivePlan(
     speed_knots=((0, 0), (3, 0), (9, 10), (30, 12), (36, 0), (41, 0), (47, 14), (70, 14)),
-    stretches=(Stretch(200, 60), Stretch(200, 250)),
-    bumps=(Bump(330, 0.05, 1.5),),
+    stretches=(RoadStretch(200, 60), RoadStretch(200, 250)),
+    bumps=(SpeedBump(330, 0.05, 1.5),),
     reception=Reception(first_fix_s=6, lost=((20, 24),), corrupted_s=15),
     seed=5,
 )

@@ -18,7 +18,7 @@ from drivers.errors import DumpError
 from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.integrity import verify
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.dump_recording import repair_recordings
 from logger.store.log.log_writer import ClockMap, next_session, read_sidecar, repair
 from logger.store.log.row_format import format_row, parse_row, read_log
@@ -31,7 +31,7 @@ HEADER = DumpHeader(None, {"driver": "bma220", "range_g": 2}, {"baud": 9600}, "r
 OFFSET_US = 1_783_160_000_000_000
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EROFS)
 KINDS = ("create", "write", "sync", "close", "rename", "remove", "sync_directory")
-WHOLE_DISK = Limits(floor_bytes=0)
+WHOLE_DISK = QuotaLimits(floor_bytes=0)
 OUTAGE_STEPS = 60
 LIFE_STEPS = 30
 
@@ -153,7 +153,7 @@ class Outcome:
     rows_lost: int = 0
     damaged_accepted: int = 0
     torn_or_damaged: int = 0
-    told: bool = False
+    reported: bool = False
     wrong: str = ""
 
 
@@ -252,7 +252,7 @@ def _is_as_written(record: WindowRecord) -> bool:
 class Service:
     """The storage of a running service, with a clock of its own: a row and two events each half second."""
 
-    def __init__(self, folder: Path, files: RefusingFiles, limits: Limits = WHOLE_DISK,
+    def __init__(self, folder: Path, files: RefusingFiles, limits: QuotaLimits = WHOLE_DISK,
                  max_file_bytes: int = 2500) -> None:
         folder.mkdir(exist_ok=True)
         self.folder = folder
@@ -292,7 +292,7 @@ def outage(folder: Path, error: int, kinds: tuple[str, ...], begin: int, length:
             service.storage.log.set_clock_map(ClockMap(OFFSET_US))
         files.refuses = lambda kind, bad=begin <= step < begin + length: bad and kind in kinds
         service.step()
-        outcome.told |= bool(service.storage.status().trouble)
+        outcome.reported |= bool(service.storage.status().trouble)
     service.wait()
     is_well = service.storage.status().trouble == "" and service.storage.log.waiting == 0
     service.storage.close()

@@ -1,6 +1,6 @@
 """Disks that fail: one that refuses, and one whose power is cut at any instant.
 
-``RefusingFiles`` raises what a full, dying or read-only disk raises, at a chosen change or for as long as it is told.
+``RefusingFiles`` raises what a full, dying or read-only disk raises, at a chosen change or for as long as it is set to.
 
 ``RecordingFiles`` does what it is asked and keeps a journal of it. ``CrashModel`` is what the disk knows after the
 first changes of a journal, and gives the folders that it may show when everything ends there:

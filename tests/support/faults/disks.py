@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 from logger.service.storage import LOOK_US
 from logger.store.log import disk_quota, outage_buffer
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 
 from .crashes import ERRORS, KINDS, Service, events, outage, problems, restart, segments
 from .disk_models import RefusingFiles
@@ -25,7 +25,7 @@ def disk_refuses(folder: Path, case: Case) -> Found:
     error, kinds, begin, length = case
     outcome = outage(folder / "log", error, kinds, begin, length)
     assert not outcome.wrong, outcome.wrong
-    assert outcome.told or length < 12 or not {"write", "sync"} & set(kinds)
+    assert outcome.reported or length < 12 or not {"write", "sync"} & set(kinds)
     return found(rows=outcome.rows_promised, lost=outcome.rows_promised - outcome.rows_found)
 
 
@@ -252,14 +252,14 @@ def old_files(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
-def keeper(folder: Path, files: Card, exported: set[str], limits: Limits) -> disk_quota.DiskQuota:
+def keeper(folder: Path, files: Card, exported: set[str], limits: QuotaLimits) -> disk_quota.DiskQuota:
     return disk_quota.DiskQuota(folder, limits, lambda _: exported, files)
 
 
 def exported_files_go_first(folder: Path, by_quota: bool) -> Found:
     folder = folder / "log"
     used = old_files(folder)
-    limits = Limits(used + 45_000, 0) if by_quota else Limits(None, 1_000_000)
+    limits = QuotaLimits(used + 45_000, 0) if by_quota else QuotaLimits(None, 1_000_000)
     files = Card(folder, used + 45_000 + limits.floor_bytes if not by_quota else 10**9)
     exported = {"00002-001.csv", "00002-001.json", "00003.dump.gz", "00004.dump.gz", "00001-001.csv"}
     with small():
@@ -278,7 +278,7 @@ def nothing_is_exported(folder: Path, step: int) -> Found:
     files = Card(folder, used + 60_000)
     seen = []
     with small():
-        room = keeper(folder, files, set(), Limits(None, 0))
+        room = keeper(folder, files, set(), QuotaLimits(None, 0))
         for size in range(used + 60_000, 35_000, -step):
             files.size = size
             room.look()
@@ -299,7 +299,7 @@ def name_that_is_a_folder(folder: Path, name: str) -> Found:
     used = old_files(folder)
     (folder / name).mkdir()
     with small():
-        room = keeper(folder, Card(folder, used + 4_000), set(), Limits(None, 0))
+        room = keeper(folder, Card(folder, used + 4_000), set(), QuotaLimits(None, 0))
         room.look()
     assert room.dumps_lost == 1
     assert not (folder / "00001.dump.gz").exists()
@@ -312,7 +312,7 @@ def card_fills_and_is_emptied(folder: Path, case: None) -> Found:
     folder.mkdir()
     files = Card(folder, 10**6)
     with small():
-        service = Service(folder, files, Limits(None, 0))
+        service = Service(folder, files, QuotaLimits(None, 0))
         states = []
         for size in (10**6, 40_000, -10**6, 10**6):
             files.size = size
@@ -361,7 +361,7 @@ HAZARDS = (
       for name, error in zip(("disk full (ENOSPC)", "dying card (EIO)", "card turns read-only (EROFS)"), ERRORS,
                              strict=True)),
     Hazard("disk that never comes back", "full, failing or read-only from a round on, to the end of the drive",
-           "what was on it stays; waiting and lost rows are counted and told", "as promised", disk_never_comes_back,
+           "what was on it stays; waiting and lost rows are counted and reported", "as promised", disk_never_comes_back,
            tuple(product(ERRORS, range(2, 12))), 15),
     Hazard("fsync that fails once", "the next fsync says that all is well, as Linux does",
            "never believed: the rows since the last good one are written again, to another file", "as promised",

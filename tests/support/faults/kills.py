@@ -26,7 +26,7 @@ from unittest.mock import patch
 
 from drivers.dump import Event, intact_bytes, open_dump
 from logger.commands.status import advice, screen
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
@@ -44,7 +44,7 @@ Rows = dict[int, set[int]]
 def fast_drive(path: Path, seconds: float) -> None:
     """Recorded at 24 m/s nearly from the start."""
     speed = ((0, 0), (1, 0), (4, 24), (seconds, 24))
-    plan = DrivePlan(speed_knots=speed, stretches=(Stretch(30 * seconds, 60),), seed=7)
+    plan = DrivePlan(speed_knots=speed, stretches=(RoadStretch(30 * seconds, 60),), seed=7)
     record(simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009"))), path)
 
 
@@ -54,7 +54,7 @@ class Kills:
 
     kills: int = 0
     rows: int = 0
-    rows_told: int = 0
+    rows_reported: int = 0
     torn_tails: int = 0
     dumps: int = 0
     wrong: list[str] = field(default_factory=list)
@@ -130,14 +130,14 @@ class KilledService:
         self.found.wrong.append(f"did not start: {(self.work / 'stderr.txt').read_text()[-500:]}")
 
     def _after_kill(self, pid: int, before: Rows) -> Rows:
-        """Compare with what was there after the kill before, and with what the status had told."""
+        """Compare with what was there after the kill before, and with what the status had reported."""
         rows = self._check(before, all_finished=False)
         status = read_status(self.work / "status.json")
         if status is not None and status.pid == pid and status.rows_written:
             newest = max(rows)
-            self.found.rows_told += status.rows_written
+            self.found.rows_reported += status.rows_written
             if len(rows[newest]) < status.rows_written:
-                self.found.wrong.append(f"status told {status.rows_written} rows, {len(rows[newest])} are there")
+                self.found.wrong.append(f"status reported {status.rows_written} rows, {len(rows[newest])} are there")
         return rows
 
     def _check(self, before: Rows, all_finished: bool) -> Rows:
@@ -190,7 +190,7 @@ def killed_at_random(folder: Path, case: tuple[int, float, int]) -> Found:
     kills, longest_s, seed = case
     services = kill_many(folder, kills, SERVICES, longest_s, seed)
     figures = {name: float(sum(getattr(one, name) for one in services))
-               for name in ("rows", "rows_told", "torn_tails", "dumps")}
+               for name in ("rows", "rows_reported", "torn_tails", "dumps")}
     wrong = tuple(words for one in services for words in one.wrong)
     return Found(sum(one.kills for one in services), figures, wrong=wrong)
 
@@ -214,7 +214,7 @@ def may_write_no_more(folder: Path, case: None) -> Found:
             full = _wait_for(service, process.pid, lambda status: status.storage.rows_waiting > 10)
             _drain(manager)
             time.sleep(1.5)
-            told = _drain(manager)
+            reported = _drain(manager)
             resource.prlimit(process.pid, resource.RLIMIT_FSIZE, unlimited)
             _wait_for(service, process.pid, lambda status: not status.storage.trouble)
         finally:
@@ -222,8 +222,8 @@ def may_write_no_more(folder: Path, case: None) -> Found:
             ended = process.wait(timeout=PATIENCE_S)
             service.close()
     assert ended == 0
-    assert "WATCHDOG=1" in told
-    assert any("NOT WRITING" in words for words in told)
+    assert "WATCHDOG=1" in reported
+    assert any("NOT WRITING" in words for words in reported)
     assert full.accelerometer.state == "ok"
     lines = "\n".join(screen(full, None))
     assert "but writes NOTHING" in lines
@@ -232,7 +232,7 @@ def may_write_no_more(folder: Path, case: None) -> Found:
     assert segments == list(range(1, len(segments) + 1))
     assert len(segments) > full.rows_written + full.storage.rows_waiting
     assert all(check.ok for check in verify(sorted(service.log.glob("*.csv"))))
-    return found(told=advice(full)[0], waited=full.storage.rows_waiting)
+    return found(reported=advice(full)[0], waited=full.storage.rows_waiting)
 
 
 def _wait_for(service: KilledService, pid: int, what: Callable[[ServiceStatus], bool]) -> ServiceStatus:
@@ -247,23 +247,23 @@ def _wait_for(service: KilledService, pid: int, what: Callable[[ServiceStatus], 
 
 
 def _drain(manager: socket.socket) -> list[str]:
-    """What systemd was told."""
-    told = []
+    """What systemd was notified of."""
+    reported = []
     try:
         while True:
-            told.append(manager.recv(1000).decode())
+            reported.append(manager.recv(1000).decode())
     except BlockingIOError:
-        return told
+        return reported
 
 
 KILLS = Hazard(
     "the real service killed (SIGKILL)", f"{SERVICES} services at a time under load (windows of 1 m at 24 m/s, files "
     "of 10 kB, a raw dump), at any moment from the first import on, each started again in the same folder",
-    "no row that was there or that `ridelog status` had told of is gone, none is missing in between; every finished "
-    "file is good", "{rows.total:.0f} rows left, {rows_told.total:.0f} of them told of before, none gone; "
+    "no row that was there or that `ridelog status` had reported is gone, none is missing in between; every finished "
+    "file is good", "{rows.total:.0f} rows left, {rows_reported.total:.0f} of them reported before, none gone; "
     "{torn_tails.total:.0f} torn rows refused, {dumps.total:.0f} dumps cut off", killed_at_random,
     ((2, 10.0, 1), *((8, 20.0, seed) for seed in range(2, 6))), 1)
 WRITES_NO_MORE = Hazard(
     "the real service may write no more", "the system limits the size of its files in the middle of a write (EFBIG)",
-    "it stays up, the watchdog is fed, systemd and `status` are told; once it may, every row is written",
+    "it stays up, the watchdog is fed, systemd is notified and `status` says so; once it may, every row is written",
     "{waited.total:.0f} rows waited, all were written", may_write_no_more)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from logger.records import WindowRecord
-from logger.store.log.disk_quota import DiskQuota, Limits
+from logger.store.log.disk_quota import DiskQuota, QuotaLimits
 from logger.store.log.log_reader import read_logged
 from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
@@ -63,7 +63,7 @@ def cut_while_room_is_made(folder: Path, power: bool) -> Found:
 
 def _make_room(folder: Path, files: FullCard) -> None:
     exported = {path.name for path in folder.iterdir()}
-    DiskQuota(folder, Limits(None, 0), lambda _: exported, files).look()
+    DiskQuota(folder, QuotaLimits(None, 0), lambda _: exported, files).look()
 
 
 def flipped_sidecar_of_an_open_part(folder: Path, case: tuple[int, int]) -> Found:

@@ -40,7 +40,7 @@ from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import OTHER_DATE_US
 from logger.store.formats.vehicle_file import read_model
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
 
 from ..drives.replay import Rows, parts_for
@@ -101,7 +101,7 @@ class Port(RecordedPort):
 
 
 class Clock:
-    """Time that passes when it is told to. It never goes back."""
+    """Time that passes when it is stepped. It never goes back."""
 
     def __init__(self) -> None:
         self.now_us = monotonic_us()
@@ -139,7 +139,7 @@ class Car:
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = wiring.instrument(self.config.accelerometer)
         vehicle = read_model(self.config.vehicle)
-        self.storage = Storage(folder, {}, 4_000_000, None, Limits(), self.clock)
+        self.storage = Storage(folder, {}, 4_000_000, None, QuotaLimits(), self.clock)
         self.decoder = wiring.gps_decoder(self.config)
         self.pipeline = wiring.pipeline(self.config, sensor, vehicle)
         self.rows = Rows()
@@ -215,12 +215,12 @@ def accelerometer_unplugged(folder: Path, seed: int) -> Found:
     back_s = out_s + out_for_s
     car = Car(folder, [Cue(Fault.UNPLUG, at_us=round(out_s * 1e6)), Cue(Fault.REPLUG, at_us=round(back_s * 1e6))])
     assert car.drive(out_s - 0.1).accelerometer.state == "ok"
-    told = ""
+    reported = ""
     if out_for_s > 1:
         away = car.drive(out_for_s)
         assert away.accelerometer.state == "retrying"
-        told, *_ = advice(away)
-        assert "nothing answers" in told
+        reported, *_ = advice(away)
+        assert "nothing answers" in reported
         assert away.gps.state == "ok"
     status = car.drive(max(out_for_s, 3) + 14)
     assert status.accelerometer.state == "ok"
@@ -229,7 +229,7 @@ def accelerometer_unplugged(folder: Path, seed: int) -> Found:
     assert car.bus.chip.watchdog_on
     assert "gap" in car.flags()
     assert all(record.distance_start_m is not None or "gps_lost" in record.flags for record in car.rows.records)
-    return found(told=told, waited_s=waited_s)
+    return found(reported=reported, waited_s=waited_s)
 
 
 def receiver_unplugged(folder: Path, seed: int) -> Found:
@@ -240,14 +240,14 @@ def receiver_unplugged(folder: Path, seed: int) -> Found:
     away = car.drive(out_s + out_for_s - 0.1)
     assert away.gps.state == "retrying"
     assert away.accelerometer.state == "ok"
-    told, *_ = advice(away)
+    reported, *_ = advice(away)
     status = car.drive(out_for_s + 12)
     assert status.gps.state == "ok"
     assert status.fix_valid
     assert "gps_lost" in car.flags()
     heard_share = len(car.heard_us) / (100 * car.now_s)
     assert abs(heard_share - 1) < 0.02
-    return found(told=told, heard_percent=100 * heard_share)
+    return found(reported=reported, heard_percent=100 * heard_share)
 
 
 def another_chip(folder: Path, identity: int) -> Found:
@@ -255,11 +255,11 @@ def another_chip(folder: Path, identity: int) -> Found:
     car.bus.chip.stuck = {CHIP_ID.address: identity}
     status = car.drive(20)
     assert (status.accelerometer.state, status.accelerometer.readings) == ("absent", 0)
-    told, *_ = advice(status)
-    assert f"has id 0x{identity:02X}, a BMA220 has 0xDD" in told
+    reported, *_ = advice(status)
+    assert f"has id 0x{identity:02X}, a BMA220 has 0xDD" in reported
     car.bus.chip.stuck = {}
     assert car.drive(31).accelerometer.state == "ok"
-    return found(told=told)
+    return found(reported=reported)
 
 
 def garbled(data: bytes, rng: random.Random) -> bytes:
@@ -274,13 +274,13 @@ def receiver_with_wrong_baud_rate(folder: Path, seed: int) -> Found:
     car.receiver = lambda second: garbled(good(second), car.rng)
     status = car.drive(25)
     assert (status.gps.state, status.gps.readings, status.utc_known) == ("doubtful", 0, False)
-    told = " ".join(advice(status))
-    assert "check the baud rate" in told
+    reported = " ".join(advice(status))
+    assert "check the baud rate" in reported
     assert all(record.lat_deg is None for record in car.rows.records)
     car.receiver = good
     status = car.drive(5)
     assert status.gps.state == "ok"
-    return found(told=told)
+    return found(reported=reported)
 
 
 def another_device(folder: Path, kind: str) -> Found:
@@ -298,9 +298,9 @@ def another_device(folder: Path, kind: str) -> Found:
                                                                                          status.gps)
     assert (wrong.state, wrong.readings) == ("doubtful", 0)
     assert (right.state, right.readings > 10) == ("ok", True)
-    told = " ".join(advice(status))
-    assert "no other device" in told
-    return found(told=told)
+    reported = " ".join(advice(status))
+    assert "no other device" in reported
+    return found(reported=reported)
 
 
 def settings_lost(folder: Path, case: tuple[int, str]) -> Found:
@@ -332,8 +332,8 @@ def settings_lost(folder: Path, case: tuple[int, str]) -> Found:
     assert not set(car.heard_us) & set(wrong_us)
     assert status.accelerometer.state == "ok"
     assert car.accelerometer.restarts == 1
-    told = " ".join(advice(status))
-    assert "lost its settings" in told
+    reported = " ".join(advice(status))
+    assert "lost its settings" in reported
     doubtful = [record for record in car.rows.records
                 if record.t_us <= wrong_us[-1] and wrong_us[0] <= record.t_us + record.duration_s * 1e6]
     assert doubtful
@@ -347,7 +347,7 @@ def settings_lost(folder: Path, case: tuple[int, str]) -> Found:
                        and record.accel_rms_mps2 is not None])
     assert all(abs(record.accel_rms_mps2 / usual - 1) < 0.15 for record in car.rows.records
                if record.accel_rms_mps2 is not None)
-    return found(told=told, unheard_s=unheard_s)
+    return found(reported=reported, unheard_s=unheard_s)
 
 
 def lose(chip: Bma220Chip, loss: str) -> None:
@@ -370,17 +370,17 @@ def bus_held_low(folder: Path, watchdog_ms: int) -> Found:
     assert car.longest_step_us < HANG_US
     assert status.gps.state == "ok"
     assert status.rows_written > 20
-    told = ""
+    reported = ""
     if watchdog_ms:
         assert status.accelerometer.state == "ok"
         assert heard_after(car, 10.0) < 13
     else:
         assert status.accelerometer.state == "retrying"
-        told, *_ = advice(status)
-        assert "the bus is held low" in told
+        reported, *_ = advice(status)
+        assert "the bus is held low" in reported
         assert car.drive(45).accelerometer.state == "ok"
     assert car.bus.chip.watchdog_on is bool(watchdog_ms)
-    return found(told=told, step_s=car.longest_step_us / 1e6)
+    return found(reported=reported, step_s=car.longest_step_us / 1e6)
 
 
 def refused_transfers(folder: Path, loss: float) -> Found:
@@ -418,8 +418,8 @@ def frozen_chip(folder: Path, level: int) -> Found:
     assert status.accelerometer.state == "ok"
     status = car.drive(45)
     assert status.accelerometer.state == "doubtful"
-    told, *_ = advice(status)
-    assert "not changed at all" in told
+    reported, *_ = advice(status)
+    assert "not changed at all" in reported
     assert car.accelerometer.restarts > restarts
     late = [record for record in car.rows.records if record.t_us > car.begin_us + (40 + FROZEN_S + 2) * 1e6]
     assert len(late) > 30
@@ -430,7 +430,7 @@ def frozen_chip(folder: Path, level: int) -> Found:
     status = car.drive(20)
     assert status.accelerometer.state == "ok"
     assert "frozen" not in car.rows.records[-1].flags
-    return found(told=told, rows=len(late))
+    return found(reported=reported, rows=len(late))
 
 
 def parked(folder: Path, receiver: str) -> Found:
@@ -456,12 +456,12 @@ def saturated(folder: Path, level: int) -> Found:
     car.sample = lambda second: bytes((0, 4 * car.rng.randrange(2), 4 * level & 0xFF))
     status = car.drive(30)
     assert status.accelerometer.state == "doubtful"
-    told, *_ = advice(status)
-    assert "does not feel 1 g" in told
+    reported, *_ = advice(status)
+    assert "does not feel 1 g" in reported
     placed = [record for record in car.rows.records if record.samples]
     assert len(placed) > 10
     assert all("clipped" in record.flags for record in placed)
-    return found(told=told, rows=len(placed))
+    return found(reported=reported, rows=len(placed))
 
 
 def peaks_beyond_the_range(folder: Path, at_s: float) -> Found:
@@ -582,7 +582,7 @@ HAZARDS = (
            ("receiver on the sensor's port", "sensor on the receiver's port", "wrong baud rate")),
     Hazard("accelerometer loses its settings", "a brown-out, or registers that change: the readings go on, "
            "2 to 8 times too large or too small, or with no filter",
-           "no such reading is taken; started anew within a second; the rows in it are flagged `gap`; `status` says so",
+           "no such reading is taken; restarted within a second; the rows in it are flagged `gap`; `status` says so",
            "{unheard_s.most:.2f} s of readings left out, or less", settings_lost,
            ((4, "brown-out"), (2, "brown-out"), (2, "range and filter"), (2, "range"), (2, "filter"), (2, "axes"),
             (2, "watchdog"))),
@@ -594,8 +594,8 @@ HAZARDS = (
            "only the samples that are hit are lost (up to 30 %); back within 30 s after the storm",
            "back after {waited_s.most:.1f} s or less", refused_transfers, (0.05, 0.3, 0.6, 0.9, 0.99)),
     Hazard("frozen accelerometer", "one and the same reading while the car drives",
-           f"told after {FROZEN_S:g} s; from then on rows are flagged `frozen`, without IRI and comfort; the chip is "
-           "started anew; well again by itself",
+           f"reported after {FROZEN_S:g} s; from then on rows are flagged `frozen`, without IRI and comfort; the chip "
+           "is restarted; well again by itself",
            "{rows.total:.0f} rows, all flagged, none with a figure", frozen_chip, (17, 15, 16), 1),
     Hazard("parked car", "one and the same reading while the car stands, has no fix or drifts",
            "never taken for a frozen sensor", "as promised", parked,

@@ -16,7 +16,7 @@ from unittest.mock import patch
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.service.storage import Storage
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.log_writer import ClockMap, SegmentLog
 from logger.store.log.row_format import read_log
 
@@ -24,7 +24,7 @@ from .crashes import FACTS, HEADER, OFFSET_US, event_of, problems, window
 from .disk_models import RefusingFiles
 from .trials import Found, Hazard, found
 
-ROOM = Limits(10**9, 0)
+ROOM = QuotaLimits(10**9, 0)
 SESSION = 2
 ROWS = 6
 OPEN_PART = f"{SESSION:05d}-002.csv.part"

@@ -25,7 +25,7 @@ from logger.service.event_core import EventCore
 from logger.service.storage import Storage
 from logger.store.formats.vehicle_file import read_model
 from logger.store.integrity import FileCheck, verify
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
 
 from ..drives.car_days import HEADER, START_US, CarDay
@@ -99,7 +99,7 @@ class _Service:
         self._sync_us = config.log.sync_s * 1e6
         self.t_us = START_US
         self.storage = Storage(directory, wiring.sidecar(config, sensor, vehicle), MAX_FILE_BYTES, HEADER,
-                               Limits(quota_bytes, floor_bytes=0), lambda: self.t_us)
+                               QuotaLimits(quota_bytes, floor_bytes=0), lambda: self.t_us)
         pipeline = wiring.pipeline(config, sensor, vehicle)
         self._core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, self.storage.log)
         self._tended_us = self._sampled_us = START_US

@@ -222,7 +222,7 @@ def fault_at_any_call(folder: Path, case: tuple[int, bool]) -> Found:
 
 
 def pulled_during_a_repeat(folder: Path, case: None) -> Found:
-    """A log changed since the last export and one is new: set aside, copied, listed anew, cut at every call."""
+    """A log changed since the last export and one is new: set aside, copied, listed again, cut at every call."""
     logs, stick = a_card(folder), a_stick(folder / "stick")
     at, calls = 0, 10**9
     while at < calls:
@@ -575,11 +575,11 @@ HAZARDS = (
            "found by reading back; nothing counts as exported", "as promised", stick_that_lies),
     Hazard("write-protected stick that has everything", "every change is refused", "no fault", "as promised",
            write_protected),
-    Hazard("copy damaged since", "cut, changed in place, changed and longer, emptied", "found and made anew",
+    Hazard("copy damaged since", "cut, changed in place, changed and longer, emptied", "found and made again",
            "as promised", damaged_copy,
            (b"", b"content of 00001", b"CONTENT of 00001-001.csv\n" * 10, b"CONTENT OF 00001-001.csv\n" * 20,
             b"x" * 10**6)),
-    Hazard("manifest lost or damaged", "removed, emptied, cut, overwritten", "made anew", "as promised",
+    Hazard("manifest lost or damaged", "removed, emptied, cut, overwritten", "made again", "as promised",
            damaged_manifest, (None, b"", b"# ridelog-manifest 1 logger ", b"\0" * 5000)),
     Hazard("list of what was exported damaged on the card", "each byte changed, and the list cut there",
            "no file counts as exported that is not", "as promised", damaged_marks),
@@ -587,7 +587,7 @@ HAZARDS = (
            "set aside, never followed; nothing outside the stick changes; the export is complete", "as promised",
            prepared_name, tuple(product(_LINKS, (NAMES[0], manifest.NAME)))),
     Hazard("hostile folder on the stick", "the same where our folder belongs",
-           "told, not followed; nothing outside the stick changes", "as promised", prepared_folder,
+           "reported, not followed; nothing outside the stick changes", "as promised", prepared_folder,
            tuple(product((hostile_link_to_folder, hostile_link_to_nothing, hostile_pipe, hostile_hard_link),
                          ("ridelog", "own")))),
     Hazard("odd names on stick and card", "options, line ends, wildcards, commands, bytes that are no text",
@@ -602,7 +602,8 @@ HAZARDS = (
            ((errno.ENODEV, True), (errno.EIO, False))),
     Hazard("first stick does not keep its number", "a bit of each write changes", "it is not paired", "as promised",
            lying_stick_is_not_paired),
-    Hazard("card that cannot be written to", "read-only, full", "emptied to the stick all the same; `unmarked` is told",
+    Hazard("card that cannot be written to", "read-only, full", "emptied to the stick all the same; `unmarked` is "
+                                                                "reported",
            "as promised", card_that_cannot_be_written_to, (errno.EROFS, errno.ENOSPC)),
     Hazard("card with a bad file", "reading one of four fails", "all others are copied, that one is named",
            "as promised", card_with_a_bad_file, NAMES),

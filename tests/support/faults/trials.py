@@ -16,18 +16,18 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Found:
-    """What a case has shown: how often the fault was injected, figures by name, what ``ridelog status`` told, and
+    """What a case has shown: how often the fault was injected, figures by name, what ``ridelog status`` said, and
     promises broken, in words."""
 
     trials: int = 1
     figures: dict[str, float] = field(default_factory=dict)
-    told: str = ""
+    reported: str = ""
     wrong: tuple[str, ...] = ()
 
 
-def found(trials: int = 1, told: str = "", **figures: float) -> Found:
+def found(trials: int = 1, reported: str = "", **figures: float) -> Found:
     """The fault was injected so often, and every promise was held."""
-    return Found(trials, figures, told)
+    return Found(trials, figures, reported)
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Line:
-    """What came of a fault. ``told``: by ``ridelog status``; ``wrong``: empty when every promise was held."""
+    """What came of a fault. ``reported``: by ``ridelog status``; ``wrong``: empty when every promise was held."""
 
     name: str
     injected: str
@@ -74,7 +74,7 @@ class Line:
     happened: str
     trials: int
     figures: dict[str, Spread] = field(default_factory=dict)
-    told: str = ""
+    reported: str = ""
     wrong: tuple[str, ...] = ()
 
 
@@ -95,9 +95,9 @@ def run(hazard: Hazard, cases: Sequence[Any], folder: Path) -> Line:
         values = [one.figures[name] for one in seen if name in one.figures]
         figures[name] = Spread(min(values), max(values), sum(values))
     happened = hazard.happened.format(**figures) if not wrong else f"**BROKEN**: {'; '.join(wrong[:3])}"
-    told = next((one.told for one in seen if one.told), "")
+    reported = next((one.reported for one in seen if one.reported), "")
     trials = sum(one.trials for one in seen)
-    return Line(hazard.name, hazard.injected, hazard.promised, happened, trials, figures, told, wrong)
+    return Line(hazard.name, hazard.injected, hazard.promised, happened, trials, figures, reported, wrong)
 
 
 def _words(broken: AssertionError) -> str:

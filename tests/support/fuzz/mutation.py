@@ -1,4 +1,4 @@
-"""Hostile input: how valid examples are damaged, and what every reader owes whoever feeds it.
+"""Hostile input: how valid examples are damaged, and what every reader owes its users.
 
 A reader is run in the process on one input at a time. It must end in time, in little memory, and either accept the
 input or refuse it with an error of its own family, in one line that names the file. What it accepted must be in the

@@ -147,11 +147,11 @@ def read_nmea(data: bytes, rng: random.Random) -> Hashable:
         place = (round(fix.lat_deg, 9), round(fix.lon_deg, 9))
         promise(place in said.places, f"a place that stands in no intact sentence: {place}")
         promise(abs(fix.lat_deg) <= 90 and abs(fix.lon_deg) <= 180, "a place not on the earth")
-        promise(fix.time_of_day_us is None or fix.time_of_day_us in said.clocks, "a time that nobody told")
+        promise(fix.time_of_day_us is None or fix.time_of_day_us in said.clocks, "a time that nobody gave")
         if fix.speed_mps is not None:
             known = {round(fix.speed_mps * 3600 / 1852, 6), round(fix.speed_mps * 3.6, 6)}
-            told = bool(known & {round(number, 6) for number in said.numbers})
-            promise(told and 0 <= fix.speed_mps <= 150, "an invented speed")
+            reported = bool(known & {round(number, 6) for number in said.numbers})
+            promise(reported and 0 <= fix.speed_mps <= 150, "an invented speed")
         for value in (fix.course_deg, fix.altitude_m, fix.hdop, fix.satellites):
             promise(value is None or round(float(value), 9) in said.numbers, f"an invented number {value}")
         if fix.utc_us is not None:
@@ -277,7 +277,7 @@ def bma220() -> Target:
 
 
 class _File:
-    """One small file that is written anew for every input."""
+    """One small file that is rewritten for every input."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.path = folder / name
@@ -544,8 +544,8 @@ def channels(folder: Path) -> Target:
         promise(0 < found.rate_hz < float("inf") and isfinite(found.start_s), "no rate")
         promise(found.samples.shape[1] == len(found.names) and found.names == (only or found.names), "other channels")
         promise(bool(np.isfinite(found.samples).all()), "a sample that is no number")
-        told = {word.strip() for word in re.split(r"[,\n]", data.decode("utf-8-sig", "replace").partition("\n")[0])}
-        promise(set(found.names) <= told, "a channel that the header does not name")
+        reported = {word.strip() for word in re.split(r"[,\n]", data.decode("utf-8-sig", "replace").partition("\n")[0])}
+        promise(set(found.names) <= reported, "a channel that the header does not name")
         return len(found.names), len(found.samples) > 12, bool(only)
     return Target("channel csv", [plain, text], read,
                   (b"t_s", b"first,", b"second", b"1e12", b"1e300", b"1e-300", b"t_s,t_s", b",c" * 64, b"0.01,1,1\n"),

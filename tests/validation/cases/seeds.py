@@ -1,6 +1,6 @@
 """Seeds of the examination, kept apart: those that the lab is developed with, and those of what is published.
 
-Problem: whoever changes the lab until certain cases come out right has fitted it to these cases, and what it reaches on
+Problem: a lab that is changed until certain cases come out right is fitted to these cases, and what it reaches on
 them is no measure of it. Solution: a range of seeds is used by published examinations alone, and only when that is said
 on the command line (``--release``); every other seed is for development.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 DEVELOPMENT_SEEDS = range(2000, 2100)
-"""Where development runs begin unless they are told otherwise; a whole one uses all of them."""
+"""Where development runs begin unless another seed is given; a whole one uses all of them."""
 
 RELEASE_SEEDS = range(7000, 8000)
 """Of published examinations. Nothing may be tuned, chosen or mended by what comes of them."""

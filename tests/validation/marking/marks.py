@@ -54,13 +54,13 @@ def rivals(record: Record, name: str) -> list[str]:
 
 
 def first_right(record: Record) -> bool:
-    """The effect stands first, or is named as what cannot be told from the first."""
+    """The effect stands first, or is named as not distinguishable from the first."""
     names, wanted = verdict(record), record["truth"]["effects"][0]["name"]
     return bool(names) and wanted in (names[0], *rivals(record, names[0]))
 
 
 def by_confusion(record: Record) -> bool:
-    """The effect does not stand first, but is named as what cannot be told from the first."""
+    """The effect does not stand first, but is named as not distinguishable from the first."""
     return first_right(record) and verdict(record)[0] != record["truth"]["effects"][0]["name"]
 
 
@@ -244,7 +244,7 @@ def goals(records: Sequence[Record]) -> list[Goal]:
     others = of_kind(records, "none", "one", "two", "three")
     found = [record for record in listed if all_found(record)]
     return [
-        Goal("One effect: right one first, or named as what cannot be told from the first", 0.90, True,
+        Goal("One effect: right one first, or named as not distinguishable from the first", 0.90, True,
              share(one, first_right)),
         Goal("Nothing missing: anything said to be missing", 0.05, False, share(of_kind(records, "none"), alarm)),
         Goal("Two effects: both named", 0.75, True, share(of_kind(records, "two"), all_named)),

@@ -83,7 +83,7 @@ def fingerprint() -> str:
 
 
 def kept_of(said: Record) -> Record:
-    """The part of a diagnosis that is judged or told of."""
+    """The part of a diagnosis that is judged or reported."""
     candidates = [{key: one[key] for key in ("effect", "parameters", "error", "p_value", "confused_with")}
                   for one in said["candidates"][:_KEPT]]
     return {key: said[key] for key in ("baseline_error", "noise_floor_error", "verdict", "unexplained")} | {

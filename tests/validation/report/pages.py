@@ -160,8 +160,8 @@ def _adding(records: Sequence[Record]) -> list[str]:
                      f"{ratios[int(0.9 * (len(ratios) - 1))]:.3f}, largest {ratios[-1]:.3f}; within 10 % in "
                      f"{_share(share(found, lambda record, key=name: near(record, key)))}.")
     lines.append("The noise floor is what the noise alone makes. The attainable error is that of the true car with its "
-                 "effects, driven along the recorded distance, which is off by millimetres to centimetres; whoever "
-                 "corrects the distance can come below it.")
+                 "effects, driven along the recorded distance, which is off by millimetres to centimetres; correcting "
+                 "the distance can bring it lower.")
     guesses = sorted(record["said"]["noise_floor_error"] / record["truth"]["noise_floor_error"] for record in found
                      if record["said"]["noise_floor_error"])
     if guesses:
@@ -231,7 +231,7 @@ def _unseen(records: Sequence[Record]) -> Table:
 @dataclass(frozen=True)
 class Matrix:
     """What was hidden, what was said, how often; which column of a row is right; how often the right one was named as
-    what cannot be told from the one that was said."""
+    what cannot be distinguished from the one that was said."""
 
     rows: Sequence[str]
     columns: Sequence[str]
@@ -274,7 +274,7 @@ class Matrix:
 _MATRIX_LINES = (
     "Cases that hid one thing, or nothing, and whose distance is right: what was hidden (rows) and what was said "
     "first (columns; a case off the list counts as unexplained where that was said, whatever else was). *Confused*: "
-    "so many of the row named another first and the right one as what cannot be told from it, which counts as right.",)
+    "so many of the row named another first and the right one as not distinguishable from it, which counts as right.",)
 
 
 def _row(record: Record) -> str:

@@ -24,7 +24,7 @@ Path = Callable[[float], dict[str, float]]
 class Effect:
     """``path(rng, car)`` draws a path to the parameters; ``stage(scene, u)`` sets what both sides of a comparison
     share (a rougher road, tracks farther apart); ``rough`` says that it needs amplitude; ``grip`` names what it acts
-    on, as two effects on the same thing may not be told apart by anyone."""
+    on, as two effects on the same thing may not be distinguishable by anyone."""
 
     name: str
     path: Callable[[np.random.Generator, Car], Path]

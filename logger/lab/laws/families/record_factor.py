@@ -1,7 +1,7 @@
 """A correction between body and record: a stable rational transfer function of low order.
 
-1 + (a + b s / w) / (1 + 2 z s / w + s2 / w2) adds one pair of poles beside the direct way: a bracket, a panel that
-rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole.
+1 + (a + b s / w) / (1 + 2 z s / w + s2 / w2) adds one pair of poles in parallel to the direct path: a bracket, a panel
+that rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""A spring whose rubber creeps: a spring and a damper in series beside the suspension's own (Maxwell's branch)."""
+"""A spring whose rubber creeps: a spring and a damper in series, parallel to the suspension's own (Maxwell's
+branch)."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ class SpringWithMemory(Family):
     def drafts(self, look: Look) -> list[Draft]:
         stiffness = rounded(_SHARE * look.vehicle.front.suspension_stiffness_n_per_m)
         return [Draft(
-            family=self.name, kind="ForceEffect", title="rubber beside the springs that creeps",
+            family=self.name, kind="ForceEffect", title="rubber parallel to the springs that creeps",
             shown_by=self.shown_by,
             parameters=(
                 Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),

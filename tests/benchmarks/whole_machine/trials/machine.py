@@ -41,7 +41,7 @@ def watchdog(bench: Bench, report: Report) -> None:
         report.check("ridelog verify of all", rc.rc == 0, rc.out.strip().splitlines()[-1])
 
 
-@trial("a full disk is told, rows wait in memory, and all of them are written when there is room again")
+@trial("a full disk is reported, rows wait in memory, and all of them are written when there is room again")
 def full_disk(bench: Bench, report: Report) -> None:
     """Below the floor of free space, and full to the last block."""
     with bench.car("full", chip="dump", card="honest") as car:
@@ -72,15 +72,16 @@ def full_disk(bench: Bench, report: Report) -> None:
         report.check("segments in a row", numbers == list(range(numbers[0], numbers[0] + len(numbers))), len(numbers))
 
 
-@trial("a root that becomes read-only under the service, or is at boot, is told; the service lives, and writes when it "
-       "can be written again")
+@trial("a root that becomes read-only under the service, or is at boot, is reported; the service lives, and writes "
+       "when it can be written again")
 def read_only_root(bench: Bench, report: Report) -> None:
     """The kernel's emergency remount, an error of the file system, and a boot with a read-only root."""
     with bench.car("read-only", chip="dump") as car:
         car.boot()
         car.wait_for_rows(5)
         car.guest.must("echo 1 > /proc/sys/kernel/sysrq; echo u > /proc/sysrq-trigger; sleep 3")
-        told(car, report, "emergency remount (the kernel then takes writes and fsync of open files, and keeps nothing)")
+        reported(car, report, "emergency remount (the kernel then takes writes and fsync of open files, and keeps "
+                              "nothing)")
         car.guest.must("mount -o remount,rw /")
         took_s = car.wait_for("rows to be written", WRITES, 180)
         status = car.guest.status()
@@ -88,7 +89,7 @@ def read_only_root(bench: Bench, report: Report) -> None:
                      f"after {took_s:.0f} s")
         # as Raspberry Pi OS and Debian mount a root: an error makes it read-only until it is checked at the next boot
         car.guest.must("mount -o remount,errors=remount-ro /; echo bench > /sys/fs/ext4/ubda/trigger_fs_error; sleep 3")
-        told(car, report, "an error of ext4 that makes it read-only")
+        reported(car, report, "an error of ext4 that makes it read-only")
         report.check("restarts", restarts(car) == 0, restarts(car))
         car.guest.cut_power()
         car.boot()
@@ -112,7 +113,7 @@ def read_only_root(bench: Bench, report: Report) -> None:
         report.check("writable again: rows come", True, f"after {took_s:.0f} s")
 
 
-def told(car: Car, report: Report, what: str) -> None:
+def reported(car: Car, report: Report, what: str) -> None:
     """Check that status says within a minute that nothing is written."""
     began_s = time.monotonic()
     try:

@@ -34,8 +34,8 @@ def mean(values: list[float]) -> float:
     return sum(values) / len(values) if values else 0.0
 
 
-@trial("a chip that loses its settings under the running service (a brown-out: another range, no filter) is started "
-       "anew within seconds, status says so, and no row holds figures made of its wrong readings")
+@trial("a chip that loses its settings under the running service (a brown-out: another range, no filter) is restarted "
+       "within seconds, status says so, and no row holds figures made of its wrong readings")
 def chip_loses_its_settings(bench: Bench, report: Report) -> None:
     """Registers poked under the service; the readings are 8 times too small until they are restored."""
     report.times = 2 if bench.quick else 5
@@ -65,7 +65,7 @@ def chip_loses_its_settings(bench: Bench, report: Report) -> None:
         later = [row for row in found if before_s <= float(row["t_s"]) < after_s]
         # the drive's roughness changes by a factor of some two; the wrong readings are 8 times too small
         wrong = [value for value in figures(later) if value < mean(good) / 4]
-        report.check("started anew", restored == report.times, f"{restored} of {report.times}, after "
+        report.check("restarted", restored == report.times, f"{restored} of {report.times}, after "
                      f"{', '.join(f'{s:.1f}' for s in took_s)} s (a look each 0.2 s from the host)")
         report.check(f"within {BROWNOUT_LIMIT_S:.0f} s", bool(took_s) and max(took_s) < BROWNOUT_LIMIT_S)
         report.check("rows with figures made of wrong readings", not wrong,
@@ -77,7 +77,8 @@ def chip_loses_its_settings(bench: Bench, report: Report) -> None:
                      f"status: {said[:200]}; journal: {journal[-200:]}; counters {status['accelerometer']['counters']}")
 
 
-@trial("a chip whose bus comes after the service is found by itself; one that gives the same reading for ever is told")
+@trial("a chip whose bus comes after the service is found by itself; one that gives the same reading for ever is "
+       "reported")
 def chip_late_and_frozen(bench: Bench, report: Report) -> None:
     """The bus's module is loaded when the service runs; then its readings stop changing."""
     with bench.car("chip-late", chip="late") as car:
@@ -93,7 +94,7 @@ def chip_late_and_frozen(bench: Bench, report: Report) -> None:
         car.guest.must("pkill -STOP -f in_guest/chip.py")
         began_s = time.monotonic()
         car.wait_for("the frozen sensor", "ridelog status | grep -iE 'doubtful|frozen'", 150, 2)
-        report.check("frozen readings are told after [s]", True, f"{time.monotonic() - began_s:.0f}")
+        report.check("frozen readings are reported after [s]", True, f"{time.monotonic() - began_s:.0f}")
         time.sleep(15)
         last = rows(car)[-3:]
         report.check("rows are flagged and hold no figures", all("frozen" in row["flags"] and not row["a_w_mps2"]

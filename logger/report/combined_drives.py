@@ -1,4 +1,4 @@
-"""Drives of logs laid over each other: means of cells of the road, what changed, and places to visit."""
+"""Repeated drives of logs, combined: means of cells of the road, what changed, and places to visit."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.report.placed_rows import column, placed, trace_of
 from logger.report.summary import counts
+from logger.roads.laid_traces import lay
 from logger.roads.places_to_visit import Place, places_to_visit
 from logger.roads.repeated_drives import (
     Changes,
@@ -25,14 +26,13 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
 from logger.store.log.log_reader import split_drives
 from logger.units import US_PER_S
 
 
 @dataclass(frozen=True, eq=False)
-class LaidDrives:
+class CombinedDrives:
     """What the drives of some logs say together, in cells (k,) by way and measure.
 
     drives, windows       how many there are, and ``placed`` windows of a known place
@@ -66,9 +66,9 @@ class LaidDrives:
     visits: tuple[Place, ...]
 
 
-def laid_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km: float,
-                split_s: float | None = None) -> LaidDrives:
-    """Lay the drives of rows over each other.
+def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km: float,
+                split_s: float | None = None) -> CombinedDrives:
+    """Combine the drives of rows by place and direction.
 
     length_m          of a cell
     above_m_per_km    from which IRI a place is rough
@@ -101,7 +101,7 @@ def laid_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km
     speed = means(driven, scatter_of(driven))
     place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(std), 0.0, np.nan), cells, mean)
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
-    return LaidDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std,
+    return CombinedDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std,
                       _at(mean.key, speed.key, speed.iri_m_per_km), *place,
                       None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter), visits)
 
@@ -137,7 +137,7 @@ def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord
             np.degrees(np.arctan2(point[:, 1], point[:, 0])), heading)
 
 
-def chains(found: LaidDrives) -> list[np.ndarray]:
+def chains(found: CombinedDrives) -> list[np.ndarray]:
     """Numbers of cells that follow each other on one way."""
     if not len(found.iri.key):
         return []

@@ -1,0 +1,42 @@
+"""Places that several drives passed, beside means done by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from logger.report.places_passed import places_passed
+
+from ..support.drives.logged_rows import repeated_drives
+
+
+@pytest.mark.parametrize("lat_deg, lon_deg", [(46.5, 6.5), (-33.9, 151.2), (-17.0, 179.9985)])
+def test_windows_of_drives_over_one_street_share_their_places(lat_deg: float, lon_deg: float) -> None:
+    rows = repeated_drives(2, 40, (2.0, 2.0), lat_deg, lon_deg)
+    found = places_passed([rows[:40], rows[40:]])
+    assert found is not None
+    inside = found.place[2:38].astype(int)
+    assert (found.drives[inside] == 2).all()
+    np.testing.assert_array_equal(found.place[2:38], found.place[42:78])
+    np.testing.assert_allclose(found.iri_m_per_km[inside], 2.0)
+    # Two equal passes whose errors say more than they scatter: the mean of two of 0.2.
+    np.testing.assert_allclose(found.iri_std_m_per_km[inside], 0.2 / 2**0.5, rtol=0.05)
+
+
+def test_one_drive_has_no_places_in_common() -> None:
+    rows = repeated_drives(1, 20, (2.0,))
+    assert places_passed([rows]) is None
+    there, apart = rows, repeated_drives(1, 20, (2.0,), lat_deg=47.0)
+    found = places_passed([there, apart])
+    assert found is not None
+    assert np.isnan(found.place).all()
+
+
+def test_rows_without_an_iri_and_empty_drives_are_borne() -> None:
+    rows = repeated_drives(2, 10, (2.0, 3.0))
+    for one in rows:
+        object.__setattr__(one, "iri_m_per_km", None)
+    found = places_passed([rows[:10], rows[10:], []])
+    assert found is not None
+    assert np.isnan(found.place).all()
+    assert not len(found.iri_m_per_km)
