@@ -1,4 +1,4 @@
-"""The lab's whole loop: compare, diagnose, add what is missing, compare again."""
+"""The lab's whole loop: compare, diagnose, learn a law where no effect explains it, add what is missing, compare."""
 
 from __future__ import annotations
 
@@ -30,21 +30,24 @@ from logger.store.formats import vehicle_file as vehicle_format
 
 if TYPE_CHECKING:
     from logger.lab import compare, diagnosis
-    from logger.lab.session import Round, Story
+    from logger.lab.selection.add_effect import AddedEffects
+    from logger.lab.session import Round, SoughtLaw, Story
     from logger.report.html import Html
     from logger.vehicle.effect import Chosen
 
-STORY = "story.html"
+STORY, LAW = "story.html", "law.py"
 MOST_ROUNDS = 6
 _SHOWN = 5
 
 Say = Callable[[Iterable[str]], None]
 Ask = Callable[[Bench, str], str | None]
 """Which effect to add where one was found missing: its name or another's, or None for none."""
+Learns = Callable[[], bool]
+"""Whether a law is to be learned where no effect explains what is missing."""
 Progress = Callable[[], AbstractContextManager[Tell]]
 Explain = Callable[[str, str, str], str]
-"""What to say under a heading, laid out: of compare, diagnose, add, again or end; with the effect that is added, and
-the vehicle file that is read, or written where an effect is added."""
+"""What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
+added, and the vehicle file that is read, or written where an effect is added; of learn the law's file."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,6 +59,7 @@ class LabStory(CommandResult):
     diagnoses            at least one
     additions            effects that were added, in order, and ``comparisons`` with them
     refused              effects that were found missing and not wanted
+    law                  file of the law that was learned; None: none was
     error_before         of the model as it was given; ``error_after`` of the last one, refitted
     noise_floor_error    that the sensor's noise alone makes
     steps                models on the way, each with its error on all samples
@@ -68,6 +72,7 @@ class LabStory(CommandResult):
     additions: tuple[AddedEffect, ...]
     comparisons: tuple[Comparison, ...]
     refused: tuple[str, ...]
+    law: Path | None
     error_before: float
     error_after: float
     noise_floor_error: float
@@ -85,15 +90,18 @@ def lab(
     vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
     tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
-    anyway: bool = False,
+    anyway: bool = False, learns: bool = True,
 ) -> LabStory:
-    """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is, six effects at
-    most. It takes minutes, and the compiler of the ``lab`` extra.
+    """The lab's whole loop: compare, diagnose, learn a law where no effect explains what is missing, add what is
+    missing, compare again, until nothing is, six effects at most. It takes minutes, and the compiler of the ``lab``
+    extra.
 
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
-    out             folder for a vehicle file of each step (``vehicle-1.yaml``) and the page ``story.html``
+    out             folder for a vehicle file of each step (``vehicle-1.yaml``), the page ``story.html``, and ``law.py``
+                    where a law is learned
     ask             given the name of an effect that was found missing, gives that of the one to be added, or None for
                     none; without it all that is missing is added
+    learns          whether a law is learned at all
     candidates, effect_files, progress    as in ``diagnose``
 
     Raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer that is no
@@ -112,15 +120,16 @@ def lab(
                        low_pass_hz=low_pass_hz, anyway=anyway)
     bench = replace(bench, effects=among(bench.effects, candidates))
     make_ready(bench, place)
-    story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress))
+    story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress), learns=lambda: learns)
     rows = [(words, f"{error:.3f}") for words, error in steps(story)]
     summary = as_json(story) | {"story": str(place / STORY)}
     return LabStory(
         "\n".join([*columns([("Model", "Error"), *rows]), "", paragraphs(ending(story))]), summary, model_of(model),
         comparison_of(story.first), tuple(map(diagnosis_of, story.diagnoses)),
         tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
-        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused, summary["error_before"],
-        summary["error_after"], summary["noise_floor_error"], tuple(steps(story)), place / STORY)
+        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused,
+        Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
+        summary["noise_floor_error"], tuple(steps(story)), place / STORY)
 
 
 def _asking(ask: Callable[[str], str | None]) -> Ask:
@@ -146,7 +155,7 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise BadInput(f"{option} {out}: expected a folder".lstrip()) from None
-    for file in (out / STORY, *(_vehicle_file(out, number + 1) for number in range(MOST_ROUNDS))):
+    for file in (out / STORY, out / LAW, *(_vehicle_file(out, number + 1) for number in range(MOST_ROUNDS))):
         check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
 
 
@@ -155,10 +164,16 @@ def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
     return ""
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain = unexplained
-         ) -> tuple[Story, vehicle_format.Model]:
+def always() -> bool:
+    """A law is to be learned."""
+    return True
+
+
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain = unexplained,
+         learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
     """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
 
+    learns      asked once, where no effect explains what is missing
     tell        called with what was found
     progress    context around what takes long, called with what is under way
     explain     what to say of each step in addition to what it finds
@@ -166,18 +181,18 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, expla
     from logger.report.session_text import ending
     from logger.report.story_page import page
 
-    story, model = go_through(given, out, ask, tell, progress, explain)
+    story, model = go_through(given, out, ask, tell, progress, explain, learns)
     write_text(out / STORY, page(story))
     tell(chapter("The end", explain("end", "", "")))
     tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
     return story, model
 
 
-def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain
-               ) -> tuple[Story, vehicle_format.Model]:
+def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain,
+               learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
     """The same without its end and its page."""
     from logger.lab.session import Story
-    from logger.report.lab_text import addition_lines, diagnosis_lines
+    from logger.report.lab_text import diagnosis_lines
 
     word = given.word
     tell(chapter("Compare", explain("compare", "", word)))
@@ -186,45 +201,93 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
     diagnoses: list[diagnosis.Diagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
-    going = True
+    law: SoughtLaw | None = None
+    step = _Step(given, out, tell, progress, explain)
+    going = asked = True
     while going and len(rounds) < MOST_ROUNDS:
         going = False
         tell(chapter("Diagnose", explain("diagnose", "", word)))
-        diagnoses.append(_diagnosed(given, frozenset(refused), progress))
+        diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
         tell(diagnosis_lines(diagnoses[-1], _SHOWN))
+        if diagnoses[-1].left_over and asked:
+            asked = False
+            if learns():
+                step, law, made = step.learned()
+                rounds += made
+                if made:
+                    word, going = made[-1].file, True
+                    continue
         for one in diagnoses[-1].missing:
             if len(rounds) == MOST_ROUNDS:
                 break
-            wanted = ask(given, one.effect.name)
+            wanted = ask(step.given, one.effect.name)
             if wanted is None:
                 refused.append(one.effect.name)
                 continue
-            file = _vehicle_file(out, len(rounds) + 1)
-            tell(chapter(f"Add {wanted}", explain("add", wanted, str(file))))
             same = wanted == one.effect.name
-            start = one if same else _searched(given, wanted, progress)
-            made, model = _round(given, start, file, progress)
-            rounds.append(made)
-            word = str(file)
-            tell([*addition_lines(rounds[-1].addition), "", f"Vehicle: {rounds[-1].file}"])
-            tell(chapter("Compare again", explain("again", wanted, word)))
-            tell(_comparison_lines(rounds[-1].comparison))
-            given = replace(given, model=model)
+            step, made_now = step.added(wanted, one if same else None, len(rounds) + 1)
+            rounds.append(made_now)
+            word = made_now.file
             if not same:  # with another effect, what is missing is searched again
                 going = True
                 break
-    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused)), given.model
+    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused), law), step.given.model
 
 
-def _round(given: Bench, start: Chosen, file: Path, progress: Progress) -> tuple[Round, vehicle_format.Model]:
-    """Add an effect, write the vehicle and compare it; the model with it."""
-    from logger.lab.session import Round
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Where the loop stands: the bench, and how what is done is reported."""
 
-    with progress() as tell:
-        addition = given.added(start, len(start.effect.trials()), tell)
-    model = given.model_with(addition)
-    vehicle_format.write_model(file, model)
-    return Round(addition, _compared(replace(given, model=model), progress), str(file)), model
+    given: Bench
+    out: Path
+    tell: Say
+    progress: Progress
+    explain: Explain
+
+    def added(self, name: str, start: Chosen | None, number: int) -> tuple[_Step, Round]:
+        """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
+        file = _vehicle_file(self.out, number)
+        self.tell(chapter(f"Add {name}", self.explain("add", name, str(file))))
+        begin = start or _searched(self.given, name, self.progress)
+        with self.progress() as tell:
+            addition = self.given.added(begin, len(begin.effect.trials()), tell)
+        return self._with(addition, name, file)
+
+    def learned(self) -> tuple[_Step, SoughtLaw, list[Round]]:
+        """A law learned, written and added, with what is missing beside it; or none."""
+        from logger.api.learning import learned, picture_of, with_law
+        from logger.lab.session import SoughtLaw
+        from logger.report.law_text import law_lines, source_of
+
+        file = self.out / LAW
+        self.tell(chapter("Learn a law", self.explain("learn", "", str(file))))
+        with self.progress() as tell:
+            found = learned(self.given, tell)
+        self.tell(law_lines(found.learning, found.addition))
+        if found.addition is None:
+            return self, SoughtLaw(found.learning, None, None, ""), []
+        write_text(file, source_of(found.learning, found.addition))
+        self.tell(["", f"Law: {file}"])
+        knows, addition = with_law(self.given, found.addition, file)
+        name = " and ".join(addition.names)
+        vehicle = _vehicle_file(self.out, 1)
+        self.tell(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
+        step, made = replace(self, given=knows)._with(addition, name, vehicle)
+        return step, SoughtLaw(found.learning, found.addition, picture_of(found), str(file)), [made]
+
+    def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
+        """The vehicle with what was added written and compared."""
+        from logger.lab.session import Round
+        from logger.report.lab_text import addition_lines
+
+        model = self.given.model_with(addition)
+        vehicle_format.write_model(file, model)
+        self.tell([*addition_lines(addition), "", f"Vehicle: {file}"])
+        self.tell(chapter("Compare again", self.explain("again", name, str(file))))
+        given = replace(self.given, model=model)
+        made = Round(addition, _compared(given, self.progress), str(file))
+        self.tell(_comparison_lines(made.comparison))
+        return replace(self, given=given), made
 
 
 def _vehicle_file(out: Path, number: int) -> Path:

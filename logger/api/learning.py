@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
 
 if TYPE_CHECKING:
-    from logger.chart_data import Chart
+    from logger.chart_data import Chart, Curves
     from logger.lab.laws.draft import Draft
     from logger.lab.laws.learn import Learning
     from logger.lab.selection.add_effect import AddedEffects
@@ -125,7 +125,15 @@ def learned(bench: Bench, tell: Tell = unsaid) -> LearnedModel:
                                        len(found.law.draft.effect.trials())))
 
 
-def picture_of(found: LearnedModel) -> Chart | None:
+def with_law(given: Bench, addition: AddedEffects, law: Path) -> tuple[Bench, AddedEffects]:
+    """A bench that knows the law of a file, and what was added with the effect of that file in it."""
+    effect, file = given.asked_for(str(law), {}, str(law))
+    effects = tuple(replace(one, effect=effect, file=file) if one.effect.name == effect.name else one
+                    for one in addition.effects)
+    return given.with_effect(effect, file), replace(addition, effects=effects)
+
+
+def picture_of(found: LearnedModel) -> Curves | None:
     """The law over the motions that the runs had; None where there is none, or it is no force."""
     from logger.lab.laws.picture import picture
 

@@ -3,7 +3,8 @@
   ridelog lab --vehicle mycar.yaml run1 run2
   ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
 
-Before an effect is added it asks: yes, no, or the name of another one. DIR gets a vehicle file for each step and
+Before an effect is added it asks: yes, no, or the name of another one. Where no effect explains what is missing it
+offers to learn a law out of the data, as ridelog learn does. DIR gets a vehicle file for each step, the law, and
 story.html, the page of all of it.
 """
 
@@ -22,7 +23,7 @@ from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
-    from logger.api.lab_loop import Ask, Explain, Say
+    from logger.api.lab_loop import Ask, Explain, Learns, Say
     from logger.lab.session import Story
 
 
@@ -31,29 +32,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bench_arguments(parser)
     parser.add_argument("--out", type=Path, default=Path("ridelog-lab"), metavar="DIR",
                         help="folder for the vehicle files and the page (default: ridelog-lab)")
-    parser.add_argument("--yes", action="store_true", help="add what is found missing without asking")
+    parser.add_argument("--yes", action="store_true",
+                        help="without asking, add what is found missing, and learn a law where no effect explains it")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
-    from logger.api.lab_loop import STORY, unsaid_lines
+    from logger.api.lab_loop import STORY, always, unsaid_lines
     from logger.report.session_text import as_json
 
     given = bench(args, searches="ridelog lab")
     asks = not (args.yes or args.json) and sys.stdin.isatty()
     ask = _asked if asks else take if args.yes or args.json else _taking()
-    story = walk(given, args.out, ask, unsaid_lines if args.json else say)
+    story = walk(given, args.out, ask, unsaid_lines if args.json else say, learns=_wants_a_law if asks else always)
     if args.json:
         print(json.dumps(as_json(story) | {"story": str(args.out / STORY)}, allow_nan=False))
     return EXIT_DONE
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, explain: Explain | None = None) -> Story:
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, explain: Explain | None = None,
+         learns: Learns | None = None) -> Story:
     """Go through the loop, as ``lab_loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
     from logger.api import lab_loop
 
     lab_loop.make_ready(given, out, "--out")
-    return lab_loop.walk(given, out, ask, tell, progress, explain or lab_loop.unexplained)[0]
+    return lab_loop.walk(given, out, ask, tell, progress, explain or lab_loop.unexplained,
+                         learns or lab_loop.always)[0]
 
 
 # --- at the terminal ---
@@ -97,6 +101,19 @@ def _asked(given: Bench, name: str) -> str | None:
             return asked_for(answer, given)[0].name
         except BadInput as error:
             print(error)
+
+
+def _wants_a_law() -> bool:
+    """What the user says."""
+    while True:
+        try:
+            answer = input("\nNo known effect explains it all. Learn a law out of the data, which takes minutes? "
+                           "yes or no: ").strip().lower()
+        except EOFError:
+            return False
+        if answer in ("", "y", "yes", "n", "no"):
+            return answer not in ("n", "no")
+        print("Expected yes or no.")
 
 
 def say(lines: Iterable[str]) -> None:

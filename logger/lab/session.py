@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from logger.chart_data import Curves
 from logger.lab.compare import Comparison
 from logger.lab.diagnosis import Diagnosis
+from logger.lab.laws.learn import Learning
 from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
 
 
@@ -19,18 +21,34 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
+class SoughtLaw:
+    """A law that was looked for where no effect explained what is missing.
+
+    addition    the model with it, and its picture; None: none was learned, or it is no force that a picture shows
+    file        that was written; empty: none
+    """
+
+    learning: Learning
+    addition: AddedEffects | None
+    picture: Curves | None
+    file: str
+
+
+@dataclass(frozen=True, eq=False)
 class Story:
     """What was done, in order.
 
     first       of the vehicle as it was given
     diagnoses   at least one
     refused     effects that a diagnosis found missing and the user did not want
+    law         None: none was looked for
     """
 
     first: Comparison
     diagnoses: tuple[Diagnosis, ...]
     rounds: tuple[Round, ...]
     refused: tuple[str, ...]
+    law: SoughtLaw | None = None
 
     @property
     def last(self) -> Comparison:

@@ -53,10 +53,11 @@ class Stance(Protocol):
 @dataclass(frozen=True, eq=False)
 class Way:
     """The way of a car in fine steps of time, (M,) each: where the front tires stand [m], and when, from the first
-    sample of the record on [s]."""
+    sample of the record on [s]; and which one it is of the runs that are looked at together, from 0 on."""
 
     distance_m: Array
     time_s: Array
+    run: int = 0
 
 
 class WheelTracks(Protocol):

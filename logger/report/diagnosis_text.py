@@ -11,19 +11,24 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
 from logger.report.band_text import band_json
-from logger.report.quantities import chance, finite, numbers_of, signal_errors
+from logger.report.quantities import chance, finite, numbers_of, percent, signal_errors
 from logger.report.removed_text import removed_json, removed_words
+from logger.report.text_layout import enumerated
 from logger.vehicle.effect import Chosen
 
 JUDGED_ON = "stretches that no fit saw"
 """What the errors of steps and candidates are errors of."""
 _MOST_HIDDEN = 6
+_SUSPECT = 0.1
+"""An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
 
 
 def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     removed = removed_words(found.removed, found.band)
-    lines = [*removed, *(_missing(found, one) for one in found.missing)]
+    lines = list(removed)
+    for one, group in zip(found.missing, groups(found), strict=True):
+        lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting or found.removed.distance_error_m > 0)
         lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
@@ -41,7 +46,7 @@ def summary(found: Diagnosis) -> list[str]:
     lines.append(_errors(found))
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
-    lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
+    lines += _faint(found)
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
         lines.append(f"Added during the search and dropped again, because the others explain it: {', '.join(dropped)}.")
@@ -65,14 +70,32 @@ def untested(found: Diagnosis) -> list[str]:
     return lines
 
 
+def groups(found: Diagnosis) -> list[list[str]]:
+    """Each effect of the verdict with those that explain as well in its place, the likeliest first."""
+    return [[name, *found.candidate(name).confused_with] for name in found.verdict]
+
+
 def _missing(found: Diagnosis, one: Chosen) -> str:
-    numbers = f": {numbers_of(one)}" if one.values else ""
-    candidate = found.candidate(one.effect.name)
-    says = "is missing"
-    if found.unexplained:
-        says = "would explain part of what is missing, or imitates something else"
-    return (f"{one.effect.name} {says} ({one.effect.title}){numbers}. "
-            f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}.")
+    name, numbers = one.effect.name, f": {numbers_of(one)}" if one.values else ""
+    candidate = found.candidate(name)
+    likely = f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}."
+    says = "would explain part of what is missing, or imitates something else" if found.unexplained else "is missing"
+    if candidate.confused_with:
+        group = enumerated([name, *candidate.confused_with], "or")
+        return (f"One of {group} {says}; these runs cannot distinguish them. The numbers are for {name} "
+                f"({one.effect.title}){numbers}. {likely}")
+    return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
+
+
+def _faint(found: Diagnosis) -> list[str]:
+    """What comes nearest to being named, where it is likelier than not to be more than noise."""
+    others = [one for one in found.candidates if one.effect.name not in found.verdict]
+    nearest = min(others, key=lambda one: one.p_value, default=None)
+    if found.unexplained or nearest is None or not FALSE_ALARM <= nearest.p_value < _SUSPECT:
+        return []
+    return [f"{nearest.effect.name} comes near to being named: noise alone would look like it in "
+            f"{percent(nearest.p_value)} of such searches, and {percent(FALSE_ALARM)} is the most that is allowed. To "
+            f"know: {nearest.effect.shown_by}."]
 
 
 def _errors(found: Diagnosis) -> str:
@@ -87,12 +110,11 @@ _STEP_WORDS = {
 }
 
 
-def _confusion(found: Diagnosis, one: Chosen) -> str:
-    """What explains as well, and which drive would separate them."""
-    others = found.candidate(one.effect.name).confused_with
-    drives = [f"{name}: {found.catalogue[name].shown_by}" for name in (one.effect.name, *others)]
-    return (f"These runs cannot distinguish {one.effect.name} from {' or '.join(others)}: each explains about as much "
-            f"of the residual. Drives that would: {'; '.join(drives)}.")
+def _confusion(names: list[str], found: Diagnosis) -> str:
+    """Which drive would separate effects that explain alike."""
+    drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
+    return (f"{enumerated(names, 'and')} explain about as much of the residual as each other. Drives that would "
+            f"separate them: {'; '.join(drives)}. ridelog plan says beforehand whether a drive would.")
 
 
 def _on_the_way(found: Diagnosis) -> list[str]:
@@ -122,7 +144,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
              "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),
              "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
             for one in found.candidates],
-        "verdict": list(found.verdict), "unexplained": found.unexplained,
+        "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},

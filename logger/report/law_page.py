@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from logger.chart_data import Chart
-from logger.lab.laws.learn import Learning
+from logger.lab.laws.learn import Law, Learning
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.charts import chart
 from logger.report.diagnosis_page import falling, shape_sections
@@ -26,18 +26,24 @@ def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, ve
         return document(title, [
             heading(title, runs), _tiles(summary), paragraphs(law_lines(found, addition)),
             shape_sections(found.diagnosis)])
-    one = learned(law, addition)
-    numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
-               for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
-    picture = EMPTY if drawn is None else section(
-        "The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY))
     return document(title, [
-        heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)), picture,
-        section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3))),
+        heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)),
+        *law_sections(law, addition, drawn),
         section("How the error fell", falling("Error on all samples", steps_of(law, addition),
                                               addition.noise_floor_error)),
         section("Where it is", paragraphs([f"{file}: an effect of your own, which compare, simulate, add-effect and "
                                            "diagnose --effect-file take.", law.draft.source]))])
+
+
+def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[Html]:
+    """A law's picture, if it has one, and its numbers."""
+    one = learned(law, addition)
+    numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
+               for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
+    table = section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3)))
+    if drawn is None:
+        return [table]
+    return [section("The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY)), table]
 
 
 def _tiles(summary: dict[str, object]) -> Html:

@@ -70,7 +70,7 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     if law.beside:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
-                     + ". Add these to the vehicle first.")
+                     + ". The law was fitted with these: they belong in the vehicle as well.")
     share = max(law.listed, 0.0) / law.with_law
     lines.append(f"The known effects alone explain {share:.0%} of what the model with the law does (2 ln of the "
                  f"evidence {law.listed:.0f} of {law.with_law:.0f}).")

@@ -7,7 +7,7 @@ from typing import Any
 
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.report.quantities import chance, finite, numbers_of
-from logger.report.text_layout import columns, paragraphs
+from logger.report.text_layout import columns, enumerated, paragraphs
 
 
 def summary(found: UnknownRoadDiagnosis) -> list[str]:
@@ -19,8 +19,8 @@ def summary(found: UnknownRoadDiagnosis) -> list[str]:
         lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
                      f"looks like this, all candidates together: {chance(candidate.p_value)}.")
         if candidate.confused_with:
-            lines.append(f"These drives cannot distinguish {one.effect.name} from "
-                         f"{' or '.join(candidate.confused_with)}.")
+            names = enumerated([one.effect.name, *candidate.confused_with], "and")
+            lines.append(f"{names} explain about as much as each other: these drives cannot distinguish them.")
     if not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"

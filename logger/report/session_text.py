@@ -34,8 +34,12 @@ def ending(story: Story) -> list[str]:
         return [*lines, *with_what]
     if diagnosis.conflicts and not diagnosis.left_over:
         lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
+    elif diagnosis.unexplained and story.law is None:
+        lines.append("Something is missing still that no effect explains: ridelog learn may find a law, or an effect "
+                     "of your own may do it.")
     elif diagnosis.unexplained:
-        lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
+        lines.append("Something is missing still that no effect and no law out of the data explains: an effect of your "
+                     "own may do it.")
     else:
         lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
     return [*lines, *with_what]
@@ -51,5 +55,6 @@ def as_json(story: Story) -> dict[str, Any]:
         "steps": [{"step": words, "error": error} for words, error in models],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],
-        "vehicles": [one.file for one in story.rounds], "sentences": ending(story),
+        "vehicles": [one.file for one in story.rounds], "law": story.law.file or None if story.law else None,
+        "sentences": ending(story),
     }

@@ -14,6 +14,8 @@ from logger.report.diagnosis_page import falling, shape_sections
 from logger.report.diagnosis_text import summary, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
+from logger.report.law_page import law_sections
+from logger.report.law_text import sentences, why_none
 from logger.report.session_text import ending, steps
 from logger.report.worst_moment import worst_moment
 
@@ -33,7 +35,7 @@ def page(story: Story) -> Html:
         _tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
         section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
         section("What was missing", concatenated(paragraphs(summary(one)) for one in story.diagnoses)),
-        *map(_added, story.rounds),
+        *_law(story), *map(_added, story.rounds),
         section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
         section("What the car's numbers had been taken for", _moved(story)),
         section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))) if story.rounds else "",
@@ -57,6 +59,19 @@ def _steps(story: Story) -> Html:
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
     return (falling("Error of each model, on all samples", steps(story), story.floor)
             + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + hint(STEPS_HINT))
+
+
+def _law(story: Story) -> list[Html]:
+    """The law that was looked for; nothing where none was."""
+    sought = story.law
+    if sought is None:
+        return []
+    if sought.learning.law is None or sought.addition is None:
+        said = why_none(sought.learning)
+        return [section("A law out of the data", paragraphs([f"{said[0].upper()}{said[1:]}."]))]
+    return [section("A law out of the data", paragraphs(
+        [*sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."])),
+        *law_sections(sought.learning.law, sought.addition, sought.picture)]
 
 
 def _added(one: Round) -> Html:

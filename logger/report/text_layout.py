@@ -18,3 +18,8 @@ def columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows of words as columns, the last one as wide as it is."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def enumerated(names: Sequence[str], last: str) -> str:
+    """Names in a row, with a word before the last: "a, b or c"."""
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -86,7 +86,7 @@ class SimulatedRuns:
             key = fine_hz, distance.tobytes(), track
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(track, run.rate_hz, distance, fine_hz)
+                passage = Passage(track, run.rate_hz, distance, fine_hz, index)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)

@@ -91,7 +91,8 @@ class Car:
         for one in self.records:
             assert isinstance(one.effect, RecordEffect)
             accel_z_mps2 = one.effect.record(
-                one.p, Recording(passage.time_s, passage.distance_m, passage.speed_mps, accel_z_mps2))
+                one.p, Recording(passage.time_s, passage.distance_m, passage.speed_mps, accel_z_mps2,
+                                 passage.way.run))
         return accel_z_mps2
 
 

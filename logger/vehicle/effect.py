@@ -277,12 +277,14 @@ class Recording:
     distance_m      (n,) where the front tires truly stood [m]; on a rig 0
     speed_mps       (n,) how fast that changes [m/s]; on a rig 0
     accel_z_mps2    (n,) what the record would be without the effect [m/s2]
+    run             which one it is of the runs that are looked at together, from 0 on
     """
 
     time_s: Array
     distance_m: Array
     speed_mps: Array
     accel_z_mps2: Array
+    run: int = 0
 
 
 class RecordEffect(Effect):

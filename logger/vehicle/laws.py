@@ -43,6 +43,7 @@ class Seen(NamedTuple):
     distance_m                      where this wheel stands along the road
     time_s                          since the record's first sample
     speed_mps                       of the car along the road
+    run                             which one it is of the runs that are looked at together, from 0 on
     memory                          the law's own states
     """
 
@@ -55,6 +56,7 @@ class Seen(NamedTuple):
     distance_m: Any
     time_s: Any
     speed_mps: Any
+    run: Any
     memory: tuple[Any, ...]
 
 

@@ -265,14 +265,14 @@ _DRAWN = 2048  # motions that such a law is asked at, half of them the others tu
 # Means are moved by so much of a deviation to see their slope: far enough for a law that jumps. A law is smoothed by
 # it as by a motion whose variance is 1 / 50 larger.
 _SLOPE_OVER, _LEAST_STEP = 0.25, 1e-9
-_ELSEWHERE = (123.4, 56.7, 8.9)  # m, s, m/s
+_ELSEWHERE = (123.4, 56.7, 8.9, 1.0)  # m, s, m/s, run
 
 
 def _check_steady(law: MotionLaw) -> None:
     """ValueError for a law that is another one at another place or time."""
     motions, memory = 0.1 * _normals(MOTIONS + 1).T, tuple(np.full(_DRAWN, one) for one in law.memory)
     for asked in (one for one in (law.force, law.rates) if one is not None):
-        here, there = (asked(law.p, Seen._make([*motions, *at, memory])) for at in ((0.0, 0.0, 0.0), _ELSEWHERE))
+        here, there = (asked(law.p, Seen._make([*motions, *at, memory])) for at in ((0.0,) * 4, _ELSEWHERE))
         if not np.array_equal(here, there):
             raise ValueError("a force that depends on the place or the time has no linear stand-in: expected effects "
                              "without one here")
@@ -302,7 +302,7 @@ def _linear_law(law: MotionLaw, old: LinearLaw, motions: npt.NDArray[np.complex1
 
 def _means(law: MotionLaw, at: Array) -> Array:
     """The mean force, and how fast the states grow on the average (1 + m,), at motions and states (_DRAWN, ...)."""
-    felt = Seen._make([*at[:, :MOTIONS].T, at[:, 1] + at[:, MOTIONS - 1], 0.0, 0.0, 0.0, tuple(at[:, MOTIONS:].T)])
+    felt = Seen._make([*at[:, :MOTIONS].T, at[:, 1] + at[:, MOTIONS - 1], *[0.0] * 4, tuple(at[:, MOTIONS:].T)])
     growing = () if law.rates is None else law.rates(law.p, felt)
     return np.array([np.mean(one) for one in (law.force(law.p, felt), *growing)])
 

@@ -41,11 +41,13 @@ class Passage:
     rate_hz       samples a second
     distance_m    (N,) where the front tires stand at each sample [m]; on a rig 0
     fine_hz       at least so many steps a second
+    run           which one it is of the runs that are looked at together, from 0 on
 
     ValueError unless there are two or more finite distances.
     """
 
-    def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ) -> None:
+    def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ,
+                 run: int = 0) -> None:
         if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
@@ -57,7 +59,7 @@ class Passage:
         way = np.concatenate([distance_m[0] + pace_m * np.arange(-self._lead, 0), distance_m,
                               distance_m[-1] + ahead_m * np.arange(1, self._tail + 1)])
         way_m = finer(way, self.steps)
-        self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - self._lead * self.steps) * self.step_s))
+        self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - self._lead * self.steps) * self.step_s), run)
         coarse = len(way) + round(_REST_S * rate_hz)
         self._coarse = smooth_length(coarse)
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse

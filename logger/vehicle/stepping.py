@@ -188,7 +188,7 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     places = way.distance_m[:, None] - structure.behind_m
     return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),
             np.array(memories, dtype=float), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places,
-            np.stack([way.time_s, np.gradient(way.distance_m, way.time_s)], axis=1))
+            np.stack([way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)], axis=1))
 
 
 def _tabulated(

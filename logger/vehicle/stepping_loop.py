@@ -207,7 +207,7 @@ def _feel(felt: Array, motion: Array, m: int, w: int, i: int, road: Array, place
     felt[0], felt[1] = motion[m + i], motion[m + w + i]
     felt[2], felt[3] = motion[m + 2 * w + i] - road[i], motion[m + 3 * w + i] - road[w + i]
     felt[4], felt[5] = motion[m + 3 * w + i], motion[m + w + i] + motion[m + 3 * w + i]
-    felt[6], felt[7], felt[8] = place, clock[0], clock[1]
+    felt[6], felt[7], felt[8], felt[9] = place, clock[0], clock[1], clock[2]
 
 
 @_compiled

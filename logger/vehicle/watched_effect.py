@@ -144,7 +144,7 @@ class _WatchedRecord(_Watched, RecordEffect):
     def record(self, p: SimpleNamespace, recording: Recording) -> Array:
         with self._blame(), np.errstate(all="ignore"):
             own = Recording(recording.time_s.copy(), recording.distance_m.copy(), recording.speed_mps.copy(),
-                            recording.accel_z_mps2.copy())
+                            recording.accel_z_mps2.copy(), recording.run)
             return _numbers("record", self._own.record(p, own), recording.accel_z_mps2)
 
 
@@ -217,8 +217,8 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
 
 
 # Motions that a law is tried at: up to what tables of other laws reach to, each as far as it usually goes, and rest.
-_TRIED = np.vstack([np.zeros(9), np.random.default_rng(1).uniform(-1, 1, (30, 9))]) * [
-    0.4, 8.0, 0.1, 8.0, 8.0, 8.0, 1000.0, 100.0, 40.0]
+_TRIED = np.vstack([np.zeros(10), np.random.default_rng(1).uniform(-1, 1, (30, 10))]) * [
+    0.4, 8.0, 0.1, 8.0, 8.0, 8.0, 1000.0, 100.0, 40.0, 0.0]
 
 
 def _check_motion(law: MotionLaw) -> None:

@@ -118,7 +118,7 @@ def test_an_effect_of_the_users_own_that_is_like_another(offset_runs: list[str],
     own.write_text(OWN, "utf-8")
     assert diagnose(*offset_runs, "--effect-file", str(own)) == 0
     reported = " ".join(capsys.readouterr().out.split())
-    assert "These runs cannot distinguish" in reported
+    assert "these runs cannot distinguish them" in reported
     assert "drive a smooth road" in reported  # what the file says would show it
     assert "5 effects are known" in reported
 

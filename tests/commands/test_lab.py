@@ -10,13 +10,17 @@ from html import escape
 from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_model
+from logger.vehicle.effect import ForceEffect, chosen
+from logger.vehicle.laws import CornerLaws
 
 from ..support.lab.runs_with_effects import FEW, named, write_runs
 
@@ -127,6 +131,34 @@ def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, c
     assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["sensor_gain",
                                                                                             "sensor_offset"]
     assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
+
+
+class Square(ForceEffect):
+    """A damper by the square of the rate: no effect of the few is like it."""
+
+    name = "square"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return laws.with_force(lambda travel_m, rate_mps: 2500.0 * rate_mps * np.abs(rate_mps))
+
+
+@pytest.mark.slow
+def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                                      answering: Callable[..., list[str]]) -> None:
+    runs = write_runs(tmp_path / "runs", [chosen(Square(), {})], lasts_s=16.0)
+    asked = answering("maybe", "no", *["no"] * 4)
+    assert lab(runs, tmp_path / "not") == 0
+    assert "Learn a law out of the data" in asked[0] and "Expected yes or no." in capsys.readouterr().out
+    assert not (tmp_path / "not" / "law.py").exists()
+    out = tmp_path / "out"
+    assert lab(runs, out, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["law"] == str(out / "law.py") and told["added"] == ["learned_force_by_rate"]
+    assert told["error_after"] < 1.1 * told["noise_floor_error"] and not told["unexplained"]
+    assert [one.effect.name for one in read_model(out / "vehicle-1.yaml").effects] == ["learned_force_by_rate"]
+    html = (out / "story.html").read_text("utf-8")
+    for words in ("A law out of the data", "The law", "power_ratio", "with learned_force_by_rate"):
+        assert words in html
 
 
 def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str], tmp_path: Path) -> None:

@@ -105,11 +105,23 @@ def test_distances_that_are_off_are_reported() -> None:
 
 def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them() -> None:
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
-    said = summary(replace(FOUND, candidates=(alike, *OTHERS)))[-1]
-    assert said.startswith("These runs cannot distinguish dry_friction from damper_blow_off or sensor_gain: each "
-                           "explains")
+    found = replace(FOUND, candidates=(alike, *OTHERS))
+    verdict, drives, *_ = summary(found)
+    assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
+                              "distinguish them. The numbers are for dry_friction (")
+    assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain about as much of the residual as ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
-        assert f"{name}: {EFFECTS[name].shown_by}" in said
+        assert f"{name}: {EFFECTS[name].shown_by}" in drives
+    assert as_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
+    assert as_json(FOUND)["groups"] == [["dry_friction"]] and as_json(NOTHING)["groups"] == []
+
+
+def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> None:
+    near = candidate("sensor_gain", 0.008, 15.6)
+    *_, said = summary(replace(NOTHING, candidates=(near, OTHERS[0])))
+    assert said == ("sensor_gain comes near to being named: noise alone would look like it in 0.8% of such searches, "
+                    f"and 0.1% is the most that is allowed. To know: {EFFECTS['sensor_gain'].shown_by}.")
+    assert not any("comes near" in one for one in (*summary(NOTHING), *summary(FOUND)))
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:

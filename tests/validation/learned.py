@@ -26,7 +26,7 @@ from pathlib import Path
 from .cases.kept_back import KeptBack, write_kept_back
 from .cases.random_case import case
 from .cases.seeds import add_seed_options, first_seed, seeds
-from .marking.families import PHASES_OF_THEIR_OWN, RIGHT, named
+from .marking.families import DRIFT, PHASES_OF_THEIR_OWN, REMOVED_DRIFT, RIGHT, named
 from .marking.marks import Goal, share
 from .marking.results import appended, read_results
 from .marking.sitting import NoAnswer, Question, Record, asked, fingerprint
@@ -118,7 +118,8 @@ def judged(given: KeptBack, said: Record) -> Record:
     """Errors on what was kept back: of the model before, and with the law where there is one, as it stands and with its
     numbers and distances refitted. What is said to be missing beside the law is added first."""
     before = compared(given.vehicle, given.kept)
-    found: Record = {"before": before["error"], "before_refitted": before["refitted"]["error"]}
+    found: Record = {"before": before["error"], "before_refitted": before["refitted"]["error"],
+                     "without_drift": before["error_without_drift"]}
     if said["family"] is None:
         return found
     vehicle = given.vehicle
@@ -144,9 +145,20 @@ def family(record: Record) -> str | None:
     return record["said"]["family"] if record["said"] else None
 
 
+def meaning(record: Record) -> str | None:
+    """The family of the law; where none was learned and a drifting sensor is what was hidden, the drift that was
+    said to be removed. None: nothing was said."""
+    if record["said"] and family(record) is None and RIGHT[record["kind"]].meanings == (DRIFT,):
+        return REMOVED_DRIFT if record["said"]["removed"]["drift"]["error_power_share"] > 0 else None
+    return family(record)
+
+
 def above(record: Record) -> float:
-    """The error on what was kept back over what the truth reaches there; infinite where no law was learned."""
+    """The error on what was kept back over what the truth reaches there; infinite where no law was learned, and no
+    drift was removed instead."""
     kept = record["kept"]
+    if kept and record["kind"] in RIGHT and meaning(record) == REMOVED_DRIFT:
+        return float(kept["without_drift"] / kept["floor"])
     if not kept or "after" not in kept:
         return float("inf")
     if record["kind"] in PHASES_OF_THEIR_OWN:
@@ -156,7 +168,7 @@ def above(record: Record) -> float:
 
 def right_family(record: Record) -> bool:
     """Whether the law is of a family that means what was hidden."""
-    return named(record["kind"], family(record))
+    return named(record["kind"], meaning(record))
 
 
 def prefers_the_list(record: Record) -> bool:
@@ -196,8 +208,8 @@ def reported(record: Record) -> str:
         return f"{head} -> NO ANSWER: {record['failed']}"
     kept, took = record["kept"], f"{record['learning']['wall_s']:.0f} s"
     if family(record) is None:
-        mark = "WRONG" if record["kind"] in RIGHT else "right"
-        return f"{head} -> {mark}: no law; {took}"
+        mark = "WRONG" if record["kind"] in RIGHT and not right_family(record) else "right"
+        return f"{head} -> {mark}: {record['said']['words']}; {took}"
     mark = "right" if record["kind"] in RIGHT and right_family(record) else "WRONG"
     return (f"{head} -> {mark}: {family(record)} ({record['said']['words']}); error {kept['before']:.3f}, with the "
             f"law {kept['after']:.3f}, refitted {kept['after_refitted']:.3f}; the truth {kept['attainable']:.3f}, the "

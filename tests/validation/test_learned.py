@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.plugins import catalogue
+
 from .cases import random_case as cases
 from .cases.kept_back import write_kept_back
 from .cases.random_case import case
 from .cases.seeds import DEVELOPMENT_SEEDS
-from .learned import KINDS, LISTED, NONE, above, goals, planned, reported
-from .marking.families import NAMES, PHASES_OF_THEIR_OWN, RIGHT, named
+from .learned import KINDS, LISTED, NONE, above, goals, planned, reported, right_family
+from .marking.families import NAMES, PHASES_OF_THEIR_OWN, REMOVED_DRIFT, RIGHT, named
 from .marking.sitting import Record
 from .simulator.newcomers import NEWCOMERS
 from .simulator.outsiders import OUTSIDERS
@@ -33,6 +35,20 @@ def test_every_effect_off_the_list_has_a_family_and_every_meaning_a_name() -> No
     assert RIGHT.keys() > PHASES_OF_THEIR_OWN
     for right in RIGHT.values():
         assert right.meanings and all(NAMES[meaning] for meaning in right.meanings)
+
+
+def test_every_family_has_a_meaning() -> None:
+    assert catalogue("logger.lab.laws.families", "FAMILY").keys() == set().union(*NAMES.values()) - {REMOVED_DRIFT}
+
+
+def test_a_sensor_that_drifts_is_said_and_needs_no_law() -> None:
+    record = answer("warming_sensor", None)
+    record["kept"]["without_drift"] = 0.0945
+    for share, right in ((0.4, True), (0.0, False)):
+        record["said"]["removed"] = {"drift": {"error_power_share": share}}
+        assert right_family(record) is right
+        assert above(record) == (pytest.approx(1.05) if right else float("inf"))
+    assert not right_family(answer("warming_sensor", "changing_gain"))
 
 
 def test_a_right_family_and_a_wrong_one() -> None:

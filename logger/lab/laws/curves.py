@@ -18,7 +18,9 @@ from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _STRONGEST = 100.0
 _SLOPE_STEP = 0.02
-_POINTS = (0.5, 0.9, 0.995)  # shares of the time within which a motion stays: where a free curve's points are
+_POINTS = {"curve": (0.5, 0.9, 0.995), "long_curve": (0.5, 0.9, 0.99, 0.999)}
+"""Shares of the time within which a motion stays: where free curves have their points. A spring that stiffens at the
+ends of its travel does most where it hardly ever is."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ class CurveFamily(Family):
         usual = reach(self.usual_share)
         size_n = self.usual_force_n(look, usual)
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
-                self._free([reach(share) for share in _POINTS], size_n)]
+                *(self._free(variant, [reach(share) for share in shares], size_n)
+                  for variant, shares in _POINTS.items())]
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
         motion = self.motion.at
@@ -109,7 +112,7 @@ def force_n(p, at):
                                 "exponent"))
         return self._draft("power", "grows with a power of", parameters, functions, reference)
 
-    def _free(self, knots: Sequence[float], size_n: float) -> Draft:
+    def _free(self, variant: str, knots: Sequence[float], size_n: float) -> Draft:
         """A force that follows a smooth curve through points on either side of rest."""
         places = sorted({sign * rounded(one) for one in knots for sign in (-1, 1)})
         names = {one: f"force_{number}_n" for number, one in enumerate(places, 1)}
@@ -119,12 +122,13 @@ AT = np.array([{', '.join(repr(one) for one in at)}])
 
 
 def force_n(p, at):
-    through = np.array([{', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
+    through = np.array([
+        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
     return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
 """
         parameters = tuple(_strength(name, size_n, f"at {one:g} {self.motion.unit}", (0.1,))
                            for one, name in names.items())
-        return self._draft("curve", "follows a curve of", parameters, functions, places[-1],
+        return self._draft(variant, "follows a curve of", parameters, functions, places[-1],
                            ("from scipy.interpolate import PchipInterpolator",))
 
     def _draft(self, variant: str, does: str, parameters: tuple[Parameter, ...], functions: str, reference: float,

@@ -10,9 +10,10 @@ their place only by decisive evidence.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,13 +43,15 @@ class Effort:
     listed                          how many known effects are sought first; all as usual where no law alone explains
                                     what is left
     worth_narrowing                 families of which one axle alone is tried
-    fitted, refined                 how many laws are fitted on a model, and how many of these with slopes of their own
+    fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with slopes of their
+                                    own
     worth_fitting, worth_refining   of what the best one promises, and gains
     """
 
     listed: int = 2
     worth_narrowing: int = 3
     fitted: int = 5
+    of_a_family: int = 3
     refined: int = 2
     worth_fitting: float = 0.2
     worth_refining: float = 0.5
@@ -172,13 +175,17 @@ def is_left_over(model: Baseline) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Chooser:
-    """The choice of a law, after the search among the known effects."""
+    """The choice of a law, after the search among the known effects.
+
+    kept    laws that were fitted, and beside which models
+    """
 
     search: Search
     selection: Selection
     families: Mapping[str, Family]
     known: Mapping[str, Effect]
     effort: Effort
+    kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
 
     def alone(self) -> Law | None:
         """A law that explains all that is missing by itself, better than the known effects do; None where none does, or
@@ -219,7 +226,15 @@ class _Chooser:
         return law, model
 
     def _fitted_beside(self, base: Baseline) -> list[LawFit]:
-        """Laws fitted on top of a model."""
+        """Laws fitted on top of a model, once."""
+        for known, fits in self.kept:
+            if known is base:
+                return fits
+        fits = self._fitted_anew(base)
+        self.kept.append((base, fits))
+        return fits
+
+    def _fitted_anew(self, base: Baseline) -> list[LawFit]:
         search, effort = self.search, self.effort
         look = Look(base.posterior, base.state)
         drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(look)]
@@ -231,7 +246,8 @@ class _Chooser:
             promised = sorted([*promised, *self._screened(pool, base, narrower)],
                               key=lambda each: -self._promise(base, each[2]))
             enough = effort.worth_fitting * max(self._promise(base, promised[0][2]), 0.0) if promised else 0.0
-            worth = [each for each in promised[: effort.fitted] if self._promise(base, each[2]) > enough]
+            worth = [each for each in _most_of_each(promised, effort.of_a_family)[: effort.fitted]
+                     if self._promise(base, each[2]) > enough]
             search.progress(f"fitting {len(worth)} laws")
             rough = list(pool.map(lambda each: roughly_fitted(base.score, base, each[2])[0], worth))
             found = sorted(zip(worth, rough, strict=True), key=lambda pair: -pair[1].gain)
@@ -290,6 +306,18 @@ def _firsts(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Fa
     for each in promised:
         found.setdefault(each[0].name, each)
     return list(found.values())
+
+
+def _most_of_each(promised: Sequence[tuple[Family, Draft, Screened]], most: int
+                  ) -> list[tuple[Family, Draft, Screened]]:
+    """At most so many laws of each family."""
+    counts: Counter[str] = Counter()
+    found = []
+    for each in promised:
+        counts[each[0].name] += 1
+        if counts[each[0].name] <= most:
+            found.append(each)
+    return found
 
 
 def _best_of_each(fits: Iterable[LawFit]) -> list[LawFit]:

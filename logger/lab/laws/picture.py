@@ -66,7 +66,7 @@ def _loops(draft: Draft, found: Chosen, look: Look) -> Curves | None:
         force = force + laws.dry_friction_n * np.sign(rate)
         for law in laws.motions:
             memory, step_s = np.array(law.memory, dtype=float), 1 / _LOOP_HZ / _LOOP_STEPS
-            still = np.zeros(6)
+            still = np.zeros(len(Seen._fields) - 3)
             for index, (x, v) in enumerate(zip(travel, rate, strict=True)):
                 seen = Seen._make([x, v, *still, tuple(memory)])
                 force[index] += law.force(law.p, seen)

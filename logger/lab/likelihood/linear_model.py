@@ -223,12 +223,15 @@ class LinearModel:
 
     def eliminated(self, predictions: Sequence[Array], laid: Sequence[Array] | None = None) -> Eliminated:
         """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
+        return self.absorbed(self.posterior.left_by(predictions), self.state.record if laid is None else laid)
+
+    def absorbed(self, residuals: Sequence[Array], laid: Sequence[Array]) -> Eliminated:
+        """The same of what predictions leave (n,), per run, that were laid out with record errors (k,)."""
         from scipy.linalg import cho_solve
 
         record, squares, whites, steps = [], 0.0, [], []
         for left, whitener, root, precision, one, here in zip(
-                self.posterior.left_by(predictions), self.whiteners, self._roots, self._precisions, self._records,
-                self.state.record if laid is None else laid, strict=True):
+                residuals, self.whiteners, self._roots, self._precisions, self._records, laid, strict=True):
             white = whitener(left)
             owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)

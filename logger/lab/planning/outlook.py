@@ -74,6 +74,12 @@ class Outlook:
     detectability: Array
     pairwise: Array
 
+    def standing_out(self, detectability: Array) -> Outlook:
+        """The same with effects that stand out by so much (e,) in truth; what remains of each beside another one is
+        less in the same proportion."""
+        share = detectability / np.maximum(self.detectability, _TINY)
+        return Outlook(detectability, self.pairwise * share[:, None])
+
     @property
     def isolability(self) -> Array:
         """(e,) how far each is distinguishable from the effect that is most like it."""
@@ -120,6 +126,14 @@ def outlook(settings: EffectGrid, information: Information, precision: Array, co
     pairwise = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
     found = np.sqrt(np.maximum(pairwise, 0.0))
     return Outlook(np.diag(found).copy(), found)
+
+
+def likeliest_sizes(information: Information, precision: Array, columns: Indices) -> tuple[Indices, Array]:
+    """Which of ``SIZES`` of the distance errors is the likeliest with each effect (e,), and what that costs (e,) [minus
+    twice a log-likelihood]; arguments as of ``outlook``."""
+    marginal, costs = _marginal(information, precision)
+    which = (np.einsum("sii->si", marginal)[:, columns] + costs[:, None]).argmin(axis=0)
+    return which, costs[which]
 
 
 def _marginal(information: Information, precision: Array) -> tuple[Array, Array]:

@@ -23,8 +23,17 @@ from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.noise_floor import noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
-from logger.lab.planning.outlook import ISOLABLE_SIGMA, EffectGrid, Outlook, outlook, representatives
-from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, information
+from logger.lab.planning.outlook import (
+    ISOLABLE_SIGMA,
+    EffectGrid,
+    Indices,
+    Outlook,
+    likeliest_sizes,
+    outlook,
+    representatives,
+)
+from logger.lab.planning.planned_drive import SIZES, CarThere, Information, PlannedDrive, SensorNoise, information
+from logger.lab.planning.refit import DrivesThere, refitted_gain
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -33,6 +42,8 @@ from logger.vehicle.effect import Chosen, Effect
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
+_AS_SLOPES_SAY = 3.0
+"""An effect that stands out by fewer deviations moves nothing farther than its slopes hold."""
 _WORTH_TELLING = 1.0
 """Deviations that are gained: fewer are within what noise does to a search."""
 
@@ -112,16 +123,18 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
         asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
-        parts: list[Information] = []
+        parts: list[_Shown] = []
         if fitted is not None:
             progress("what the runs show")
             parts.append(asked.of_runs(fitted))
         for number, drive in enumerate(drives, 1):
             progress(f"what planned drive {number} of {len(drives)} would show")
-            parts.append(drive.information(asked.changes(drive), ()))
-        total = reduce(add, parts)
+            parts.append(asked.of_drive(drive))
+        total = reduce(add, (one.information for one in parts))
         columns = representatives(settings, total, asked.precision)
         now = outlook(settings, total, asked.precision, columns)
+        progress("what a refit would leave of each effect")
+        refitted = asked.refitted(parts, total, columns, now)
         following: list[NextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
@@ -131,8 +144,18 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
                 following.append(_next(option, settings, now, outlook(settings, after, asked.precision, columns)))
     return Plan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
-        tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), now, obstacles,
+        tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), refitted,
+        obstacles,
         tuple(sorted(following, key=lambda one: (-round(one.more_named, 1), -len(one.gains)))))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What some drives show: beside which models, and what the effects do there, (m, n) per run."""
+
+    there: DrivesThere
+    changes: list[Array]
+    information: Information
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +170,40 @@ class _Asked:
         """What the effects do to a planned record (m, (1 + s) n)."""
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
-    def of_runs(self, fitted: LinearModel) -> Information:
-        """Information of runs about additions to a fitted model."""
+    def of_drive(self, drive: PlannedDrive) -> _Shown:
+        """What a planned drive shows, recorded by its sensor alone."""
+        linear, changes = drive.model(), self.changes(drive)
+        levels = [np.concatenate(drive.levels(run, bands)) for run, bands in zip(
+            linear.posterior.runs.runs, linear.posterior.bands, strict=True)]
+        return _Shown(DrivesThere(linear.without_wall(), levels, linear.state.predictions), [changes],
+                      information(linear, [changes]))
+
+    def of_runs(self, fitted: LinearModel) -> _Shown:
+        """What runs show about additions to a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
         here = predict(state.effects)
         there = self.pool.map(lambda one: predict((*state.effects, one)), self.settings.columns)
-        changes = [[new - old for new, old in zip(one, here, strict=True)] for one in there]
-        return information(fitted, [np.array(some) for some in zip(*changes, strict=True)])
+        changes = [np.array(some) for some in zip(*(
+            [new - old for new, old in zip(one, here, strict=True)] for one in there), strict=True)]
+        levels = [bands.levels(residual) for bands, residual in zip(
+            posterior.bands, posterior.residuals(state), strict=True)]
+        return _Shown(DrivesThere(fitted.without_wall(), levels, here), changes, information(fitted, changes))
+
+    def refitted(self, parts: Sequence[_Shown], total: Information, columns: Indices, now: Outlook) -> Outlook:
+        """What the drives show where the car without each effect is refitted to what it does."""
+        which, costs = likeliest_sizes(total, self.precision, columns)
+        of_size = {size: [one.there.of_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
+
+        def deviations(index: int) -> float:
+            first_order = float(now.detectability[index])
+            if first_order < _AS_SLOPES_SAY:
+                return first_order
+            changes = [[one[columns[index]] for one in part.changes] for part in parts]
+            gain = refitted_gain(of_size[int(which[index])], changes, self.precision) + costs[index]
+            return float(np.sqrt(max(gain, 0.0)))
+
+        return now.standing_out(np.array(list(self.pool.map(deviations, range(len(columns))))))
 
 
 def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:

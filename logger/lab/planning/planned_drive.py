@@ -145,25 +145,33 @@ class PlannedDrive:
 
     def information(self, changes: Array, signals: Sequence[int]) -> Information:
         """Of effects' changes (m, (1 + s) n), recorded by the sensor and some of the signals alone."""
-        run, kept = self.run, [0, *(1 + one for one in signals)]
+        return information(self.model(signals), [self._of_kept(changes, signals)])
+
+    def model(self, signals: Sequence[int] = ()) -> LinearModel:
+        """Beside its prediction, as recorded by the sensor and some of the signals."""
+        run = self.run
         chosen_signals = tuple(run.signals[one] for one in signals)
         fewer = replace(run, facts=replace(run.facts, signals=chosen_signals), more=run.more[list(signals)])
-
-        def of_kept(columns: Array) -> Array:
-            parts = columns.reshape(*columns.shape[:-1], -1, run.count)[..., kept, :]
-            return np.asarray(parts.reshape(*columns.shape[:-1], -1))
-
         posterior = self._posterior_of(fewer)
         expected = [self._whitener(fewer, one) for one in posterior.bands]
-        linear = LinearModel(posterior, self._state_of(posterior, of_kept(self._here)), [of_kept(self.numbers)],
-                             expected)
-        return information(linear, [of_kept(changes)])
+        state = self._state_of(posterior, self._of_kept(self._here, signals))
+        return LinearModel(posterior, state, [self._of_kept(self.numbers, signals)], expected)
+
+    def levels(self, run: Run, bands: Bands | JointBands) -> list[Array]:
+        """Of the noise to come, in each band (b,), of the sensor and of each signal of a run."""
+        each = bands.each if isinstance(bands, JointBands) else [bands]
+        return [np.maximum(self._noise.variance_of(signal), one.floor)
+                for one, signal in zip(each, (None, *run.signals), strict=True)]
+
+    def _of_kept(self, columns: Array, signals: Sequence[int]) -> Array:
+        kept = [0, *(1 + one for one in signals)]
+        parts = columns.reshape(*columns.shape[:-1], -1, self.run.count)[..., kept, :]
+        return np.asarray(parts.reshape(*columns.shape[:-1], -1))
 
     def _whitener(self, run: Run, bands: Bands | JointBands) -> Whitener | JointWhitener:
         """By the noise to come."""
         each = bands.each if isinstance(bands, JointBands) else [bands]
-        variances = [self._noise.variance_of(one) for one in (None, *run.signals)]
-        found = [Whitener(one, np.maximum(variance, one.floor)) for one, variance in zip(each, variances, strict=True)]
+        found = [Whitener(one, levels) for one, levels in zip(each, self.levels(run, bands), strict=True)]
         return JointWhitener(found) if isinstance(bands, JointBands) else found[0]
 
 

@@ -13,6 +13,9 @@ FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading
 MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
 DRIFT, CHANGE = "sensor drift", "number that changes"
 
+REMOVED_DRIFT = "drift that is removed"
+"""No family: a sensor's drift is no law of the car, it is removed and said."""
+
 NAMES: dict[str, frozenset[str]] = {
     BY_TRAVEL: frozenset({"force_by_travel"}),
     BY_RATE: frozenset({"force_by_rate"}),
@@ -23,10 +26,10 @@ NAMES: dict[str, frozenset[str]] = {
     PLAY: frozenset({"damper_backlash"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
-    CORRECTION: frozenset({"record_filter"}),
-    REPEATS: frozenset({"periodic"}),
-    DRIFT: frozenset({"sensor_drift"}),
-    CHANGE: frozenset({"changing_number"}),
+    CORRECTION: frozenset({"record_factor", "clipping"}),
+    REPEATS: frozenset({"hum", "wheel_turns"}),
+    DRIFT: frozenset({REMOVED_DRIFT}),
+    CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
 }
 """What ``ridelog learn`` calls the families of each meaning."""
 

@@ -1,24 +1,27 @@
 """Something that hums into the record by itself: an engine, a fan, a pump.
 
 Its frequency stays, or wanders as an engine's does by a slow swing (time is that since the run began), or goes with the
-speed of the car as an engine's does in one gear. The road does not cause it, so that it is added to the record.
+speed of the car as an engine's does in one gear. The road does not cause it, so that it is added to the record. It may
+begin elsewhere in each run: then each has two strengths of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.own_phases import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run
 from logger.lab.laws.repeating import along_the_way, tone_in_time
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):
     turned = 2 * np.pi * {cycles}
-    return recording.accel_z_mps2 + p.cos_mps2 * np.cos(turned) + p.sin_mps2 * np.sin(turned)
+    cos_mps2, sin_mps2 = {pick}
+    return recording.accel_z_mps2 + cos_mps2 * np.cos(turned) + sin_mps2 * np.sin(turned)
 """
 _STEADY = "p.frequency_hz * recording.time_s"
 _WANDERS = """p.frequency_hz * (
@@ -52,41 +55,51 @@ class Hum(Family):
                     Parameter("early_sin_s", tone.wander_sin_s, -20.0, 20.0, None, Scale.LINEAR, (tone.wander_sin_s,),
                               "by how much it is early a quarter of a period later", step=_STEP_S),
                     _shape("period_s", tone.period_s, "in which its frequency goes up and down", step=10 * _STEP)]
-            drafts.append(self._draft(look, numbers, _WANDERS if wanders else _STEADY,
-                                      "wanders" if wanders else "steady",
-                                      "a tone that is there whatever the speed and the road"))
+            drafts += self._drafts(look, numbers, _WANDERS if wanders else _STEADY, "wanders" if wanders else "steady",
+                                   "a tone that is there whatever the speed and the road")
         per_m = along_the_way(look, _PER_M) if look.is_driven else None
         if per_m is not None:
-            drafts.append(self._draft(look, [_shape("cycles_per_m", per_m, "cycles in a metre of the way", step=_STEP)],
-                                      _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
-                                      words=("needs_road = True",)))
+            drafts += self._drafts(look, [_shape("cycles_per_m", per_m, "cycles in a metre of the way", step=_STEP)],
+                                   _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
+                                   words=("needs_road = True",))
         return drafts
 
-    def _draft(self, look: Look, numbers: list[Parameter], cycles: str, variant: str, signature: str,
-               **more: Any) -> Draft:
+    def _drafts(self, look: Look, numbers: list[Parameter], cycles: str, variant: str, signature: str,
+                **more: Any) -> list[Draft]:
+        """A tone that begins in all runs alike, and one that begins in each elsewhere."""
         size = rounded(float(np.std(np.concatenate(look.residuals))))
-        strengths = [Parameter(f"{part}_mps2", 0.1 * size, -_MOST_MPS2, _MOST_MPS2, 0.0, Scale.LINEAR, (0.1 * size,),
-                               f"{words} of the hum", step=0.02 * size)
-                     for part, words in (("cos", "even part"), ("sin", "odd part"))]
-        return Draft(family=self.name, kind="RecordEffect", title=self.title, parameters=(*strengths, *numbers),
-                     source="orders of engines and machines (ISO 20816-1:2016)", signature=signature,
-                     shown_by=self.shown_by, method=_METHOD.format(cycles=cycles), variant=variant, **more)
+
+        def draft(runs: Sequence[str], variant: str) -> Draft:
+            strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -_MOST_MPS2, _MOST_MPS2, 0.0, Scale.LINEAR,
+                                   (0.1 * size,), f"{words} of the hum{of_run(run)}", step=0.02 * size)
+                         for run in runs for part, words in (("cos", "even part"), ("sin", "odd part"))]
+            pairs = ", ".join(f"(p.{in_run('cos', run, 'mps2')}, p.{in_run('sin', run, 'mps2')})" for run in runs)
+            pick = pairs if len(runs) == 1 else f"(\n        {pairs},\n    )[min(recording.run, {len(runs) - 1})]"
+            return Draft(family=self.name, kind="RecordEffect", title=self.title, parameters=(*strengths, *numbers),
+                         source="orders of engines and machines (ISO 20816-1:2016)", signature=signature,
+                         shown_by=self.shown_by, method=_METHOD.format(cycles=cycles, pick=pick), variant=variant,
+                         **more)
+
+        ways = ((ALL_ALIKE, variant), (each_run(look), f"{variant}{EACH}"))
+        return [draft(runs, name) for runs, name in ways if runs]
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
-        size = _strength(found.values)
-        if draft.variant == "by_way":
-            return f"a hum of {size:.2g} m/s2 r.m.s. with {say('cycles_per_m')} cycles, that the road does not cause"
+        size, begins = _strength(found.values), BEGINS * draft.variant.endswith(EACH)
+        if draft.variant.startswith("by_way"):
+            return (f"a hum of {size:.2g} m/s2 r.m.s. with {say('cycles_per_m')} cycles{begins}, that the road does "
+                    "not cause")
         wanders = ""
-        if draft.variant == "wanders":
+        if draft.variant.startswith("wanders"):
             late_s = float(np.hypot(found.values["early_cos_s"], found.values["early_sin_s"]))
             share = 2 * np.pi * late_s / found.values["period_s"]
             wanders = f", going up and down by {share:.0%} in {say('period_s')}"
-        return (f"a hum of {size:.2g} m/s2 r.m.s. at {say('frequency_hz')}{wanders}, that the road does not cause: an "
-                "engine or a fan")
+        return (f"a hum of {size:.2g} m/s2 r.m.s. at {say('frequency_hz')}{wanders}{begins}, that the road does not "
+                "cause: an engine or a fan")
 
 
 def _strength(values: Mapping[str, float]) -> float:
-    return float(np.hypot(values["cos_mps2"], values["sin_mps2"]) / np.sqrt(2))
+    parts = [value for name, value in values.items() if name.endswith("_mps2")]
+    return float(np.linalg.norm(parts) / np.sqrt(len(parts)))
 
 
 def _shape(name: str, value: float, meaning: str, step: float) -> Parameter:

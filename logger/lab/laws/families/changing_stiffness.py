@@ -1,0 +1,60 @@
+"""Springs or tires that change as a run goes on: air that warms up in a tire makes it stiffer, rubber softer.
+
+A stiffness k that was taken for fixed is k + d (1 - exp(-t / T)): it changes by d in the end, most of it in the time T.
+A tire's stiffness grows with its pressure (J. Y. Wong, Theory of Ground Vehicles, 2008, chapter 1), and that with the
+temperature.
+"""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_FUNCTIONS = """
+def changed(p, seen):
+    return p.changed_n_per_m * (1.0 - np.exp(-np.maximum(seen.time_s, 0.0) / p.time_s)) * seen.{motion}
+"""
+_METHOD = """def laws(self, p, laws):
+    own = SimpleNamespace(changed_n_per_m=p.changed_n_per_m, time_s=p.time_s)
+    return laws.with_law(Between.{between}, changed, own)
+"""
+_TRIED, _MOST = 0.1, 3.0  # of the stiffness: tried, and what may be
+_OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
+       "tires": ("deflection_m", "WHEEL_AND_GROUND", "the wheels hop")}
+
+
+class ChangingStiffness(Family):
+    name = "changing_stiffness"
+    title = "a stiffness that changes as a run goes on"
+    shown_by = "drive one rough road cold and once more after half an hour"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        front = look.vehicle.front
+        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+        return [_draft(of, stiffness, lasts_s) for of, stiffness in (
+            ("springs", front.suspension_stiffness_n_per_m), ("tires", front.tire_stiffness_n_per_m))]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        return (f"{draft.variant} whose stiffness changes by {say('changed_n_per_m', 0.001, 'N/mm')} as a run goes on, "
+                f"within about {say('time_s')}")
+
+
+def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
+    motion, between, what = _OF[of]
+    times = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
+    size, most = rounded(_TRIED * stiffness_n_per_m), rounded(_MOST * stiffness_n_per_m)
+    return Draft(
+        family=FAMILY.name, kind="ForceEffect", title=f"{of} whose stiffness changes as a run goes on",
+        parameters=(
+            Parameter("changed_n_per_m", size, -most, most, 0.0, Scale.LINEAR, (size, -size),
+                      f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),
+            Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
+                      "after which most of it is there")),
+        source="a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1",
+        signature=f"{what} faster, or slower, as a run goes on", shown_by=FAMILY.shown_by,
+        method=_METHOD.format(between=between), functions=_FUNCTIONS.format(motion=motion), variant=of,
+        imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))
+
+
+FAMILY = ChangingStiffness()

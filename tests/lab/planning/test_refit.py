@@ -1,0 +1,53 @@
+"""What a refit leaves, where the right answer is known: a car with other numbers and nothing else, and small things."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from logger.lab.planning.planned_drive import PlannedDrive
+from logger.lab.planning.refit import DrivesThere, refitted_gain
+from logger.runs import Array
+
+from .test_outlook import planned
+
+
+def there_of(drive: PlannedDrive) -> DrivesThere:
+    linear = drive.model().without_wall()
+    levels = [np.concatenate(drive.levels(drive.run, bands)) for bands in linear.posterior.bands]
+    return DrivesThere(linear, levels, linear.state.predictions)
+
+
+def change_of(drive: PlannedDrive, logs: Array) -> Array:
+    """What other numbers of the car do to the record."""
+    still = [np.zeros(one.count) for one in drive.posterior.record_errors]
+    return np.asarray(drive.posterior.predict((), logs, still, rough=True)[0] - drive.run.measured_mps2)
+
+
+def precision_of(drive: PlannedDrive) -> Array:
+    return drive.posterior.prior.without_wall().curvature(np.zeros(13))
+
+
+@pytest.mark.parametrize("number", ["front.tire_stiffness_n_per_m", "sprung_mass_kg"])
+def test_a_car_with_other_numbers_leaves_no_more_than_what_its_prior_costs(number: str) -> None:
+    drive = planned(0.02)
+    names = drive.posterior.prior.names
+    logs = np.where(np.array(names) == number, np.log(1.2), 0.0)
+    change, precision = change_of(drive, logs), precision_of(drive)
+    gain = refitted_gain([there_of(drive)], [[change]], precision)
+    costs = float(precision @ logs**2)
+    assert 0 < gain < 1.01 * costs
+    linear = drive.model().without_wall()
+    white = linear.whitened([change])
+    mixed, own = linear.mixed(white)
+    first_order = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
+    assert first_order > 1.3 * gain
+
+
+def test_what_is_small_leaves_what_first_order_says() -> None:
+    drive, rng = planned(0.5), np.random.default_rng(4)
+    change = 0.01 * rng.standard_normal(drive.run.count)
+    linear = drive.model().without_wall()
+    mixed, own = linear.mixed(linear.whitened([change]))
+    expected = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
+    assert refitted_gain([there_of(drive)], [[change]], precision_of(drive)) == pytest.approx(expected, rel=0.05)
