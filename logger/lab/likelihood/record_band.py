@@ -42,16 +42,16 @@ import numpy.typing as npt
 from logger.dsp.butterworth import butterworth
 from logger.dsp.pass_band import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
+from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.runs import NO_READING, READING, LowPass, Run
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_BLOCK_S = 3.0
 # Of the loudest power: below that, a spectrum by Hann's windows shows rounding and what leaks from louder frequencies
 # (by Hann's window 110 dB, 60 of its lines away).
 _LEAST_POWER = 1e-9
-_WIDTH_HZ, _LOWEST_HZ, _HIGHEST_OF_RATE = 1.5, 1.0, 0.37
+_WIDTH_HZ, _LOWEST_HZ = 1.5, 1.0
 # Cut-offs, orders, gains and shares of the spectrum that may be noise: finer ones change a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
 _ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
@@ -78,7 +78,6 @@ _REACH = 1.2  # times the cut-off, up to where phases are read
 _DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
 LEAST_WIDTH_HZ = 3.0
 """A narrower band holds the body's bounce at most, and no model of a car can be told from another."""
-_DB = 10 / np.log(10)
 
 
 def is_steep(seen: LowPass) -> bool:
@@ -180,7 +179,7 @@ def _seen(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None
     size, left = sum(one.size for one in fits), float(table[place])
     if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * left:
         return None
-    if plain < _BETTER * left or _DB * (plain - left) < _BETTER_DB * size:
+    if plain < _BETTER * left or 10 / np.log(10) * (plain - left) < _BETTER_DB * size:
         return None
     return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
 
@@ -288,12 +287,12 @@ def _cutoffs_hz(rate_hz: float) -> Array:
 def _spectrum(run: Run, samples: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Mean powers in bands of one width (b,), by Welch's method [m2/s4], and in which of them there is nothing."""
     kept = samples[run.first:]
-    size = min(round(_BLOCK_S * run.rate_hz), len(kept))
+    size = min(round(BLOCK_S * run.rate_hz), len(kept))
     taper = np.hanning(size + 1)[:-1]
     blocks = np.lib.stride_tricks.sliding_window_view(kept, size)[:: max(1, size // 2)]
     power = (np.abs(np.fft.rfft(blocks * (taper / np.sqrt((taper**2).mean())), axis=1)) ** 2).mean(axis=0) / size
     f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
-    edges = np.arange(_LOWEST_HZ, _HIGHEST_OF_RATE * run.rate_hz + 0.1, _WIDTH_HZ)
+    edges = np.arange(_LOWEST_HZ, HIGHEST_OF_RATE * run.rate_hz + 0.1, _WIDTH_HZ)
     floor = _LEAST_POWER * power.max() + np.finfo(float).tiny
     means = np.exp([np.log(power[(f_hz >= low) & (f_hz < high)] + floor).mean() for low, high in pairwise(edges)])
     return means, means < 2 * floor

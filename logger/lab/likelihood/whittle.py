@@ -26,7 +26,7 @@ DISCREPANCY = 0.003
 """By what share of the signal in a band two right simulations of one car may differ. They differ most where a car has
 dry friction, whose force comes late by part of a step. A judgement: with 1 %, searches called right models unexplained.
 """
-_BLOCK_S = 3.0
+BLOCK_S = 3.0
 """Of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 HIGHEST_OF_RATE = 0.37
 """Above it recorders' filters take away what no two of them take away alike."""
@@ -57,11 +57,11 @@ class Bands:
         rate = run.rate_hz
         self.rate_hz, self.first, self.count = rate, run.first, run.count
         kept = run.count - run.first
-        size = min(int(_BLOCK_S * rate + _ROUNDED), kept)
+        size = min(int(BLOCK_S * rate + _ROUNDED), kept)
         self._size = size
         taper = np.hanning(size + 1)[:-1]
         self._taper = taper / np.sqrt((taper**2).mean())
-        starts = np.ceil(np.arange(0, kept, 0.5 * _BLOCK_S * rate) - _ROUNDED).astype(int)
+        starts = np.ceil(np.arange(0, kept, 0.5 * BLOCK_S * rate) - _ROUNDED).astype(int)
         self._starts = starts[starts <= kept - size]
         f_hz = np.fft.rfftfreq(size, 1 / rate)
         band_hz = run.pass_band_hz if signal is None else (0.0, rate / 2)

@@ -14,6 +14,7 @@ from logger.vehicle.laws import CornerLaws
 
 Array = npt.NDArray[np.float64]
 
+# Of a curve: smooth to the eye at the width of a page; its ends are motions that one in a thousand samples goes beyond.
 _POINTS, _REACHED = 201, 0.999
 RATE, TRAVEL = "rate", "travel"
 
