@@ -113,9 +113,10 @@ def _words(x: float, y: float, text: str, anchor: str = "start") -> Html:
     return html('<text class="tick" x="{:.1f}" y="{:.1f}"{}>{}</text>', x, y, where, text)
 
 
-def _figure(box: _Box, title: str, drawn: Iterable[Html]) -> Html:
-    """The figure element."""
-    svg = html('<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', WIDTH, box.height, title,
+def _figure(box: _Box, title: str, drawn: Iterable[Html], style: str = "plot") -> Html:
+    """The figure element; ``style``: "plot" shrinks to the width of a phone, "plot named" is shifted there instead,
+    as the names at its left would not fit."""
+    svg = html('<svg class="{}" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', style, WIDTH, box.height, title,
                concatenated(drawn))
     return html("<figure><figcaption>{}</figcaption>{}</figure>", title, svg)
 
@@ -158,7 +159,7 @@ def _bars(one: Bars) -> Html:
         x = frame.x(one.level[0])
         parts += [html('<path class="level" d="M{:.1f} {}V{}"/>', x, box.top, box.bottom_px),
                   _words(x, box.top - 8, one.level[1], "middle")]
-    return _figure(box, one.title, parts)
+    return _figure(box, one.title, parts, "plot named")
 
 
 def _curves(one: Curves) -> list[Html]:
@@ -313,4 +314,4 @@ def steps_figure(one: Steps) -> Html:
         parts += [_dot(x, y, 5, 0), _words(x, y - 10, f"{value:.3f}", "middle")]
         parts += [_words(x, _STEPS.bottom_px + 18 + _LINE_PX * number, line, "middle")
                   for number, line in enumerate(wrap(words, letters)[:_MOST_LINES])]
-    return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)])
+    return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")

@@ -9,6 +9,8 @@ from logger.report.charts import chart
 from logger.report.document import document, heading, section
 from logger.report.html import Html, concatenated, html
 
+_COLUMN_GAP = "  "
+
 
 def page(title: str, of: str, text: str, charts: Sequence[Chart]) -> Html:
     """The page.
@@ -17,5 +19,13 @@ def page(title: str, of: str, text: str, charts: Sequence[Chart]) -> Html:
     text    what the command prints
     """
     return document(f"{title}: {of}", [
-        heading(title, of), html('<pre class="said">{}</pre>', text),
+        heading(title, of), *map(_part, text.split("\n\n")),
         section("Pictures", concatenated(map(chart, charts)))])
+
+
+def _part(text: str) -> Html:
+    """Lines of a table stay in their columns, and are shifted sideways on a phone; sentences wrap."""
+    lines = text.strip("\n").split("\n")
+    if any(_COLUMN_GAP in line.strip() for line in lines):
+        return html('<pre class="whole">{}</pre>', "\n".join(lines))
+    return html('<p class="lines">{}</p>', "\n".join(lines))

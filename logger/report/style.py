@@ -26,7 +26,8 @@ svg text{font:12px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-se
 .mark circle{fill:var(--ink);stroke:var(--ground);stroke-width:1.5}
 svg .mark text{fill:var(--ground);font-size:10.5px;font-weight:650}
 figure{margin:0 0 14px;overflow-x:auto}
-.plot{min-width:640px}
+@media screen and (max-width:640px){.named{min-width:640px}.plot:not(.named) .tick{font-size:17px}
+.plot:not(.named) .line{stroke-width:2}.plot:not(.named) .thick{stroke-width:4}}
 figcaption{font-size:13.5px;font-weight:600;margin-bottom:2px}
 figcaption .unit{font-weight:400}
 .grid{stroke:var(--faint);stroke-width:1}
@@ -81,6 +82,8 @@ details{margin-top:14px;border-top:1px solid var(--line);padding-top:12px}
 summary{cursor:pointer;font-weight:600}
 pre{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;overflow:auto;
 max-height:520px;font-size:12.5px;line-height:1.45}
+pre.whole{max-height:none}
+.lines{white-space:pre-line}
 .notes{padding-left:18px;margin:14px 0 0}
 .notes li{margin:3px 0}
 .warn{font-weight:600}
