@@ -151,12 +151,12 @@ def loop_area_n_m(amplitude_m: float, values: SimpleNamespace) -> float:
     """Of a settled loop of the law, by SciPy along the way."""
     def slope(t: float, z: np.ndarray) -> list[float]:
         v = 2 * pi * amplitude_m * np.cos(2 * pi * t)
-        return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
+        return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
 
     settled = 12
     t = np.linspace(settled, settled + 1, 4001)
     z = solve_ivp(slope, (0, settled + 1), [0.0], "LSODA", t, rtol=1e-9, atol=1e-12, max_step=5e-3).y[0]
-    f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
+    f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
     return float(np.trapezoid(f, amplitude_m * np.sin(2 * pi * t)))
 
 
@@ -188,7 +188,7 @@ def test_no_friction_gives_energy() -> None:
             parts = max(1, int(abs(step) / 0.01))
             for _ in range(parts):
                 way = step / parts
-                dz = float(rates(values, Seen(0, way, 0, 0, 0, 0, 0, 0, 0, (z,)))[0])
+                dz = float(rates(values, Seen(0, way, 0, 0, 0, 0, 0, 0, 0, 0, (z,)))[0])
                 lost.append(lost[-1] + (z + dz / 2) * (way - dz))
                 z += dz
         assert abs(z) <= 1.01
