@@ -116,8 +116,8 @@ def _words(x: float, y: float, text: str, anchor: str = "start") -> Html:
 def _figure(box: _Box, title: str, drawn: Iterable[Html], style: str = "plot") -> Html:
     """The figure element; ``style``: "plot" shrinks to the width of a phone, "plot named" is shifted there instead,
     as the names at its left would not fit."""
-    svg = html('<svg class="{}" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', style, WIDTH, box.height, title,
-               concatenated(drawn))
+    svg = html('<svg class="{}" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', style, WIDTH, box.height,
+               title, concatenated(drawn))
     return html("<figure><figcaption>{}</figcaption>{}</figure>", title, svg)
 
 
