@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from logger.records import WindowRecord
 from logger.report.document import hint, section
 from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.places_passed import MOST_ROWS
 from logger.report.summary import COMFORT_NAMES, IRI_CLASSES, DriveSummary, Share
 from logger.report.terminal import class_words, comfort_words
 
@@ -42,11 +43,18 @@ def _choice(drives: Sequence[str]) -> Html:
                 "</label>", options)
 
 
+def _repeated_words(windows: int) -> str:
+    if windows <= MOST_ROWS:
+        return "Where several drives came by, the colour is that of their mean."
+    return (f"More than {MOST_ROWS:,} windows: where several drives came by, they are drawn one over the other. Show a "
+            "single drive, or let ridelog passes average them.")
+
+
 def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
     buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
                                 "true" if name == "iri" else "false", words) for name, words in _MODES)
     trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
-    repeated = hint("Where several drives came by, the colour is that of their mean.") if len(drives) > 1 else EMPTY
+    repeated = hint(_repeated_words(summary.windows)) if len(drives) > 1 else EMPTY
     return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
                 "{}</div>{}</div>"
                 '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. '

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from logger.report.places_passed import places_passed
+from logger.report.summary import summarise
+from logger.report.terminal import date_words
+from logger.report.track_views import track_views
 
 from ..support.drives.logged_rows import repeated_drives
 
@@ -40,3 +43,12 @@ def test_rows_without_an_iri_and_empty_drives_are_borne() -> None:
     assert found is not None
     assert np.isnan(found.place).all()
     assert not len(found.iri_m_per_km)
+
+
+def test_a_page_of_too_many_windows_says_that_drives_lie_over_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = repeated_drives(2, 20, (2.0, 3.0))
+    drives = [date_words(summarise(rows[part])) for part in (slice(20), slice(20, None))]
+    assert "colour is that of their mean" in str(track_views(rows, summarise(rows), "", drives))
+    monkeypatch.setattr("logger.report.track_views.MOST_ROWS", 30)
+    page = str(track_views(rows, summarise(rows), "", drives))
+    assert "More than 30 windows" in page and "ridelog passes" in page and "colour is that of" not in page
