@@ -106,7 +106,7 @@ def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: p
     named = {(row[0], row[1]): dict(zip(ten["columns"], row, strict=True)) for row in ten["rows"]}
     iri = [one["value"] for one in json.loads((folder / "trip_iri_1ccf.json").read_text())["path"]["data"]]
     # Logarithms off by a and b each: they differ by the root of a^2 + b^2, whatever the road.
-    for name, off in (("85e7 beside 1ccf", np.hypot(0.1, 0.1)), ("e9ef beside 1ccf", np.hypot(0.1, 0.2))):
+    for name, off in (("85e7 against 1ccf", np.hypot(0.1, 0.1)), ("e9ef against 1ccf", np.hypot(0.1, 0.2))):
         expected = 1 - off**2 / np.var(np.log(iri))
         assert named[name, "nearest cells"]["R2 of log IRI"] == pytest.approx(expected, abs=0.05)
         assert named[name, "laid over, each 200 m moved by up to 4 m"]["R2"] > named[name, "laid over"]["R2"] - 0.01

@@ -106,4 +106,5 @@ def test_localized_roughness_slides_along_each_drive(logs: Path, capsys: pytest.
     assert max(one["worst_m_per_km"] for one in found) == pytest.approx(worst)
     assert main(["sections", str(logs), "--localized", "900"]) == 0
     assert "nowhere is the IRI over 25 ft above 900 m/km" in capsys.readouterr().out
-    assert main(["sections", str(logs), "--localized", "0"]) == 2
+    with pytest.raises(BadInput, match=r"--localized 0: expected 0\.01 to 1000 m/km"):
+        main(["sections", str(logs), "--localized", "0"])
