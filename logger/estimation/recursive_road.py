@@ -181,14 +181,13 @@ class FollowedRoad:
         solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
 
         moving = block.moving & read
-        typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
+        mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain = solution.gain
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
             others = cavity(motion, variance)
             if moving.any():
-                uneven, typical = typical, even_variance(motion, others[moving], variance[moving])
-                gain = gain * (uneven / typical)
+                gain = gain * (mean_variance / even_variance(motion, others[moving], variance[moving]))
 
         innovations = np.fft.irfft(solution.waves, block.count)
         resolved = mean_resolved(gain, local[seen > 0])
@@ -208,7 +207,7 @@ class FollowedRoad:
             self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
-        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, typical)
+        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, mean_variance)
 
     def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
