@@ -23,8 +23,8 @@ def run(effort: Effort) -> Result:
     building = with_damping_ratios(*chain(np.full(5, _FLOOR_KG), np.full(5, _STOREY_N_PER_M)),
                                    np.full(5, PRINTED_TRUE_DAMPING))
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
-    missed, extra, records = 0, 0, []
-    for seed in effort.each(range(effort.count(_RECORDS, 2))):
+    missed, extra, records, count = 0, 0, [], effort.count(_RECORDS, 2)
+    for seed in effort.each(range(count)):
         found = find_modes(_record(building, seed), _RATE_HZ, "ssi").modes
         near = [[mode for mode in found if abs(mode.frequency_hz / hz - 1) < _NEAR] for hz in true_hz]
         missed += sum(not one for one in near)
@@ -39,18 +39,18 @@ def run(effort: Effort) -> Result:
     values += _beside("frequency of mode {} found [Hz]", PRINTED_HZ, PRINTED_TRUE_HZ, hz, hz_std)
     values += _beside("damping ratio of mode {} found", PRINTED_DAMPING, (PRINTED_TRUE_DAMPING,) * 5, damping,
                       damping_std)
-    values += [Statement(f"modes missed in {len(numbers)} records", "found where they are named by hand", float(missed),
+    values += [Statement(f"modes missed in {count} records", "found where they are named by hand", float(missed),
                          0,
                          0, Word.BETTER),
                Statement("modes that are not there", "found where they are named by hand", float(extra), 0, 0,
                          Word.BETTER)]
     worst = 100 * float(max(abs(one / PRINTED_TRUE_DAMPING - 1) for one in PRINTED_DAMPING))
     ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / PRINTED_TRUE_DAMPING - 1).max(axis=1)))
-    verdict = (f"All five come out of each of {len(numbers)} records, none that is not there, without a person who "
-               f"names them; the example is given their frequencies. The worst damping is {ours:.0f} % off on the "
-               f"median, {worst:.0f} % in the print, and here a standard error stands beside each: 300 s of random "
-               "shaking tell a damping no better. Of the printed record's length the versions of the example differ; "
-               "that of the one that is stored now is taken.")
+    verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} found that are not there, "
+               "without a person who names them; the example is given their frequencies. The worst damping is "
+               f"{ours:.0f} % off on the median, {worst:.0f} % in the print, and here a standard error stands beside each: 300 s of random "
+               "shaking show a damping no better. Versions of the example differ in the record's length; the current "
+               "one's is taken, 300 s.")
     table = Table("The first record", (
         Column("mode", ".0f"), Column("true [Hz]", ".3f"), Column("printed [Hz]", ".3f"), Column("ours [Hz]", ".3f"),
         Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),

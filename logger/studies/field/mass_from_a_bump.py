@@ -39,7 +39,7 @@ def run(effort: Effort) -> Result:
     inside = float(np.mean(np.abs(errors) < 2 * given))
     table = Table("The mass from one bump (nothing of it is printed)", (
         Column("package, run by us"), Column("error [%]", "+.2f"), Column("its standard error [%]", ".2f")),
-        (*PEERS, (f"ridelog, mean of {len(errors)} records", float(errors.mean()), float(given.mean()))))
+        (*PEERS, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
     verdict = (f"The mass comes out {rms:.2f} % off (r.m.s. over {len(errors)} records), as near as the record's "
                "noise lets anybody come, and its standard error says so: the truth lies within two of them in "
                f"{inside:.0%}. Packages that are given the car's equations do as well; those without find frequencies "

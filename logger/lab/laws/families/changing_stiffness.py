@@ -19,7 +19,7 @@ _METHOD = """def laws(self, p, laws):
     own = SimpleNamespace(changed_n_per_m=p.changed_n_per_m, time_s=p.time_s)
     return laws.with_law(Between.{between}, changed, own)
 """
-_TRIED, _MOST = 0.1, 3.0  # of the stiffness: tried, and what may be
+_TRIED, _MOST_LOST, _MOST = 0.1, 0.9, 3.0  # of the stiffness: tried, and what may be lost or come
 _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
        "tires": ("deflection_m", "WHEEL_AND_GROUND", "the wheels hop")}
 
@@ -27,13 +27,15 @@ _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
 class ChangingStiffness(Family):
     name = "changing_stiffness"
     title = "a stiffness that changes as a run goes on"
-    shown_by = "drive one rough road cold and once more after half an hour"
+    shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, look: Look) -> list[Draft]:
-        front = look.vehicle.front
+        axles = [one for one in (look.vehicle.front, look.vehicle.rear) if one is not None]
         lasts_s = max(run.count / run.rate_hz for run in look.runs)
-        return [_draft(of, stiffness, lasts_s) for of, stiffness in (
-            ("springs", front.suspension_stiffness_n_per_m), ("tires", front.tire_stiffness_n_per_m))]
+        # The softer axle's: no axle may be left without a stiffness.
+        return [_draft(of, min(stiffness), lasts_s) for of, stiffness in (
+            ("springs", [one.suspension_stiffness_n_per_m for one in axles]),
+            ("tires", [one.tire_stiffness_n_per_m for one in axles]))]
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
         return (f"{draft.variant} whose stiffness changes by {say('changed_n_per_m', 0.001, 'N/mm')} as a run goes on, "
@@ -43,11 +45,11 @@ class ChangingStiffness(Family):
 def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
     motion, between, what = _OF[of]
     times = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
-    size, most = rounded(_TRIED * stiffness_n_per_m), rounded(_MOST * stiffness_n_per_m)
+    size, lost, most = (rounded(share * stiffness_n_per_m) for share in (_TRIED, _MOST_LOST, _MOST))
     return Draft(
         family=FAMILY.name, kind="ForceEffect", title=f"{of} whose stiffness changes as a run goes on",
         parameters=(
-            Parameter("changed_n_per_m", size, -most, most, 0.0, Scale.LINEAR, (size, -size),
+            Parameter("changed_n_per_m", size, -lost, most, 0.0, Scale.LINEAR, (size, -size),
                       f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),
             Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
                       "after which most of it is there")),

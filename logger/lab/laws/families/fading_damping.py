@@ -23,7 +23,7 @@ _METHOD = """def laws(self, p, laws):
 class FadingDamping(Family):
     name = "fading_damping"
     title = "a damping that changes as a run goes on"
-    shown_by = "drive one rough road cold and once more after half an hour"
+    shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, look: Look) -> list[Draft]:
         lasts_s = max(run.count / run.rate_hz for run in look.runs)
