@@ -91,7 +91,7 @@ class NoiseLearner:
         self._to_fine = _cubic(fine, len(self.log_noise))
         self._usual = _log_density(usual, self.log_noise)
         self._prior = _log_density(before, self.log_noise)
-        self._told = np.zeros(len(self.log_noise))
+        self._evidence = np.zeros(len(self.log_noise))
         self._slopes = np.zeros(len(self.log_noise))
         self._squares = np.zeros(len(self.log_noise))
         self._heard = 0.0
@@ -109,7 +109,7 @@ class NoiseLearner:
         slopes = np.gradient(log_evidence, _SPACING)
         self._prior = (1 - _FORGOTTEN_PER_STRETCH) * self._prior + _FORGOTTEN_PER_STRETCH * self._usual
         self._forget(_FORGOTTEN_PER_STRETCH)
-        self._told = self._told + log_evidence
+        self._evidence = self._evidence + log_evidence
         self._slopes = self._slopes + slopes
         self._squares = self._squares + slopes**2
         self._heard += 1
@@ -127,7 +127,7 @@ class NoiseLearner:
         self._std = min(hypot(self._std, _WANDERED_LOG_STD), UNKNOWN_LOG_STD)
 
     def _forget(self, share: float) -> None:
-        self._told = (1 - share) * self._told
+        self._evidence = (1 - share) * self._evidence
         self._slopes = (1 - share) * self._slopes
         self._squares = (1 - share) * self._squares
         self._heard *= 1 - share
@@ -143,7 +143,7 @@ class NoiseLearner:
 
     def _moments(self, excess: float) -> tuple[float, float]:
         """Mean and standard error of the log noise."""
-        belief = self._to_fine @ (self._prior + self._told / excess)
+        belief = self._to_fine @ (self._prior + self._evidence / excess)
         weight = np.exp(belief - belief.max())
         weight /= weight.sum()
         mean = float(weight @ self._fine_log_noise)

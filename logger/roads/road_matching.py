@@ -163,9 +163,9 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
         ahead = [(number, chain._replace(error=_drifted(chain.error, step_s, receiver, spread)))
                  for number, chain in enumerate(chains)]
         drift = _drift_m2(step_s, receiver)
-        new = [found for one in here for found in _told_apart(
+        new = [found for one in here for found in _distinct(
             [_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead])]
-        new += [found for one in here for found in _told_apart(
+        new += [found for one in here for found in _distinct(
             [_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead])]
         if not here:
             new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=())
@@ -179,7 +179,7 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
     return path, states, _belief(history, lists)
 
 
-def _told_apart(chains: Sequence[_Chain]) -> list[_Chain]:
+def _distinct(chains: Sequence[_Chain]) -> list[_Chain]:
     """Of chains that came to one street: the best, and those that say another error, as what comes next may speak for
     them (multiple hypotheses; Reid, "An algorithm for tracking multiple targets", IEEE Trans. Automatic Control 24,
     1979). One that is left out is a rival of the one that it is like."""

@@ -77,7 +77,7 @@ _HIGHEST_ORDER = 8
 _REACH = 1.2  # times the cut-off, up to where phases are read
 _DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
 LEAST_WIDTH_HZ = 3.0
-"""A narrower band holds the body's bounce at most, and no model of a car can be told from another."""
+"""A narrower band holds the body's bounce at most, and no model of a car can be distinguished from another."""
 
 
 def is_steep(seen: LowPass) -> bool:

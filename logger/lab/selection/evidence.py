@@ -17,7 +17,7 @@ FALSE_ALARM = 0.001
 IMITATION = 0.1
 """An effect that gains a smaller share of what a full explanation would may only imitate what is missing."""
 CONFUSED = 10.0
-"""Models whose scores differ by less cannot be told apart (R. E. Kass and A. E. Raftery 1995: 2 ln B > 10 is very
+"""Models whose scores differ by less cannot be distinguished (R. E. Kass and A. E. Raftery 1995: 2 ln B > 10 is very
 strong evidence)."""
 
 

@@ -212,7 +212,7 @@ class Search:
         return max(least_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
-        """Of those that are there and cannot be told from the likeliest, the plainest."""
+        """Of those that are there and cannot be distinguished from the likeliest, the plainest."""
         there = [one for one in tried.fits if self.accepted(now, one)]
         return min((one for one in there if one.gain > there[0].gain - CONFUSED),
                    key=lambda one: self._complexity(one.chosen), default=None)

@@ -49,8 +49,8 @@ def run(effort: Effort) -> Result:
     verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} found that are not there, "
                "without a person who names them; the example is given their frequencies. The worst damping is "
                f"{ours:.0f} % off on the median, {worst:.0f} % in the print, and here each has a standard error: 300 s "
-               "of random shaking show a damping no better. Versions of the example differ in the record's length; the current "
-               "one's is taken, 300 s.")
+               "of random shaking show a damping no better. Versions of the example differ in the record's length; "
+               "the current one's is taken, 300 s.")
     table = Table("The first record", (
         Column("mode", ".0f"), Column("true [Hz]", ".3f"), Column("printed [Hz]", ".3f"), Column("ours [Hz]", ".3f"),
         Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),
