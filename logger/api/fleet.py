@@ -218,10 +218,13 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     digest = sha256(content).hexdigest()
     if not dataset.is_new and digest != dataset.manifest.roads:
         raise BadInput(f"{roads or dataset.folder / _ROADS}: expected the roads that the dataset was begun with")
-    lines = read_road_lines(roads or dataset.folder / _ROADS)
+    try:
+        pieces = pieces_of(read_road_lines(roads or dataset.folder / _ROADS))
+    except ValueError as error:
+        raise BadInput(f"{roads or dataset.folder / _ROADS}: {error}") from None
     if dataset.is_new:
         replace_bytes(dataset.folder / _ROADS, content)
-    yield RoadMap(pieces_of(lines)).keys, digest
+    yield RoadMap(pieces).keys, digest
 
 
 def _car_of(log: Path) -> str:

@@ -57,7 +57,8 @@ class Pieces:
 
 
 def pieces_of(lines: Sequence[tuple[Array, Array]]) -> Pieces:
-    """Lines of latitudes and longitudes (n,) [degrees] in pieces; a line without length has none."""
+    """Lines of latitudes and longitudes (n,) [degrees] in pieces; a line without length has none.
+    ValueError where no line has a length."""
     found: list[tuple[Array, ...]] = []
     for road, (lat_deg, lon_deg) in enumerate(lines):
         east = np.diff(lon_deg) * np.cos(np.radians((lat_deg[1:] + lat_deg[:-1]) / 2))
@@ -70,6 +71,8 @@ def pieces_of(lines: Sequence[tuple[Array, Array]]) -> Pieces:
         count = len(cut_m) - 1
         found.append((np.full(count, float(road)), cut_m[:-1], np.diff(cut_m),
                       np.stack([lat[:-1], lat[1:]], axis=1), np.stack([lon[:-1], lon[1:]], axis=1)))
+    if not found:
+        raise ValueError("expected a line with a length")
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return Pieces(columns[0].astype(np.intp), *columns[1:])
 

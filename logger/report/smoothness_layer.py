@@ -46,6 +46,8 @@ def _features(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Iterat
         usable.append(way)
         corners = on_sphere(way.lat_deg, way.lon_deg)
         lengths.append(float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()))
+    if not usable:
+        return
     parts: list[tuple[Array, ...]] = []
     for number, drive in enumerate(split_drives(records)):
         rows = [one for one in drive if placed(one)]
@@ -75,6 +77,8 @@ def _features(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Iterat
 def _feature(way: MapWay, length_m: float, covered_m: float, drives: int, iri: float, std: float) -> Feature:
     known = covered_m >= LEAST_COVERED * length_m
     word, confidence = suggestion(iri, std) if known else (None, None)
+    if drives < 2:  # what one drive has of its car, its load and its tires is not known
+        confidence = None
     places = tuple(zip(way.lon_deg.tolist(), way.lat_deg.tolist(), strict=True))
     title = f"way {way.osm_id}: smoothness={word}" if word else f"way {way.osm_id}: too little of it is known"
     return Feature(f"way {way.osm_id}", title, (

@@ -30,10 +30,12 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
     posts             (p, 2) latitudes and longitudes of kilometre posts, with measures (p,): between them they hold,
                       and beyond the outer ones the line's own length goes on from them
 
-    ValueError where posts do not follow each other along the line by growing measures.
+    ValueError where the line has no length, or posts do not follow each other along the line by growing measures.
     """
     corners = on_sphere(lat_deg, lon_deg)
     length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    if not length_m[-1] > 0:
+        raise ValueError("expected a line with a length")
     if posts is None or post_m is None or not len(post_m):
         first = begin_m if begin_m is not None else 0.0 if end_m is None else end_m - length_m[-1]
         last = end_m if end_m is not None else first + length_m[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def rows_along(lat_deg: float, lon_deg: float, north_m: float, length_m: float, 
         for number, (at_m, east) in enumerate(zip(middle.tolist(), lon.tolist(), strict=True))]
 
 
-def extract(lat_deg: float, lon_deg: float) -> dict[str, object]:
+def extract(lat_deg: float, lon_deg: float) -> dict[str, Any]:
     """Two parallel streets 30 m apart, 600 m long, a footway between them, and a street that nobody drove."""
     def feature(number: int, north_m: float, **tags: str) -> dict[str, object]:
         east = np.degrees(np.array([0.0, 300.0, 600.0]) / EARTH_RADIUS_M) / np.cos(np.radians(lat_deg)) + lon_deg
@@ -133,3 +134,18 @@ def test_what_holds_no_ways_is_one_line(tmp_path: Path, content: str, complaint:
     file.write_text(content)
     with pytest.raises(BadInput, match=complaint):
         read_map_ways(file)
+
+
+def test_one_drive_says_no_confidence_and_odd_ways_are_left_out(tmp_path: Path) -> None:
+    """A merged way has a list of kinds; a line of one point twice has no length."""
+    ways = extract(46.5, 6.5)
+    features = ways["features"]
+    features[1]["properties"]["highway"] = ["residential", "tertiary"]
+    features[3]["geometry"]["coordinates"] = [[6.5, 46.5]] * 2
+    file = tmp_path / "ways.geojson"
+    file.write_text(json.dumps(ways))
+    rows = rows_along(46.5, 6.5, 1.0, 600.0, 3.4, 1)
+    one, = smoothness_layer(rows, read_map_ways(file)).features
+    found = dict(zip(smoothness_layer(rows, []).names, one.values, strict=True))
+    assert (found["smoothness_suggested"], found["drives"], found["confidence"]) == ("good", 1, None)
+    assert not smoothness_layer(rows, [way for way in read_map_ways(file) if way.osm_id == 14]).features

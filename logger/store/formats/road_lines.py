@@ -110,8 +110,8 @@ def read_map_ways(path: Path | str) -> list[MapWay]:
         if not isinstance(named, dict) or not isinstance(geometry, dict) or geometry.get("type") != "LineString":
             continue
         number = _osm_id(one, named)
-        if number is not None and named.get("highway") in CAR_ROADS:
-            tags = {key: value for key, value in named.items() if isinstance(value, str)}
+        tags = {key: value for key, value in named.items() if isinstance(value, str)}
+        if number is not None and tags.get("highway") in CAR_ROADS:
             found.append(MapWay(number, tags, *_line(path, geometry.get("coordinates"))))
     if not found:
         raise BadInput(f"{path}: expected ways of OpenStreetMap for cars: LineStrings with a highway and an @id "
