@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import zlib
 from base64 import b64decode, b64encode
 from hashlib import sha256
@@ -213,10 +214,11 @@ def test_the_command_reads_a_folder_in_order(drive, tmp_path: Path, capsys: pyte
 def test_the_command_finds_the_logs_on_a_stick(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "page.html"
     cars = [tmp_path / "stick" / "ridelog" / name for name in ("0123456789ab", "123456789abc")]
-    for car in cars:
+    for car, windows in zip(cars, (5, 6), strict=True):
         car.mkdir(parents=True)
-        write_log(car / "00001-001.csv", drive(5))
+        write_log(car / "00001-001.csv", drive(windows))
     write_log(cars[1] / "00002-001.csv", drive(4))
+    shutil.copytree(cars[1], tmp_path / "stick" / "saved" / cars[1].name)
     (tmp_path / "stick" / "ridelog" / "link").symlink_to(cars[0])
     names = ["0123456789ab/00001-001.csv", "123456789abc/00001-001.csv", "123456789abc/00002-001.csv"]
     for place, expected in ((tmp_path / "stick", [f"ridelog/{name}" for name in names]),

@@ -5,6 +5,7 @@ Rows are joined when the next begins where the last ended and lies near it; what
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -67,17 +68,19 @@ def find_logs(place: Path) -> list[Path]:
 def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
     """The logs of files and folders, place by place, each with the folder that its name is shown from.
 
-    A log that an earlier place has too, itself or as a copy (on a stick, say), is left out. Raises BadInput for a place
-    without any.
+    A copy of a log that came before it (from a stick, say) is left out: it would count a drive twice. Raises BadInput
+    for a place without any.
     """
+    # With one place its own name says nothing; among several it distinguishes them.
+    listed = [(log, place if len(places) == 1 else place.parent) for place in places for log in find_logs(place)]
+    of_one_size = Counter(_name_and_size(log) for log, _ in listed)
     found: list[tuple[Path, Path | None]] = []
     seen: set[object] = set()
-    for place in places:
-        # With one place its own name says nothing; among several it distinguishes them.
-        shown_from = place if len(places) == 1 else place.parent
-        marks = {log: {log.resolve(), _copied(log) if len(places) > 1 else None} - {None} for log in find_logs(place)}
-        found += [(log, shown_from) for log, its in marks.items() if not seen & its]
-        seen.update(*marks.values())
+    for log, shown_from in listed:
+        marks = {log.resolve(), _copied(log) if of_one_size[_name_and_size(log)] > 1 else None} - {None}
+        if not seen & marks:
+            found.append((log, shown_from))
+        seen |= marks
     return found
 
 
@@ -85,6 +88,14 @@ def read_found(found: Iterable[tuple[Path, Path | None]]) -> list[LoggedFile]:
     """The logs that ``find_logs_in`` found, as they are read; those that are there no more are left out. BadInput as
     ``read_logged``."""
     return [logged for log, place in found if (logged := read_logged(log, place)) is not None]
+
+
+def _name_and_size(log: Path) -> tuple[str, int | None]:
+    """What copies share and can be asked without reading the log."""
+    try:
+        return log.name, log.stat().st_size
+    except OSError:
+        return log.name, None
 
 
 def _copied(log: Path) -> tuple[str, bytes] | None:
