@@ -36,6 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog iri``."""
     if args.response:
+        if args.profile is not None or args.localized is not None:
+            raise BadInput("--response: expected no PROFILE and no --localized, it is the response of the IRI itself")
         table = response()
         print(json.dumps({"response": table}) if args.json else "\n".join(response_screen(table)))
         return EXIT_DONE
@@ -66,10 +68,10 @@ def response() -> list[dict[str, float]]:
 
 def response_screen(table: list[dict[str, float]]) -> list[str]:
     """The same for a person, with bars."""
-    lines = ["What the IRI hears of a sinusoidal road (80 km/h, 250 mm moving average)", "",
+    lines = ["IRI of a sinusoidal road by wavelength (80 km/h, 250 mm moving average)", "",
              "wavelength  slope gain  IRI of 1 mm"]
     for row in table:
         bar = "#" * round(20 * row["slope_gain"])
-        heard = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
-        lines.append(f"{row['wavelength_m']:8.2f} m {heard}  {bar}")
+        figures = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
+        lines.append(f"{row['wavelength_m']:8.2f} m {figures}  {bar}")
     return lines

@@ -110,8 +110,7 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
         cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
         if not len(cars):
             return None
-        one_in = -(-int(of_cars["passes"].sum()) // MOST_PASSES)
-        sample = engine.arrays(passes_by_session(engine.rows, since_us, until_us, _ZERO_US, one_in))
+        sample = _sample(engine, since_us, until_us, int(of_cars["passes"].sum()))
         biases = car_biases(as_passes(sample, cars), len(cars))
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
     shared = biases.session_std**2 / biases.pass_std**2 if biases.pass_std > 0 else 0.0
@@ -121,6 +120,18 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
     return FleetFigures(grouped(segments, by, pieces, shared), cars, car_passes, biases, shared, windows,
                         int((~published).sum()))
+
+
+def _sample(engine: Engine, since_us: int | None, until_us: int | None, passes: int) -> Mapping[str, npt.NDArray[Any]]:
+    """Passes by session of a part of the roads, at most some ``MOST_PASSES``.
+
+    Of few roads the part by remainders may be far smaller than meant, or empty: then of twice as many roads."""
+    one_in = -(-passes // MOST_PASSES)
+    while True:
+        sample = engine.arrays(passes_by_session(engine.rows, since_us, until_us, _ZERO_US, one_in))
+        if one_in == 1 or 4 * int(sample["passes"].sum()) >= MOST_PASSES:
+            return sample
+        one_in = -(-one_in // 2)
 
 
 def as_passes(sample: Mapping[str, npt.NDArray[Any]], cars: Keys) -> Passes:

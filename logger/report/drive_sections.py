@@ -96,7 +96,8 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
         float(windows.end_m[-1] - first_m - length_m * first), length_m)
     found = sections(windows, edges_m)
     condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
-    yield DriveSections(log, number, records, measure_m, found, condition,
+    counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
+    yield DriveSections(log, number, counted_records, measure_m[kept], found, condition,
                         np.minimum(edges_m[1:], windows.end_m[-1]), "along" if direction == ALONG else "against")
 
 

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from logger.report.display_units import UNITS, DisplayUnits
 from logger.report.quantities import known
 from logger.roads.localized_roughness import Area
 
 
-def area_lines(found: Sequence[Area], limit_m_per_km: float) -> Iterator[str]:
+def area_lines(found: Sequence[Area], limit_m_per_km: float, units: DisplayUnits = UNITS["si"]) -> Iterator[str]:
     """A table, or a sentence where there is none."""
+    (place, place_m), (iri, scale), decimals = units.place, units.iri, units.iri_decimals
+    limit = f"{limit_m_per_km / scale:.{decimals}f}" if scale != 1 else f"{limit_m_per_km:g}"
     if not found:
-        yield f"Localized roughness: nowhere is the IRI over 25 ft above {limit_m_per_km:g} m/km."
+        yield f"Localized roughness: nowhere is the IRI over 25 ft above {limit} {iri}."
         return
-    yield f"Localized roughness: where the IRI over 25 ft, which slides along, is above {limit_m_per_km:g} m/km"
-    yield f"{'from m':>10} {'to m':>10} {'length m':>9} {'worst m/km':>14} {'at m':>10}"
+    yield f"Localized roughness: where the IRI over 25 ft, which slides along, is above {limit} {iri}"
+    yield f"{'from ' + place:>10} {'to ' + place:>10} {'length ' + place:>9} {'worst ' + iri:>14} {'at ' + place:>10}"
     for one in found:
         error = known(one.worst_std_m_per_km)
-        worst = f"{one.worst_m_per_km:.2f}" + ("" if error is None else f" ± {error:.2f}")
-        yield (f"{one.start_m:10.2f} {one.end_m:10.2f} {one.end_m - one.start_m:9.2f} {worst:>14} "
-               f"{one.worst_at_m:10.2f}")
+        worst = (f"{one.worst_m_per_km / scale:.{decimals}f}"
+                 + ("" if error is None else f" ± {error / scale:.{decimals}f}"))
+        start, end, length, at = (f"{value / place_m:.{units.place_decimals}f}" for value in (
+            one.start_m, one.end_m, one.end_m - one.start_m, one.worst_at_m))
+        yield f"{start:>10} {end:>10} {length:>9} {worst:>14} {at:>10}"
 
 
 def area_values(one: Area) -> dict[str, float | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -12,30 +11,13 @@ import numpy as np
 from logger.chart_data import Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
+from logger.report.display_units import UNITS, DisplayUnits
 from logger.report.drive_sections import DriveSections, localized
 from logger.report.localized_text import area_lines, area_values
 from logger.report.quantities import known
 from logger.roads.iso8608 import iri_class
 from logger.roads.roughness_words import FEDERAL_WORDS
-from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
-
-
-@dataclass(frozen=True)
-class _Units:
-    """How lengths, roughness and speeds are written: name and SI value of the unit."""
-
-    length: tuple[str, float]
-    length_decimals: int
-    iri: tuple[str, float]
-    iri_decimals: int
-    speed: tuple[str, float]
-    way: tuple[str, float]
-
-
-_SYSTEMS = {
-    "si": _Units(("m", 1.0), 1, ("m/km", 1.0), 2, ("km/h", KMH_MPS), ("km", 1000.0)),
-    "us": _Units(("mi", MILE_M), 3, ("in/mi", INCH_PER_MILE_M_PER_KM), 0, ("mph", MPH_MPS), ("mi", MILE_M)),
-}
+from logger.units import FOOT_M, MILE_M
 
 
 def lines(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
@@ -43,14 +25,14 @@ def lines(drives: Sequence[DriveSections], length_m: float, system: str, localiz
     """For a person; with a limit the areas of localized roughness under each drive."""
     if not drives:
         return ["No row has a distance, or lies on the route: there are no sections."]
-    units = _SYSTEMS[system]
+    units = UNITS[system]
     said = list(_summary(drives, length_m, units))
     head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
             f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
     for one in drives:
         said += ["", _title(one), head, *_rows(one, units)]
         if localized_m_per_km is not None:
-            said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km)]
+            said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km, units)]
     return [*said, "",
             "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313. Class: ISO 8608.",
             "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
@@ -60,7 +42,7 @@ def _title(one: DriveSections) -> str:
     return f"{one.log}, drive {one.number}" + (f", {one.direction} the route" if one.direction else "")
 
 
-def _summary(drives: Sequence[DriveSections], length_m: float, units: _Units) -> Iterator[str]:
+def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUnits) -> Iterator[str]:
     count = sum(len(one.condition) for one in drives)
     known_m, iri, std = (np.concatenate([getattr(one.figures, name) for one in drives])
                          for name in ("known_m", "iri_m_per_km", "iri_std_m_per_km"))
@@ -81,7 +63,7 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: _Units) ->
     yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())
 
 
-def _rows(one: DriveSections, units: _Units) -> Iterator[str]:
+def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[str]:
     figures = one.figures
     columns = (figures.edges_m[:-1], one.ends_m, figures.known_m, figures.iri_m_per_km, figures.iri_std_m_per_km,
                figures.a_w_mps2, figures.speed_mps)

@@ -163,6 +163,12 @@ def test_neither_profile_nor_response_is_refused() -> None:
         main(["iri"])
 
 
+@pytest.mark.parametrize("more", [["road.csv"], ["--localized", "2"]])
+def test_the_response_takes_no_road(more: list[str]) -> None:
+    with pytest.raises(BadInput, match="--response: expected no PROFILE"):
+        main(["iri", "--response", *more])
+
+
 @pytest.mark.parametrize("length", ["0", "-1", "nan"])
 def test_a_window_that_has_no_length_is_refused_by_its_name(road: tuple[Path, np.ndarray], length: str) -> None:
     with pytest.raises(BadInput, match=r"^--window .*: expected a length above 0 m"):

@@ -14,6 +14,7 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.fleet import summary
 from logger.fleet.dataset import Dataset
 
 from ..support.drives.fleet_town import drives, town, write_logs
@@ -196,3 +197,18 @@ def test_wrong_use_is_one_line(arguments: list[str], complaint: str, logs: Path,
     places = {"LOGS": str(logs), "TOWN": str(tmp_path / "town")}
     with pytest.raises(BadInput, match=complaint):
         main(["fleet", *(places.get(one, one) for one in arguments)])
+
+
+@pytest.mark.parametrize("most", [1, 8])
+def test_biases_of_few_roads_with_many_passes_are_estimated(most: int, logs: Path, tmp_path: Path,
+                                                            capsys: pytest.CaptureFixture[str],
+                                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """One road in so many may be none of the few that there are."""
+    seen: list[int] = []
+    real = summary.car_biases
+    monkeypatch.setattr(summary, "MOST_PASSES", most)
+    monkeypatch.setattr(summary, "car_biases", lambda passes, cars: (seen.append(int(passes.count.sum())),
+                                                                     real(passes, cars))[1])
+    ingest(logs, tmp_path / "town")
+    assert main(["fleet", "summarise", str(tmp_path / "town"), "--json"]) == 0
+    assert seen[0] >= most / 4
