@@ -144,11 +144,11 @@ class Bench:
         return replace(self, effects={**self.effects, effect.name: effect},
                        files={**self.files, effect.name: file} if file is not None else self.files)
 
-    def searched(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
+    def search_effects(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
         """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
-        from logger.lab.diagnosis import refitted
-        from logger.lab.selection.candidate_fit import refined, roughly_fitted
-        from logger.lab.selection.screening import misalignment, screened
+        from logger.lab.diagnosis import refit
+        from logger.lab.selection.candidate_fit import fit_roughly, refine
+        from logger.lab.selection.screening import misalignment, screen
         from logger.vehicle.effect import chosen
 
         if set(values) >= {one.name for one in effect.parameters}:
@@ -158,12 +158,12 @@ class Bench:
             tell("refitting the car's own numbers")
             nominal = posterior.start(self.model.effects)
             seen = misalignment(posterior, nominal)
-            base = refitted(posterior, nominal)
+            base = refit(posterior, nominal)
             tell(f"searching for {effect.name}")
-            tries = roughly_fitted(base.score, base, screened(base, effect, [seen]))
+            tries = fit_roughly(base.score, base, screen(base, effect, [seen]))
         choices = {one.name for one in effect.parameters if one.choices} & set(values)
         said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
-        best = max((refined(base.score, one) for one in said or tries), key=lambda one: one.gain)
+        best = max((refine(base.score, one) for one in said or tries), key=lambda one: one.gain)
         return chosen(effect, {**best.chosen.values, **values})
 
     def added(self, start: Chosen, candidates: int, tell: Tell = unsaid) -> AddedEffects:

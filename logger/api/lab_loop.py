@@ -31,7 +31,7 @@ from logger.store.formats import vehicle_file as vehicle_format
 if TYPE_CHECKING:
     from logger.lab import compare, diagnosis
     from logger.lab.selection.add_effect import AddedEffects
-    from logger.lab.session import Round, SoughtLaw, Story
+    from logger.lab.session import LawSearch, Round, Story
     from logger.report.html import Html
     from logger.vehicle.effect import Chosen
 
@@ -201,7 +201,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
     diagnoses: list[diagnosis.Diagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
-    law: SoughtLaw | None = None
+    law: LawSearch | None = None
     step = _Step(given, out, tell, progress, explain)
     going = asked = True
     while going and len(rounds) < MOST_ROUNDS:
@@ -209,7 +209,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
         tell(chapter("Diagnose", explain("diagnose", "", word)))
         diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
         tell(diagnosis_lines(diagnoses[-1], _SHOWN))
-        if diagnoses[-1].left_over and asked:
+        if diagnoses[-1].exceeds_noise and asked:
             asked = False
             if learns():
                 step, law, made = step.learned()
@@ -253,10 +253,10 @@ class _Step:
             addition = self.given.added(begin, len(begin.effect.trials()), tell)
         return self._with(addition, name, file)
 
-    def learned(self) -> tuple[_Step, SoughtLaw, list[Round]]:
+    def learned(self) -> tuple[_Step, LawSearch, list[Round]]:
         """A law learned, written and added, with what is missing beside it; or none."""
         from logger.api.learning import learned, picture_of, with_law
-        from logger.lab.session import SoughtLaw
+        from logger.lab.session import LawSearch
         from logger.report.law_text import law_lines, source_of
 
         file = self.out / LAW
@@ -265,7 +265,7 @@ class _Step:
             found = learned(self.given, tell)
         self.tell(law_lines(found.learning, found.addition))
         if found.addition is None:
-            return self, SoughtLaw(found.learning, None, None, ""), []
+            return self, LawSearch(found.learning, None, None, ""), []
         write_text(file, source_of(found.learning, found.addition))
         self.tell(["", f"Law: {file}"])
         knows, addition = with_law(self.given, found.addition, file)
@@ -273,7 +273,7 @@ class _Step:
         vehicle = _vehicle_file(self.out, 1)
         self.tell(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
         step, made = replace(self, given=knows)._with(addition, name, vehicle)
-        return step, SoughtLaw(found.learning, found.addition, picture_of(found), str(file)), [made]
+        return step, LawSearch(found.learning, found.addition, picture_of(found), str(file)), [made]
 
     def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
         """The vehicle with what was added written and compared."""
@@ -296,7 +296,7 @@ def _vehicle_file(out: Path, number: int) -> Path:
 
 def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
     with progress() as tell:
-        return given.searched(given.effects[name], {}, tell)
+        return given.search_effects(given.effects[name], {}, tell)
 
 
 def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:

@@ -142,4 +142,4 @@ def picture_of(found: LearnedModel) -> Curves | None:
         return None
     draft: Draft = law.draft
     one = next(one for one in addition.new if one.effect.name == draft.name)
-    return picture(draft, one, addition.errors, found.learning.look)
+    return picture(draft, one, addition.errors, found.learning.context)

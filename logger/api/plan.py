@@ -122,14 +122,14 @@ def planned(
     """What the lab says. Arguments as of ``bench_of``; ``bench``: of the runs that there are. BadInput as ``plan``."""
     from logger.lab.likelihood.priors import Tolerance
     from logger.lab.planning.plan import plan as planned_by_lab
-    from logger.lab.planning.planned_drive import CarThere, SensorNoise
+    from logger.lab.planning.planned_drive import PlannedCar, SensorNoise
 
     _check(asked, bench)
     drives = _empty_drives(model, asked)
     ready = bench or planned_bench(word, model, drives, effect_files, numbers)
     posterior = ready.posterior(searches=True)
-    there = CarThere(posterior.vehicle, posterior.stands, Tolerance(numbers=numbers), model.effects,
-                     posterior.prior.logs(posterior.vehicle, posterior.stands))
+    there = PlannedCar(posterior.vehicle, posterior.start_vehicle, Tolerance(numbers=numbers), model.effects,
+                     posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
     usual = SensorNoise(NOISE_MPS2, asked.step_mps2)
     noise = None if asked.noise_mps2 is None else SensorNoise(asked.noise_mps2, asked.step_mps2)
     with ready.blamed():

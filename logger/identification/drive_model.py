@@ -76,7 +76,7 @@ class DriveModel:
         if record.usable is None:
             return prediction
         whole = np.concatenate([np.zeros(record.first), prediction])
-        return record.kept_mps2 - record.left_by(whole)[record.first:]
+        return record.kept_mps2 - record.residual(whole)[record.first:]
 
     def observed_slopes(self, run: int, prediction: Array, slopes: Array) -> Array:
         """Slopes (n, p) of that: none where it does not change with the prediction (n,)."""

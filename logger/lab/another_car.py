@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run, normalised_rms_error
@@ -24,7 +24,7 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-SAYS_LITTLE = 0.8
+POOR_ERROR = 0.8
 """From this error on a model explains next to nothing: a third of the power (1 - 0.8 squared)."""
 
 
@@ -52,16 +52,16 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     far_sigma, several    so many numbers off by so many deviations are another car's (a judgement: an effect that is
                    missing moves few numbers far)
     """
-    if normalised_rms_error(runs, predictions) < SAYS_LITTLE:
+    if normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
-    some = SimulatedRuns([_beginning(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
-    wide = Posterior(some, vehicle, anything, vehicle).without_wall()
-    error = wide.error(aligned(wide, wide.start(effects)).state)
-    if error < SAYS_LITTLE:
+    some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
+    wide = Posterior(some, vehicle, anything, vehicle).without_soft_bounds()
+    error = wide.error(align(wide, wide.start(effects)).state)
+    if error < POOR_ERROR:
         return None
     start = wide.start(effects)
-    found = fit(aligned(wide, wide.at(effects, _drawn(wide, effects), start.record, start.size)), rounds=10).state
+    found = fit(align(wide, wide.state_at(effects, _cross_entropy_search(wide, effects), start.record, start.size)), rounds=10).state
     found_error = wide.error(found)
     lengths = wide.prior.deviations < anything.numbers
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
@@ -73,7 +73,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
-def _beginning(run: Run, lasts_s: float = 25.0) -> Run:
+def _first_part(run: Run, lasts_s: float = 25.0) -> Run:
     """The first part of a run: some thirty bounces of the body are enough to recognise a car by."""
     count = min(run.count, round((run.skip_s + lasts_s) * run.rate_hz))
     return replace(run, measured_mps2=run.measured_mps2[:count], distance_m=run.distance_m[:count],
@@ -81,7 +81,7 @@ def _beginning(run: Run, lasts_s: float = 25.0) -> Run:
                    more=run.more[:, :count])
 
 
-def _drawn(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60, best_of: int = 8,
+def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60, best_of: int = 8,
            least_spread: float = 0.03) -> Array:
     """Logarithms (p,) of the numbers of a car that explains a record roughly: the best of many that are drawn around
     the best so far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,

@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.map_fit import align, fit, fit_rounded_readings
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.repeats import Repeats, repeats_among
+from logger.lab.likelihood.repeats import Repeats, find_repeats
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
@@ -31,10 +31,6 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
-
-FAR_SIGMA = 3.0
-"""So many standard deviations of what a number is usually off are far: of a dozen numbers that are right, one goes as
-far in thirty comparisons."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,17 +81,17 @@ class Comparison:
     @cached_property
     def repeats(self) -> Repeats | None:
         """What runs that repeat each other differ by; None where none does."""
-        return repeats_among(self.plain.residuals.runs)
+        return find_repeats(self.plain.residuals.runs)
 
     @property
-    def tells(self) -> bool:
+    def exceeds_discrepancy(self) -> bool:
         """Whether the residual is larger than what two right simulations of a car differ by."""
         return self.removed.error >= DISCREPANCY
 
     @property
     def tests_found(self) -> tuple[ResidualTest, ...]:
         """Those that find more than noise, and matter."""
-        return self.tests.found if self.tells else ()
+        return self.tests.found if self.exceeds_discrepancy else ()
 
     @property
     def missing(self) -> bool:
@@ -116,9 +112,9 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     """
     car = compose(vehicle, effects)
     plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
-    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_wall()
+    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_soft_bounds()
     names, deviations = posterior.prior.names, posterior.prior.deviations
-    state = read_beside(fit(aligned(posterior, posterior.start(effects)))).state
+    state = fit_rounded_readings(fit(align(posterior, posterior.start(effects)))).state
     if posterior.error(state) > plain.error:
         # The fit weighs every frequency by its noise, and may buy a better top with a worse body bounce.
         state = posterior.start(effects)
@@ -126,7 +122,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
         return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), removed,
                           _tests(plain, removed, plain))
     car = posterior.car(state.effects, state.logs)
-    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.moved_m(state.record)))
+    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
     removed = removed_from(posterior, plain.residuals.predictions, state)
     away = np.abs(state.logs / deviations)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
@@ -134,14 +130,14 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
-                      tuple(names[index] for index in np.argsort(-away) if away[index] > FAR_SIGMA),
+                      tuple(names[index] for index in np.argsort(-away) if away[index] > UNUSUAL_SIGMA),
                       removed, _tests(refitted, removed, plain))
 
 
 def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTests:
     """Tests of the residual without the sensors' drift."""
     residuals, where = refitted.residuals, refitted.where
-    if removed.drifting:
-        residuals = replace(residuals, predictions=removed.cleared(residuals.predictions))
+    if removed.drifting_sensors:
+        residuals = replace(residuals, predictions=removed.without_drift(residuals.predictions))
         where = breakdown(residuals)
     return run_residual_tests(residuals, where, plain.residuals)

@@ -15,17 +15,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.map_fit import align, fit, fit_rounded_readings
 from logger.lab.likelihood.noise_floor import (
     UNEXPLAINED,
     Noise,
     SignalErrors,
-    excess,
+    excess_over_noise,
     floor_error,
-    noise_as_read,
+    sensor_noise_with_rounding,
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -33,18 +34,16 @@ from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
-from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
-from logger.lab.selection.holdout import HoldOut, held_out
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Effort, Search, Selection, out_of_sight
+from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
 Progress = Callable[[str], None]
 
-HAS_IT = "the model has it"
-CONFLICT_SIGMA = 4.0
-"""A number of the car that has to be off by more standard deviations of its prior than this is in conflict with it."""
+ALREADY_PRESENT = "the model has it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +118,14 @@ class Diagnosis:
     car: FittedCar | None = None
 
     @property
-    def left_over(self) -> bool:
+    def exceeds_noise(self) -> bool:
         """Whether more is left than the sensor's noise."""
         return self.excess > UNEXPLAINED
 
     @property
     def unexplained(self) -> bool:
         """Whether the effects of the verdict, in a car within its tolerance, do not explain all."""
-        return self.left_over or bool(self.conflicts)
+        return self.exceeds_noise or bool(self.conflicts)
 
     @property
     def missing(self) -> tuple[Chosen, ...]:
@@ -137,7 +136,7 @@ class Diagnosis:
     @property
     def not_tried(self) -> dict[str, str]:
         """Effects that could not be tried, and why."""
-        return {name: why for name, why in self.obstacles.items() if why != HAS_IT}
+        return {name: why for name, why in self.obstacles.items() if why != ALREADY_PRESENT}
 
     def candidate(self, name: str) -> Candidate:
         """What was found of one that was tried."""
@@ -150,11 +149,11 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    search, selection = searched(posterior, effects, present, progress, workers)
-    return judged(posterior, effects, present, search, selection)
+    search, selection = search_effects(posterior, effects, present, progress, workers)
+    return assess(posterior, effects, present, search, selection)
 
 
-def searched(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
              progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
              ) -> tuple[Search, Selection]:
     """The search of a diagnosis, and what it came to; as ``diagnose``."""
@@ -162,13 +161,13 @@ def searched(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
-    before = refitted(posterior, nominal)
+    before = refit(posterior, nominal)
     search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers,
                     effort or Effort())
     return search, search.run(before)
 
 
-def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
+def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
            selection: Selection) -> Diagnosis:
     """What a search came to, fitted finely, with all that is to be said of it."""
     progress, tried = search.progress, search.effects
@@ -176,11 +175,11 @@ def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     progress("fitting it finely")
     selection, after = _finely_fitted(search, selection)
     fine, state = after.posterior, after.state
-    read = noise_as_read(fine, state)
+    read = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
-    with_errors, _ = standard_errors(after)
+    with_standard_errors, _ = standard_errors(after)
     progress("what these runs could not show")
-    above = excess(fine, state, FALSE_ALARM)
+    above = excess_over_noise(fine, state, FALSE_ALARM)
     stood = fine.start(present)
     removed = removed_from(fine, stood.predictions, state)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
@@ -189,16 +188,16 @@ def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         baseline_error=fine.error(stood), final_error=fine.error(state),
         noise=read, noise_floor_error=floor_error(fine, read), candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=above,
-        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_errors,
+        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_standard_errors,
         undetectable=hidden, shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, stood, state),
         car=fitted_car(fine, stood, state),
     )
 
 
-def refitted(posterior: Posterior, nominal: State) -> Baseline:
+def refit(posterior: Posterior, nominal: State) -> Baseline:
     """The car's own numbers and the distance errors fitted."""
-    return Baseline.of(read_beside(fit(aligned(posterior, nominal))))
+    return Baseline.of(fit_rounded_readings(fit(align(posterior, nominal))))
 
 
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -208,7 +207,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
-        why = HAS_IT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
+        why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
         if why is not None:
             found[name] = why
     return found
@@ -217,15 +216,15 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 def _finely_fitted(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, finely simulated, in a car that may bend as far as the runs ask: so that it shows when
     it has to bend too far. What is nothing then, or something else, is left out."""
-    fine = selection.before.posterior.without_wall(fine=True)
+    fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
         state = selection.now.state
-        start = fine.at(state.effects, state.logs, state.record, state.size)
-        after = read_beside(fit(aligned(fine, start), selection.now.linear.numbers))
-        ended = [one.effect.name for one in after.state.effects[search.present:] if out_of_sight(fine, one)]
+        start = fine.state_at(state.effects, state.logs, state.record, state.size)
+        after = fit_rounded_readings(fit(align(fine, start), selection.now.linear.numbers))
+        ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
             return selection, after
-        selection = search.left_out(selection, ended[0])
+        selection = search.without_effect(selection, ended[0])
 
 
 def _conflicts(posterior: Posterior, state: State) -> dict[str, float]:
@@ -259,7 +258,7 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
-    others += [_of_promise(selection.before, one, before, count) for one in selection.first.promises
+    others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
                if one.effect.name not in selection.gains]
     return (*found, *sorted(others, key=lambda one: -one.gain))
 
@@ -268,7 +267,7 @@ def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[Candi
     there = one.hold_out
     p_value = probability_by_chance(one.gain, count)
     alike = tuple(other.effect.name for other in fits
-                  if other is not one and abs(other.gain - one.gain) < CONFUSED and p_value < FALSE_ALARM)
+                  if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
     return Candidate(one.effect, one.chosen.values, there.error, p_value, one.gain, before.deviance - there.deviance,
                      alike)
 
@@ -276,7 +275,7 @@ def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[Candi
 def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> Candidate:
     """An effect that was not fitted: at the strength that its trial promises."""
     trial = one.trials[0]
-    there = held_out(base.linear, [change[None] for change in trial.change])
+    there = cross_validate(base.linear, [change[None] for change in trial.change])
     gain = trial.gain - len(moves_of([trial.one])) * float(np.log(base.posterior.freedom))
     return Candidate(one.effect, trial.one.values, there.error, probability_by_chance(gain, count), gain,
                      before.deviance - there.deviance, ())

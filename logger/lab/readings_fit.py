@@ -24,7 +24,7 @@ from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.session import upright_fit
 from logger.lab.likelihood.distance_error import USUAL, RecordError
-from logger.lab.likelihood.lag import followed_m
+from logger.lab.likelihood.lag import offset_by_lag_m
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.readings import Readings
 from logger.runs import Run, normalised_rms
@@ -63,8 +63,8 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
             at = _moved(model, found, errors, at).at
         there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
         predictions = _whole(model_of(there), _values(found))
-        readings = [Readings.of(one).beside(prediction) for one, prediction in zip(there, predictions, strict=True)]
-        rounded = not all(one.as_read for one in readings)
+        readings = [Readings.of(one).given(prediction) for one, prediction in zip(there, predictions, strict=True)]
+        rounded = not all(one.rounding_is_noise for one in readings)
         if not (rounded or moves):
             return ReadingsFit(found, model)
         before = found
@@ -75,7 +75,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
             break
     if moves:
         found = _with_spread(found, _moved(model, found, errors, at))
-    off_m = max((float(np.abs(error.moved_m(k)).max()) for error, k in zip(errors, at, strict=True)
+    off_m = max((float(np.abs(error.distance_error_m(k)).max()) for error, k in zip(errors, at, strict=True)
                  if error is not None and k is not None), default=0.0)
     return ReadingsFit(_as_read(found, first, model, records), model, rounded, off_m)
 
@@ -90,7 +90,7 @@ def _places(record: Run) -> RecordError | None:
 def _at(record: Run, error: RecordError | None, k: Array | None) -> Run:
     if error is None or k is None:
         return record
-    return replace(record, distance_m=record.distance_m + error.moved_m(k))
+    return replace(record, distance_m=record.distance_m + error.distance_error_m(k))
 
 
 def _values(found: Fit) -> Array:
@@ -107,7 +107,7 @@ def _followed(model: DriveModel, errors: Sequence[RecordError | None]) -> list[A
     """Numbers of the distance errors with which runs lie where a car with the numbers that a fit starts from is like
     them."""
     predictions = _whole(model, np.array([one.start for one in model.parameters]))
-    return [None if error is None else error.through(followed_m(record, prediction))
+    return [None if error is None else error.coefficients_of(offset_by_lag_m(record, prediction))
             for record, error, prediction in zip(model.records, errors, predictions, strict=True)]
 
 
@@ -188,7 +188,7 @@ def _with_spread(found: Fit, places: _Moved) -> Fit:
 def _as_read(found: Fit, first: Fit, model: DriveModel, records: Sequence[Run]) -> Fit:
     """A fit with the errors of readings as they were read, and where its numbers started."""
     predictions = model.predict(_values(found))
-    read = [record.left_by(np.concatenate([np.zeros(record.first), one]))[record.first:]
+    read = [record.residual(np.concatenate([np.zeros(record.first), one]))[record.first:]
             for record, one in zip(records, predictions, strict=True)]
     return replace(found, free=first.free, residuals=read, error_before=first.error_before,
                    error_after=normalised_rms(read, [record.kept_mps2 for record in records]))

@@ -63,7 +63,7 @@ class RoadMatch:
         return self.is_clear and self.turned - self.correlation > self.chance - self.mean_chance
 
 
-def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
+def pool(matches: Sequence[RoadMatch]) -> RoadMatch:
     """Several runs together, their means: what none of them could show by itself, all may, as the mean of maxima
     scatters less around its own mean than one of them."""
     upright, turned, gain, chance, mean_chance, expected = map(
@@ -110,7 +110,7 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s
     starts = range(run.first, run.count - size + 1, size)
     if not whole.is_refuted or len(starts) < 2:
         return whole
-    parts = pooled([of(slice(at, at + size)) for at in starts])
+    parts = pool([of(slice(at, at + size)) for at in starts])
     return parts if max(parts.correlation, parts.turned) > parts.chance else whole
 
 
@@ -172,7 +172,7 @@ def _expected(run: Run, band_hz: tuple[float, float], without_noise: float = 0.5
     without_noise    measured: the right road gave 0.63 and more in 200 runs of 56 simulated cars with one, two or
                      unlisted effects missing, each far stronger than the noise; wrong roads at most 0.36
     """
-    noise, _ = Bands(run).quiet(run.measured_mps2)
+    noise, _ = Bands(run).noise_band_power(run.measured_mps2)
     kept = run.kept_mps2 - run.kept_mps2.mean()
     power = np.abs(np.fft.rfft(kept)) ** 2 / len(kept)
     f_hz = np.fft.rfftfreq(len(kept), 1 / run.rate_hz)

@@ -21,7 +21,7 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class SoughtLaw:
+class LawSearch:
     """A law that was looked for where no effect explained what is missing.
 
     addition    the model with it, and its picture; None: none was learned, or it is no force that a picture shows
@@ -48,7 +48,7 @@ class Story:
     diagnoses: tuple[Diagnosis, ...]
     rounds: tuple[Round, ...]
     refused: tuple[str, ...]
-    law: SoughtLaw | None = None
+    law: LawSearch | None = None
 
     @property
     def last(self) -> Comparison:

@@ -117,8 +117,8 @@ def source_of(found: Learning, addition: AddedEffects | None) -> str:
     if law is None or addition is None:
         return ""
     said = words(law, addition)
-    seconds = sum((run.count - run.first) / run.rate_hz for run in found.look.runs)
-    count = len(found.look.runs)
+    seconds = sum((run.count - run.first) / run.rate_hz for run in found.context.runs)
+    count = len(found.context.runs)
     head = [f"{said[0].upper()}{said[1:]}.",
             f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
             "Its numbers begin where that fit ended: ridelog add-effect with this file fits them again, with the car."]

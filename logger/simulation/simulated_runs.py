@@ -53,34 +53,34 @@ class SimulatedRuns:
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False,
+    def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
                 tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
         """What would have been recorded in each run, whole, in its pass band (n,) [m/s2]; of one with more signals all
         ((1 + s) n,).
 
-        moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
+        distance_error_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         rough      step a car that rubs no finer than others: what a change does shows well enough by that
         tracks     roads in place of the runs' own; runs are laid out again for each such object
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            passages = self._laid_out(car, moved_m, rough, tracks)
+            passages = self._laid_out(car, distance_error_m, rough, tracks)
             for step_s in {one.step_s for one in passages if car.bends_laws}:
                 stepper_of(car, step_s)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
             partial(_recorded, car), passages, [run.signals for run in self.runs])
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
-    def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
+    def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
+            return [respond(car, passage) for passage in self._laid_out(car, distance_error_m)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False,
+    def _laid_out(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
                   tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
         fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs and not rough else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
-            distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
+            distance = run.distance_m if distance_error_m is None else run.distance_m + distance_error_m[index]
             distance = car.driven(distance)
             track: WheelTracks = run.track if tracks is None else tracks[index]
             key = fine_hz, distance.tobytes(), track

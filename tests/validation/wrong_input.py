@@ -23,7 +23,7 @@ from logger.api.bench import unsaid
 from logger.api.model_checks import check_model
 from logger.api.run_checks import lab_runs
 from logger.errors import BadInput
-from logger.lab.another_car import SAYS_LITTLE
+from logger.lab.another_car import POOR_ERROR
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -93,7 +93,7 @@ def main() -> int:
 
 def says_little(runs: list[Run], model: Model) -> bool:
     """Whether a model explains less than a third of the power of what was measured."""
-    return normalised_rms_error(runs, SimulatedRuns(runs).predict(compose(model.vehicle, model.effects))) > SAYS_LITTLE
+    return normalised_rms_error(runs, SimulatedRuns(runs).predict(compose(model.vehicle, model.effects))) > POOR_ERROR
 
 
 def made(kind: str, seed: int) -> tuple[list[Run], Model]:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _STRONGEST = 100.0
@@ -29,7 +29,7 @@ class Motion:
 
     at         its short name, as drafts have it
     name       in words
-    measure    what ``Look.reach`` calls it
+    measure    what ``LawContext.reach`` calls it
     unit       in which it is measured
     shown      the same in words: factor and unit
     method     of ``Laws`` that takes such a force, with what is handed on to it
@@ -79,20 +79,20 @@ class CurveFamily(Family):
     ends: tuple[tuple[int, str], ...]
 
     @abstractmethod
-    def usual_force_n(self, look: Look, usual: float) -> float:
+    def usual_force_n(self, context: LawContext, usual: float) -> float:
         """What such a force usually is where the motion is ``usual`` [N]."""
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         def reach(share: float) -> float:
-            return look.reach(self.motion.measure, share)
+            return context.reach(self.motion.measure, share)
 
         usual = reach(self.usual_share)
-        size_n = self.usual_force_n(look, usual)
+        size_n = self.usual_force_n(context, usual)
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
                 *(self._free(variant, [reach(share) for share in shares], size_n)
                   for variant, shares in _POINTS.items())]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         motion = self.motion.at
         if draft.variant == "power":
             return (f"a {self.force} that grows with the {motion} to the power {say('power_ratio')}, {say('force_n')} "

@@ -126,7 +126,7 @@ class Draft:
         return np.asarray(sum((one(at) for one in some), still) + others)
 
 
-def learned(one: Chosen) -> bool:
+def is_learned(one: Chosen) -> bool:
     """Whether an effect was learned."""
     return one.effect.name.startswith(LEARNED)
 

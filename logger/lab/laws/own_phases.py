@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 ALL_ALIKE: Sequence[str] = ("",)
 EACH = "_each"
@@ -19,9 +19,9 @@ BEGINS = ", beginning elsewhere in each run"
 _MOST = 8
 
 
-def each_run(look: Look) -> Sequence[str]:
+def each_run(context: LawContext) -> Sequence[str]:
     """A mark for each run that is learned from; none where there is one alone, or so many that laws cannot be read."""
-    count = len(look.runs)
+    count = len(context.runs)
     return [f"run_{number}" for number in range(1, count + 1)] if 1 < count <= _MOST else []
 
 

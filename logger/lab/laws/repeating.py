@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 Array = npt.NDArray[np.float64]
 
@@ -24,24 +24,24 @@ _LOUD = 12.0
 runs."""
 
 
-def white_residuals(look: Look) -> list[Array]:
+def white_residuals(context: LawContext) -> list[Array]:
     """Residuals (n - first,) per run, white in their bands, in units of the noise."""
-    posterior = look.posterior
+    posterior = context.posterior
     found = []
-    for run, bands, residual in zip(look.runs, posterior.bands, posterior.residuals(look.state), strict=True):
+    for run, bands, residual in zip(context.runs, posterior.bands, posterior.residuals(context.state), strict=True):
         white = bands.whitener(residual).in_time(residual)
         found.append(np.asarray(white[: run.count - run.first]))
     return found
 
 
-def along_the_way(look: Look, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
+def spatial_frequency(context: LawContext, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
     """The wave number at which something repeats along the way, whatever the speed [1/m]; None where nothing does.
 
     per_m          between these
     speed_power    it grows with the speed to this power
     """
     signals, ways = [], []
-    for run, residual, moved in zip(look.runs, white_residuals(look), look.posterior.moved_m(look.state.record),
+    for run, residual, moved in zip(context.runs, white_residuals(context), context.posterior.distance_error_m(context.state.record),
                                     strict=True):
         speed = np.maximum(run.speed_mps[run.first:], _SLOWEST_MPS)
         signals.append(residual * (speed / speed.mean()) ** speed_power)
@@ -108,27 +108,27 @@ _STEPS_HZ = 0.25
 _COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
 
 
-def tone_in_time(look: Look, hz: tuple[float, float], wanders: bool) -> Tone | None:
+def tone_in_time(context: LawContext, hz: tuple[float, float], wanders: bool) -> Tone | None:
     """The tone that is loudest, at the same time since each run began; None where none stands out.
 
     hz         its mean frequency is between these
     wanders    its frequency may wander by a sinusoid
     """
-    signals = white_residuals(look)
-    rate = look.runs[0].rate_hz
-    began_s = look.runs[0].first / rate
-    begin = _steady(signals, rate, hz) if not wanders else _ridge(signals, rate, began_s, hz)
+    signals = white_residuals(context)
+    rate = context.runs[0].rate_hz
+    began_s = context.runs[0].first / rate
+    begin = _steady_tone(signals, rate, hz) if not wanders else _strongest_ridge(signals, rate, began_s, hz)
     at = np.array([begin.frequency_hz, begin.frequency_hz * begin.wander_cos_s,
                    begin.frequency_hz * begin.wander_sin_s, 1 / begin.period_s])
     for coherent_s in _COHERENT_S:
-        at = _refined(signals, rate, began_s, at, coherent_s, wanders)
+        at = _refine(signals, rate, began_s, at, coherent_s, wanders)
     power = _coherent(signals, rate, began_s, at, _COHERENT_S[-1])
     if power < _LOUD * len(signals) or not hz[0] < at[0] < hz[1]:
         return None
     return Tone(float(at[0]), float(at[1] / at[0]), float(at[2] / at[0]), float(1 / at[3]), power)
 
 
-def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+def _steady_tone(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
     size = _FINER * max(map(len, signals))
     power = sum(np.abs(np.fft.rfft(one, size)) ** 2 / len(one) for one in signals)
     f_hz = np.fft.rfftfreq(size, 1 / rate_hz)
@@ -137,7 +137,7 @@ def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> To
     return Tone(float(f_hz[best]), 0.0, 0.0, _PERIODS_S[-1], 0.0)
 
 
-def _ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
+def _strongest_ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
     """Where the powers of short windows add up to most along a frequency that goes up and down."""
     size, hop = round(_WINDOW_S * rate_hz), round(_WINDOW_S * _HOP * rate_hz)
     taper = np.hanning(size + 1)[:-1]
@@ -181,7 +181,7 @@ def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, c
     return found
 
 
-def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
+def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
              wanders: bool) -> Array:
     from scipy.optimize import minimize
 
@@ -191,13 +191,13 @@ def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, co
     sizes = np.array([0.25 / lasts_s, late, late, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
     free = [0, 1, 2, 3] if wanders else [0]
 
-    def lack(x: Array) -> float:
+    def negative_power(x: Array) -> float:
         there = at.copy()
         there[free] += x * sizes[free]
         return -_coherent(signals, rate_hz, began_s, there, coherent_s)
 
     simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
-    found = minimize(lack, np.zeros(len(free)), method="Nelder-Mead",
+    found = minimize(negative_power, np.zeros(len(free)), method="Nelder-Mead",
                      options={"initial_simplex": simplex, "maxfev": 80 * len(free), "xatol": 0.02, "fatol": 0.1})
     there = at.copy()
     there[free] += found.x * sizes[free]

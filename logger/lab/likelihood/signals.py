@@ -1,9 +1,9 @@
 """Several measured signals of one run, each with its own noise.
 
 Problem: a travel sensor and an accelerometer on a wheel have other units and other noise than the sensor on the body,
-and where the car was is the same for all of them. Solution: signals are joined, one after the other; each has bands of
-its own (``whittle``), so that its level is free, and what is whitened is joined again. All that is done with whitened
-columns, the elimination of the distance error above all, does not ask how many signals there were.
+and one distance error for all of them. Solution: signals are joined, one after the other; each has bands of its own
+(``whittle``), so that its level is free, and whitened signals are joined again. Whatever works on whitened columns, the
+elimination of the distance error above all, need not know how many signals there were.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ class JointWhitener:
 
 @dataclass(frozen=True, eq=False)
 class SignalResiduals:
-    """What a model leaves of one signal in the runs that have it, or of the acceleration of one sensor: runs whose
-    readings have other steps or another range are of another.
+    """Residuals of one signal in the runs that have it, or of the acceleration of one sensor; runs whose readings have
+    other steps or another range are of another sensor.
 
     name         of the signal; empty: the sensor's acceleration
-    runs, bands, residuals (n,), shares    the last as of ``Readings``
+    runs, bands, residuals (n,), shares    of each run; the last as of ``Readings``
     size         r.m.s. of what was measured in all
     """
 

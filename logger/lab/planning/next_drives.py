@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from logger.lab.planning.planned_drive import CarThere, PlannedDrive, SensorNoise, again, at_speed
+from logger.lab.planning.planned_drive import PlannedCar, PlannedDrive, SensorNoise, at_speed, repeat_run
 from logger.profiles.track import Track
 from logger.runs import Run, Signal
 from logger.simulation.virtual_drive import Obstacle, with_obstacles
@@ -45,7 +45,7 @@ class OptionDrive:
     options: tuple[tuple[Option, tuple[int, ...]], ...]
 
 
-def option_drives(there: CarThere, noise: SensorNoise, road: Track | None, known: Sequence[Run]
+def option_drives(there: PlannedCar, noise: SensorNoise, road: Track | None, known: Sequence[Run]
                   ) -> Iterator[OptionDrive]:
     """All of them. Where no ``road`` is known only second sensors are tried, on a rig as it was driven.
 
@@ -55,7 +55,7 @@ def option_drives(there: CarThere, noise: SensorNoise, road: Track | None, known
     signals = [one for one in second_sensors(there.nominal) if (one.measures, one.of) not in there_already]
     usual = sorted(known, key=lambda run: float(run.speed_mps.mean()))[len(known) // 2]
     if road is None:
-        drive = PlannedDrive(again(usual, signals, MOST_S), there, noise)
+        drive = PlannedDrive(repeat_run(usual, signals, MOST_S), there, noise)
         yield _with_signals(drive, None, signals, drive.run.count / drive.run.rate_hz)
         return
     usual_mps = float(usual.speed_mps.mean())
@@ -89,7 +89,7 @@ def _with_signals(drive: PlannedDrive, speed: float | None, signals: Sequence[Si
                                         for index, one in enumerate(signals))))
 
 
-def _possible(there: CarThere, noise: SensorNoise, road: Track, speed_mps: float,
+def _possible(there: PlannedCar, noise: SensorNoise, road: Track, speed_mps: float,
               signals: Sequence[Signal]) -> PlannedDrive | None:
     """The drive, if the road is long enough and nobody is thrown about."""
     if (road.end_m - road.start_m) / speed_mps < _LEAST_S:

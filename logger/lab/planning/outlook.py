@@ -17,14 +17,14 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL
 from logger.lab.planning.planned_drive import SIZES, Information, with_larger_errors
-from logger.lab.selection.detectability import DETECTABLE_SIGMA, usual_says_little
-from logger.lab.selection.evidence import CONFUSED
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, is_uninformative_at_usual
+from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.vehicle.effect import Chosen, Effect, chosen
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
-ISOLABLE_SIGMA = float(np.sqrt(CONFUSED))
+ISOLABLE_SIGMA = float(np.sqrt(INDISTINGUISHABLE))
 """Two effects are distinguishable where so many deviations of the one remain once the other is fitted: their square is
 the difference of the two scores."""
 _MOST_TRIALS = 4
@@ -74,7 +74,7 @@ class Outlook:
     detectability: Array
     pairwise: Array
 
-    def standing_out(self, detectability: Array) -> Outlook:
+    def scaled_to(self, detectability: Array) -> Outlook:
         """The same with effects that stand out by so much (e,) in truth; what remains of each beside another one is
         less in the same proportion."""
         share = detectability / np.maximum(self.detectability, _TINY)
@@ -110,7 +110,7 @@ def representatives(settings: EffectGrid, information: Information, precision: A
     alone = np.sqrt(np.maximum((np.einsum("sii->si", marginal) + costs[:, None]).min(axis=0), 0.0))
     found = settings.first.copy()
     for index, effect in enumerate(settings.effects):
-        if usual_says_little(effect, float(alone[found[index]])):
+        if is_uninformative_at_usual(effect, float(alone[found[index]])):
             found[index] = max(settings.columns_of(index), key=lambda column: alone[column])
     return found
 

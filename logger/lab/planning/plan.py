@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
-from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.map_fit import align, fit, fit_rounded_readings
+from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
 from logger.lab.planning.outlook import (
@@ -32,8 +32,8 @@ from logger.lab.planning.outlook import (
     outlook,
     representatives,
 )
-from logger.lab.planning.planned_drive import SIZES, CarThere, Information, PlannedDrive, SensorNoise, information
-from logger.lab.planning.refit import DrivesThere, refitted_gain
+from logger.lab.planning.planned_drive import SIZES, Information, PlannedCar, PlannedDrive, SensorNoise, information
+from logger.lab.planning.refit import LinearisedDrives, refitted_gain
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -97,7 +97,7 @@ class Plan:
         return [tuple(self.names[one] for one in sorted(some)) for some in found if len(some) > 1]
 
 
-def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
+def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
          progress: Progress = lambda words: None, workers: int = 2) -> Plan:
     """What runs and planned drives could show of ``effects``.
@@ -112,9 +112,9 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     fitted, measured = None, noise is None and runs is not None
     if runs is not None:
         progress("refitting the car's own numbers")
-        fitted = read_beside(fit(aligned(runs, runs.start(there.effects))))
+        fitted = fit_rounded_readings(fit(align(runs, runs.start(there.effects))))
         there = replace(there, logs=fitted.state.logs)
-        noise = noise or SensorNoise(noise_of(fitted.posterior, fitted.state).deviation_mps2)
+        noise = noise or SensorNoise(sensor_noise_of(fitted.posterior, fitted.state).deviation_mps2)
     noise = noise or usual_noise
     drives = [PlannedDrive(one, there, noise) for one in planned]
     posteriors = [*([fitted.posterior] if fitted is not None else []), *(one.posterior for one in drives)]
@@ -122,26 +122,26 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     settings = EffectGrid.of([one for name, one in effects.items() if name not in obstacles])
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
-        asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
-        parts: list[_Shown] = []
+        analysis = _Analysis(settings, posteriors[0].prior.without_soft_bounds().curvature(there.logs), pool)
+        parts: list[_DriveSet] = []
         if fitted is not None:
             progress("what the runs show")
-            parts.append(asked.of_runs(fitted))
+            parts.append(analysis.of_runs(fitted))
         for number, drive in enumerate(drives, 1):
             progress(f"what planned drive {number} of {len(drives)} would show")
-            parts.append(asked.of_drive(drive))
+            parts.append(analysis.of_drive(drive))
         total = reduce(add, (one.information for one in parts))
-        columns = representatives(settings, total, asked.precision)
-        now = outlook(settings, total, asked.precision, columns)
+        columns = representatives(settings, total, analysis.precision)
+        now = outlook(settings, total, analysis.precision, columns)
         progress("what a refit would leave of each effect")
-        refitted = asked.refitted(parts, total, columns, now)
+        refitted = analysis.refitted(parts, total, columns, now)
         following: list[NextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
-            changes = asked.changes(one.drive)
+            changes = analysis.changes(one.drive)
             for option, signals in one.options:
                 after = total + one.drive.information(changes, signals)
-                following.append(_next(option, settings, now, outlook(settings, after, asked.precision, columns)))
+                following.append(_next(option, settings, now, outlook(settings, after, analysis.precision, columns)))
     return Plan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
         tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), refitted,
@@ -150,16 +150,16 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _DriveSet:
     """What some drives show: beside which models, and what the effects do there, (m, n) per run."""
 
-    there: DrivesThere
+    there: LinearisedDrives
     changes: list[Array]
     information: Information
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Analysis:
     """What is asked of each drive: effects at some values; ``precision`` (p,) of the prior of the car's numbers."""
 
     settings: EffectGrid
@@ -170,15 +170,15 @@ class _Asked:
         """What the effects do to a planned record (m, (1 + s) n)."""
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
-    def of_drive(self, drive: PlannedDrive) -> _Shown:
+    def of_drive(self, drive: PlannedDrive) -> _DriveSet:
         """What a planned drive shows, recorded by its sensor alone."""
         linear, changes = drive.model(), self.changes(drive)
         levels = [np.concatenate(drive.levels(run, bands)) for run, bands in zip(
             linear.posterior.runs.runs, linear.posterior.bands, strict=True)]
-        return _Shown(DrivesThere(linear.without_wall(), levels, linear.state.predictions), [changes],
+        return _DriveSet(LinearisedDrives(linear.without_soft_bounds(), levels, linear.state.predictions), [changes],
                       information(linear, [changes]))
 
-    def of_runs(self, fitted: LinearModel) -> _Shown:
+    def of_runs(self, fitted: LinearModel) -> _DriveSet:
         """What runs show about additions to a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
@@ -188,22 +188,22 @@ class _Asked:
             [new - old for new, old in zip(one, here, strict=True)] for one in there), strict=True)]
         levels = [bands.levels(residual) for bands, residual in zip(
             posterior.bands, posterior.residuals(state), strict=True)]
-        return _Shown(DrivesThere(fitted.without_wall(), levels, here), changes, information(fitted, changes))
+        return _DriveSet(LinearisedDrives(fitted.without_soft_bounds(), levels, here), changes, information(fitted, changes))
 
-    def refitted(self, parts: Sequence[_Shown], total: Information, columns: Indices, now: Outlook) -> Outlook:
+    def refitted(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:
         """What the drives show where the car without each effect is refitted to what it does."""
         which, costs = likeliest_sizes(total, self.precision, columns)
-        of_size = {size: [one.there.of_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
+        with_size = {size: [one.there.with_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
 
         def deviations(index: int) -> float:
             first_order = float(now.detectability[index])
             if first_order < _AS_SLOPES_SAY:
                 return first_order
             changes = [[one[columns[index]] for one in part.changes] for part in parts]
-            gain = refitted_gain(of_size[int(which[index])], changes, self.precision) + costs[index]
+            gain = refitted_gain(with_size[int(which[index])], changes, self.precision) + costs[index]
             return float(np.sqrt(max(gain, 0.0)))
 
-        return now.standing_out(np.array(list(self.pool.map(deviations, range(len(columns))))))
+        return now.scaled_to(np.array(list(self.pool.map(deviations, range(len(columns))))))
 
 
 def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:

@@ -63,15 +63,15 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
-class CarThere:
+class PlannedCar:
     """The car that is to be driven.
 
-    nominal, stands    as of ``Posterior``
+    nominal, start_vehicle    as of ``Posterior``
     effects, logs      those it has, and (p,) logarithms of its numbers over the nominal ones
     """
 
     nominal: Vehicle
-    stands: Vehicle
+    start_vehicle: Vehicle
     tolerance: Tolerance
     effects: tuple[Chosen, ...]
     logs: Array
@@ -87,7 +87,7 @@ def at_speed(name: str, track: Track, vehicle: Vehicle, speed_mps: float, signal
     return _empty(name, track, motion.distance_m, motion.speed_mps, signals)
 
 
-def again(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
+def repeat_run(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
     """The beginning of a run once more, with other signals."""
     count = min(run.count, int(most_s * run.rate_hz))
     return replace(_empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals),
@@ -106,7 +106,7 @@ class PlannedDrive:
     numbers    what the car's numbers do to it (p, (1 + s) n)
     """
 
-    def __init__(self, run: Run, there: CarThere, noise: SensorNoise) -> None:
+    def __init__(self, run: Run, there: PlannedCar, noise: SensorNoise) -> None:
         self._there, self._noise = there, noise
         empty = self._posterior_of(run)
         self._here = empty.predict(there.effects, there.logs, self._no_errors(empty), rough=True)[0]
@@ -116,7 +116,7 @@ class PlannedDrive:
 
     def _posterior_of(self, run: Run) -> Posterior:
         there = self._there
-        return Posterior(SimulatedRuns([run], fine_hz=SEARCH_HZ), there.nominal, there.tolerance, there.stands)
+        return Posterior(SimulatedRuns([run], fine_hz=SEARCH_HZ), there.nominal, there.tolerance, there.start_vehicle)
 
     @staticmethod
     def _no_errors(posterior: Posterior) -> list[Array]:
@@ -194,15 +194,15 @@ class Information:
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
     """Of a model at its state, by effects' changes (m, n) per run."""
-    free = linear.without_wall()
+    free = linear.without_soft_bounds()
     logs, white = free.state.logs, free.whitened(changes)
     each, costs = [], []
     for size in SIZES:
-        there = free.of_size(with_larger_errors(free.size, size))
+        there = free.with_size(with_larger_errors(free.size, size))
         found = there.information(logs, white)
         found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
         each.append(found)
-        costs.append(there.occam)
+        costs.append(there.occam_factor)
     return Information(np.array(each), np.array(costs))
 
 

@@ -31,7 +31,7 @@ _KEPT = 1.1
 
 
 @dataclass(frozen=True, eq=False)
-class DrivesThere:
+class LinearisedDrives:
     """Drives, of runs or planned ones, beside whose predictions effects are looked at.
 
     linear         a normal prior of the car's numbers, levels that are expected
@@ -43,18 +43,18 @@ class DrivesThere:
     levels: list[Array]
     predictions: list[Array]
 
-    def beside(self, logs: Array, moved: Sequence[Array]) -> DrivesThere:
+    def relinearise(self, logs: Array, moved: Sequence[Array]) -> LinearisedDrives:
         """The same with slopes beside a car with other numbers (p,) that is so much farther on (k,), per run."""
         linear, posterior = self.linear, self.linear.posterior
         record = [k + more for k, more in zip(linear.state.record, moved, strict=True)]
         predictions = posterior.predict(linear.state.effects, logs, record, rough=True)
         state = replace(linear.state, logs=logs, record=record, predictions=predictions)
         fresh = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps), linear.whiteners)
-        return replace(self, linear=fresh.without_wall())
+        return replace(self, linear=fresh.without_soft_bounds())
 
-    def of_size(self, factors: tuple[float, float, float]) -> DrivesThere:
+    def with_size(self, factors: tuple[float, float, float]) -> LinearisedDrives:
         """The same with distance errors so many times as large."""
-        return replace(self, linear=self.linear.of_size(with_larger_errors(self.linear.size, factors)))
+        return replace(self, linear=self.linear.with_size(with_larger_errors(self.linear.size, factors)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class _Fit:
     gain: float
 
 
-def refitted_gain(there: Sequence[DrivesThere], changes: Sequence[Sequence[Array]], precision: Array) -> float:
+def refitted_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[Array]], precision: Array) -> float:
     """What a search gains by an effect that changes the predictions so (n,), per run of each: in minus twice the
     log-likelihood, over the car without it that is fitted as well as it goes.
 
@@ -90,11 +90,11 @@ def refitted_gain(there: Sequence[DrivesThere], changes: Sequence[Sequence[Array
         now = found
         if hold:
             break
-        slopes = [one.beside(now.logs, k) for one, k in zip(there, now.moved, strict=True)]
+        slopes = [one.relinearise(now.logs, k) for one, k in zip(there, now.moved, strict=True)]
     return now.gain
 
 
-def _fitted(there: Sequence[DrivesThere], slopes: Sequence[DrivesThere], changes: Sequence[Sequence[Array]],
+def _fitted(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDrives], changes: Sequence[Sequence[Array]],
             precision: Array, now: _Fit) -> tuple[_Fit, bool]:
     """The best of some steps by the same slopes, and whether these hold."""
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
@@ -105,12 +105,12 @@ def _fitted(there: Sequence[DrivesThere], slopes: Sequence[DrivesThere], changes
         squares, pull = _squares(models, now, precision, start)
         step = np.asarray(np.linalg.solve(information, pull), float)
         promised = min(promised, squares - float(pull @ step))
-        moved = [one.absorbed(_less(some, one, step), k).record for one, some, k in zip(
+        moved = [one.fit_record_errors_to(_after_step(some, one, step), k).record for one, some, k in zip(
             models, now.left, now.moved, strict=True)]
         logs = now.logs + step
-        left = [_left(one, some, logs, k) for one, some, k in zip(there, changes, moved, strict=True)]
+        left = [_residuals(one, some, logs, k) for one, some, k in zip(there, changes, moved, strict=True)]
         now = _Fit(logs, moved, left, float(precision @ (logs - start) ** 2) + sum(
-            _lack(one, some, k) for one, some, k in zip(there, left, moved, strict=True)))
+            _deviance(one, some, k) for one, some, k in zip(there, left, moved, strict=True)))
         if not now.gain < (1 - _SMALL) * best.gain:
             best = min(now, best, key=lambda one: one.gain)
             break
@@ -122,19 +122,19 @@ def _squares(models: Sequence[LinearModel], now: _Fit, precision: Array, start: 
     """Of what is left and of what is off, and which way that falls (p,)."""
     squares, pull = float(precision @ (now.logs - start) ** 2), -precision * (now.logs - start)
     for one, left, moved in zip(models, now.left, now.moved, strict=True):
-        found = one.absorbed(left, moved)
+        found = one.fit_record_errors_to(left, moved)
         squares += found.squares
         pull = pull + sum(white @ residual for white, residual in zip(one.white, found.residuals, strict=True))
     return squares, pull
 
 
-def _less(left: Sequence[Array], linear: LinearModel, step: Array) -> list[Array]:
+def _after_step(left: Sequence[Array], linear: LinearModel, step: Array) -> list[Array]:
     """What is left after a step of the car's numbers, to first order."""
     assert linear.numbers is not None
     return [one - step @ numbers for one, numbers in zip(left, linear.numbers, strict=True)]
 
 
-def _left(there: DrivesThere, changes: Sequence[Array], logs: Array, moved: Sequence[Array]) -> list[Array]:
+def _residuals(there: LinearisedDrives, changes: Sequence[Array], logs: Array, moved: Sequence[Array]) -> list[Array]:
     """What the car without the effect, with these numbers and so much farther on, leaves of what it does (n,)."""
     posterior, state = there.linear.posterior, there.linear.state
     record = [k + more for k, more in zip(state.record, moved, strict=True)]
@@ -142,7 +142,7 @@ def _left(there: DrivesThere, changes: Sequence[Array], logs: Array, moved: Sequ
     return [change + before - after for change, before, after in zip(changes, there.predictions, now, strict=True)]
 
 
-def _lack(there: DrivesThere, left: Sequence[Array], moved: Sequence[Array]) -> float:
+def _deviance(there: LinearisedDrives, left: Sequence[Array], moved: Sequence[Array]) -> float:
     """Minus twice the log-likelihood over that of the noise alone, its levels free in each band, and what moves of the
     records cost."""
     linear, found = there.linear, 0.0

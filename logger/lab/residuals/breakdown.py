@@ -101,7 +101,7 @@ class ModelResiduals:
     @cached_property
     def residual(self) -> list[Array]:
         """measured - model, the samples that count, per run [m/s2]."""
-        return [run.left_by(one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
+        return [run.residual(one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
     @cached_property
     def measured(self) -> list[Array]:

@@ -54,7 +54,7 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
     before, after = (posterior.car(one.effects, one.logs) for one in (stood, found))
     if not after.bends_laws:
         return FittedCar(moved, ())
-    responses = posterior.runs.respond(after, posterior.moved_m(found.record))
+    responses = posterior.runs.respond(after, posterior.distance_error_m(found.record))
     curves = []
     for motion, name in ((RATE, "rate_mps"), (TRAVEL, "travel_m")):
         size = np.concatenate([np.abs(getattr(one, name)[run.first:]) for run, one in zip(
@@ -78,13 +78,13 @@ def _force_n(car: Car, number: int, motion: str, at: Array) -> Array:
     axle = car.vehicle.rear if laws.rear and car.vehicle.rear is not None else car.vehicle.front
     still = np.zeros_like(at)
     if motion == RATE:
-        force = laws.damper(at) + _rubbing_n(laws, at)
+        force = laws.damper(at) + _friction_n(laws, at)
         return np.asarray(force + sum((one(still, at) for one in laws.others), still))
     force = axle.suspension_stiffness_n_per_m * at + sum((one(at) for one in laws.springs), still)
     return np.asarray(force + sum((one(at, still) for one in laws.others), still))
 
 
-def _rubbing_n(laws: CornerLaws, rate_mps: Array) -> Array:
+def _friction_n(laws: CornerLaws, rate_mps: Array) -> Array:
     if laws.friction_transition_mps > 0:
         return np.asarray(laws.dry_friction_n * np.tanh(rate_mps / laws.friction_transition_mps))
     return np.asarray(laws.dry_friction_n * np.sign(rate_mps))

@@ -77,7 +77,7 @@ def force_map(residuals: ModelResiduals) -> ForceMap:
     regression = _Regression.of(residuals)
 
     def term(shape: Shape) -> Term:
-        coefficients, covariance, p_value, share = regression.fitted(_through(residuals, [shape]))
+        coefficients, covariance, p_value, share = regression.fitted(_responses_at_sensor(residuals, [shape]))
         return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
 
     return ForceMap(_curve(regression, residuals, of_rate=True), _curve(regression, residuals, of_rate=False),
@@ -110,7 +110,7 @@ class _Regression:
     def of(residuals: ModelResiduals) -> _Regression:
         """With each linear damper and spring, the gain and a small shift in time as what is never physics."""
         wheels = range(residuals.responses[0].rate_mps.shape[1])
-        dampers, springs = (_through(residuals, [_straight(wheel, of_rate) for wheel in wheels])
+        dampers, springs = (_responses_at_sensor(residuals, [_linear_law(wheel, of_rate) for wheel in wheels])
                             for of_rate in (True, False))
         rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
         nuisance = [np.column_stack(one) for one in zip(dampers, springs, residuals.model, rates, strict=True)]
@@ -164,7 +164,7 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     knots = _KNOTS * (float(np.sqrt(np.mean(driven**2))) or 1.0)
     used = np.flatnonzero(_KNOTS)
     coefficients, covariance, p_value, share = regression.fitted(
-        _through(residuals, [_hat(knots, int(index), of_rate) for index in used]))
+        _responses_at_sensor(residuals, [_hat(knots, int(index), of_rate) for index in used]))
     # What a straight line through 0 would do is not distinguished from a spring or damper a little off: it is taken
     # out, the middle counting as it is driven.
     weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
@@ -176,7 +176,7 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     return Curve(knots, force, errors, p_value, share)
 
 
-def _through(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate: float = 0.4) -> list[Array]:
+def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate: float = 0.4) -> list[Array]:
     """What forces of these shapes in the suspensions leave at the sensor, where the recorder's filter hardly begins:
     (n, k) per run, the samples that count."""
     structure = residuals.car.structure
@@ -202,7 +202,7 @@ def _through(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate
     return found
 
 
-def _straight(wheel: int, of_rate: bool) -> Shape:
+def _linear_law(wheel: int, of_rate: bool) -> Shape:
     """A linear damper or spring of one wheel alone."""
     def shape(travel: Array, rate: Array) -> Array:
         return (rate if of_rate else travel) * np.eye(rate.shape[1])[wheel]

@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import unusual_m
-from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.distance_error import unusual_distance_error_m
+from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.residual_tests import LEAST_SHARE
 from logger.lab.residuals.sensor_drift import Drift, drifts_of
@@ -44,11 +44,11 @@ class Removed:
     error: float
 
     @cached_property
-    def drifting(self) -> tuple[Drift, ...]:
+    def drifting_sensors(self) -> tuple[Drift, ...]:
         """The drifts that were found."""
         return tuple(one for one in self.drifts if one.found)
 
-    def cleared(self, predictions: Sequence[Array]) -> list[Array]:
+    def without_drift(self, predictions: Sequence[Array]) -> list[Array]:
         """Predictions (n,) per run with the sensors' drifts in them; other signals that are joined stay."""
         return [_drifted(one, drift) for one, drift in zip(predictions, self.drifts, strict=True)]
 
@@ -61,20 +61,20 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     runs = posterior.runs.runs
     outside = sum(run.outside_mps2**2 * (run.count - run.first) for run in runs)
     left, whole = _power(runs, state.predictions), _power(runs, plain) + outside
-    in_place = [error.in_place(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
-    unmoved = _power(runs, posterior.predict(state.effects, state.logs, in_place))
-    drifts = drifts_of(runs, posterior.as_read().residuals(state), noise_of(posterior, state).deviation_mps2)
-    cleared = _power(runs, [_drifted(one, drift) for one, drift in zip(state.predictions, drifts, strict=True)])
-    if not left - cleared > LEAST_SHARE * left:
-        drifts, cleared = tuple(one.unseen() for one in drifts), left
+    without_distance_error = [error.without_distance_error(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
+    unmoved = _power(runs, posterior.predict(state.effects, state.logs, without_distance_error))
+    drifts = drifts_of(runs, posterior.without_rounding().residuals(state), sensor_noise_of(posterior, state).deviation_mps2)
+    without_drift = _power(runs, [_drifted(one, drift) for one, drift in zip(state.predictions, drifts, strict=True)])
+    if not left - without_drift > LEAST_SHARE * left:
+        drifts, without_drift = tuple(one.nothing_found() for one in drifts), left
 
     def share(power: float) -> float:
         return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0
 
     measured = sum(float(run.kept_readings_mps2 @ run.kept_readings_mps2) for run in runs)
-    return Removed(drifts, share(left - cleared), share(unmoved - left), share(outside),
-                   unusual_m(posterior.record_errors, state.record),
-                   float(np.sqrt(cleared / measured)) if measured > 0 else float("nan"))
+    return Removed(drifts, share(left - without_drift), share(unmoved - left), share(outside),
+                   unusual_distance_error_m(posterior.record_errors, state.record),
+                   float(np.sqrt(without_drift / measured)) if measured > 0 else float("nan"))
 
 
 def _drifted(prediction: Array, drift: Drift) -> Array:
@@ -85,5 +85,5 @@ def _drifted(prediction: Array, drift: Drift) -> Array:
 
 def _power(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
     """The sum of squares of what predictions (n,) per run leave [m2/s4]."""
-    return sum(float((run.left_by(run.main(one))[run.first:] ** 2).sum())
+    return sum(float((run.residual(run.main(one))[run.first:] ** 2).sum())
                for run, one in zip(runs, predictions, strict=True))

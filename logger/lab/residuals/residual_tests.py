@@ -17,7 +17,7 @@ import numpy as np
 
 from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.identification.residual_whiteness import LAGS, autocorrelation
-from logger.lab.likelihood.lag import Lags, constant, drift, lags
+from logger.lab.likelihood.lag import Lags, constant_lag, lag_drift, lags
 from logger.lab.residuals.block_statistics import (
     autocorrelations,
     band_pass,
@@ -28,18 +28,18 @@ from logger.lab.residuals.block_statistics import (
 )
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part
 from logger.lab.residuals.force_state_map import Curve, ForceMap, force_map
-from logger.lab.residuals.road_coherence import with_road
-from logger.lab.residuals.spectral_lines import loudest, periodogram
+from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.residuals.spectral_lines import periodogram, strongest_line
 from logger.runs import short_names
 from logger.vehicle.simulate import PASS_OF_RATE
 
-DOUBT = 0.002
+SIGNIFICANCE = 0.002
 """A test whose result is less probable than this finds something: of some fifteen tests, one is false in thirty
 comparisons."""
 LEAST_SHARE = 0.02
 """A smaller share of the residual's power, or of a gain, does not matter. A judgement: an error of 0.1 would fall by
 0.001."""
-GROWN = 1.3
+LEAST_GROWTH = 1.3
 """A residual that changes by a smaller factor is as large everywhere. A judgement."""
 
 
@@ -66,7 +66,7 @@ class ResidualTest:
     @property
     def found(self) -> bool:
         """Whether the test finds something: it is hardly chance, and it matters."""
-        return bool(self.p_value < DOUBT and self.large)
+        return bool(self.p_value < SIGNIFICANCE and self.large)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +93,9 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
     drifting = _drift(alignment)
     tests = (
         drifting, _shift(alignment, drifting), _whiteness(residuals), _frequency(residuals, where),
-        _follows_road(residuals), _gain(residuals), _proportion(residuals),
-        _by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
-        _by("travel", forces.by_travel, forces.hardening.value), _lean(residuals),
+        _coherence(residuals), _gain(residuals), _proportion(residuals),
+        _force_by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
+        _force_by("travel", forces.by_travel, forces.hardening.value), _skewness(residuals),
         _excitation(residuals, where), _speed(residuals), _place(residuals, where), _tone(residuals),
     )
     return ResidualTests(tests, forces, alignment)
@@ -128,7 +128,7 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
         width = part.high - part.low
         ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
         chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
-    best = max((i for i in range(len(parts)) if chances[i] < DOUBT), key=lambda i: parts[i].share,
+    best = max((i for i in range(len(parts)) if chances[i] < SIGNIFICANCE), key=lambda i: parts[i].share,
                default=int(np.argmin(chances)))
     part = parts[best]
     white = (part.high - part.low) / whole
@@ -136,7 +136,7 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
                         figures={"part": part, "white_share": white})
 
 
-def _lean(residuals: ModelResiduals) -> ResidualTest:
+def _skewness(residuals: ModelResiduals) -> ResidualTest:
     """Skewness, with Student's test of the cubes of blocks; up to 1/2 either way a distribution counts as fairly
     symmetric (M. G. Bulmer, Principles of Statistics, 1979, chapter 4)."""
     scale = rms(residuals.residual)
@@ -154,7 +154,7 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
         low_hz, high_hz = run.pass_band_hz
         inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
-        found = loudest(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
+        found = strongest_line(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
         if found is not None:
             tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), names[run.name]))
     if not tones:
@@ -166,9 +166,9 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
 # --- the residual and the road ---
 
 
-def _follows_road(residuals: ModelResiduals) -> ResidualTest:
+def _coherence(residuals: ModelResiduals) -> ResidualTest:
     """Coherence with the road, at the frequencies that the recorder passes."""
-    coherence, top = with_road(residuals), min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
+    coherence, top = coherence_with_road(residuals), min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
     share, p_value = coherence.explained(0.0, top)
     bands = [band for band in residuals.bands if band.from_hz < top]
     most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
@@ -190,7 +190,7 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
 def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
     """The same shift all the way; none where it grows on the way. ``least_s`` is a third of a sample at 100 samples a
     second, which no clock is asked to be better than. A shift by a length is a wrong place, no part of the car."""
-    time, length, is_time = constant(alignment)
+    time, length, is_time = constant_lag(alignment)
     trend, unit = (length, "m") if is_time is False else (time, "s")
     return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
                         abs(time.value) > least_s and not drifting.found, is_time is not False,
@@ -200,7 +200,7 @@ def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> R
 def _drift(alignment: Lags, least_m: float = 0.05) -> ResidualTest:
     """A shift that grows on the way, to so much at least in the longest run (a judgement: about a
     twentieth of the wave that makes wheels hop at 10 m/s)."""
-    trend = drift(alignment)
+    trend = lag_drift(alignment)
     in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
     return ResidualTest("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > least_m, True,
                         {"in_all_m": in_all_m})
@@ -252,7 +252,7 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 # --- the residual and the suspensions ---
 
 
-def _by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
+def _force_by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
     """The largest force of a curve where it is known to a third of itself, else 0; ``bend``: how the law bends."""
     known = np.abs(curve.force_n) > 3 * curve.error_n
     return ResidualTest(f"force by {coordinate}", float(np.abs(curve.force_n[known]).max(initial=0.0)), "N", None,
@@ -273,7 +273,7 @@ def _excitation(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
                                       for signals in (residuals.residual, residuals.model)))
     low, high = where.amplitude[0], where.amplitude[-1]
     grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
-    large = len(where.amplitude) > 1 and (grown > GROWN if rho > 0 else grown < 1 / GROWN)
+    large = len(where.amplitude) > 1 and (grown > LEAST_GROWTH if rho > 0 else grown < 1 / LEAST_GROWTH)
     return ResidualTest("excitation", rho, "1", None, p_value, large, True, {"low": low, "high": high})
 
 
@@ -296,7 +296,7 @@ def _speed(residuals: ModelResiduals, least_spread: float = 1.15) -> ResidualTes
     error = float(np.sqrt(rest @ rest / freedom * np.linalg.pinv(columns.T @ columns)[1, 1]))
     factor = float(np.exp(coefficients[1] / 2))
     p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else np.nan
-    return ResidualTest("speed", factor, "1", factor * error / 2, p_value, max(factor, 1 / factor) > GROWN,
+    return ResidualTest("speed", factor, "1", factor * error / 2, p_value, max(factor, 1 / factor) > LEAST_GROWTH,
                         figures={"slow_mps": slow, "fast_mps": fast})
 
 

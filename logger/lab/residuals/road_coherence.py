@@ -61,7 +61,7 @@ class Coherence:
         return max(share, 0.0), float(gamma.sf(statistic, mean**2 / variance, scale=variance / mean))
 
 
-def with_road(residuals: ModelResiduals) -> Coherence:
+def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     """The coherence of residuals with the road under the wheels that the car has."""
     axles_m = np.unique(residuals.car.structure.behind_m)
     residual = segments(residuals, residuals.residual)

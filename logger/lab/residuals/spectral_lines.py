@@ -17,7 +17,7 @@ def periodogram(samples: Array) -> Array:
     return np.asarray(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2)
 
 
-def loudest(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
+def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
     """The frequency that stands out most of a periodogram, by its number in it, and how probable one so loud would be
     by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of its neighbours is F(2, 2 m)
     in noise, the best of so many.

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
-from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
+from logger.lab.residuals.residual_tests import SIGNIFICANCE, ResidualTests, run_residual_tests
+from logger.lab.residuals.spectral_lines import NEIGHBOURS, periodogram, strongest_line
 from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ class SpatialLine:
     @property
     def found(self) -> bool:
         """Whether the line is hardly chance."""
-        return self.p_value < DOUBT
+        return self.p_value < SIGNIFICANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +58,10 @@ class Shape:
 def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
     """The shape of the residuals of a fitted model, without what its sensors drift."""
     runs, car = posterior.runs, posterior.car(state.effects, state.logs)
-    responses = runs.respond(car, posterior.moved_m(state.record))
+    responses = runs.respond(car, posterior.distance_error_m(state.record))
     residuals, as_recorded = (
         ModelResiduals(runs.runs, car, [run.main(one) for run, one in zip(runs.runs, some, strict=True)], responses)
-        for some in map(removed.cleared, (state.predictions, runs.predict(car))))
+        for some in map(removed.without_drift, (state.predictions, runs.predict(car))))
     where = breakdown(residuals)
     return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 
@@ -85,12 +85,12 @@ def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
         waves_per_m = np.fft.rfftfreq(len(along), step_m)
         asked = (waves_per_m > per_m[0]) & (waves_per_m < per_m[1])
         power = periodogram(along)
-        stands_out = loudest(power, asked)
+        stands_out = strongest_line(power, asked)
         if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
         at_per_m = float(waves_per_m[stands_out[0]])
         # A tone in time that slips by a cycle along the way is no line there any more.
-        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < 1
+        steady = _schedule_range_s(way, run.rate_hz) * at_per_m * usual_mps < 1
         found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1],
                                  np.asarray(waves_per_m[asked], float), power[asked] / float(power[asked].mean()),
                                  steady))
@@ -107,7 +107,7 @@ def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
     return replace(best, steady=False) if again else replace(best, p_value=1.0)
 
 
-def _slips(way_m: Array, rate_hz: float) -> float:
+def _schedule_range_s(way_m: Array, rate_hz: float) -> float:
     """How much earlier or later than at a steady speed a car was along its way, from most to most [s]."""
     time_s = np.arange(len(way_m)) / rate_hz
     return float(np.ptp(time_s - np.polyval(np.polyfit(way_m, time_s, 1), way_m)))

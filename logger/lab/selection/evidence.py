@@ -13,20 +13,21 @@ from __future__ import annotations
 import numpy as np
 
 FALSE_ALARM = 0.001
-"""How often, at most, noise alone may look like an effect, all candidates together."""
+"""Probability, at most, that noise alone looks like an effect, all candidates together. A judgement: one false name in a
+thousand diagnoses."""
 IMITATION = 0.1
-"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing."""
-CONFUSED = 10.0
+"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing. A judgement."""
+INDISTINGUISHABLE = 10.0
 """Models whose scores differ by less cannot be distinguished (R. E. Kass and A. E. Raftery 1995: 2 ln B > 10 is very
 strong evidence)."""
 
 
 def probability_by_chance(gain: float, candidates: int) -> float:
-    """How often, at most, noise alone would gain so much in minus twice the log of the evidence with any of so many
+    """Bound on the probability that noise alone gains so much, in minus twice the log of the evidence, with any of so many
     candidates."""
     return float(min(1.0, candidates * np.exp(-0.5 * max(gain, 0.0))))
 
 
-def least_gain(candidates: int) -> float:
-    """The gain from which on that is less than a false alarm."""
+def min_gain(candidates: int) -> float:
+    """Gain above which that probability is below ``FALSE_ALARM``."""
     return float(2 * np.log(candidates / FALSE_ALARM))

@@ -16,20 +16,20 @@ import numpy as np
 
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
-from logger.lab.likelihood.standard_errors import with_errors
+from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
-from logger.lab.unknown_road.fisher_scoring import Fitted, fitted, inverse
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.unknown_road.fisher_scoring import RoadFit, fit, inverse
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
-from logger.lab.unknown_road.screening import Trial, trials
+from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
+from logger.lab.unknown_road.screening import Trial, screen
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
 from logger.vehicle.effect_parameters import moves_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
-TAKEN_BY_ROAD = 0.02
+ABSORBED_BY_ROAD = 0.02
 """The road takes an effect of whose information it leaves no more than this share: over a road that was measured, the
 same drives would show it seven times as well."""
 
@@ -73,7 +73,7 @@ class UnknownRoadDiagnosis:
     by_run        error of each run, before and after
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
-    together      what these drives cannot tell of the car's numbers
+    confounded      what these drives cannot tell of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
     doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
     """
@@ -84,9 +84,9 @@ class UnknownRoadDiagnosis:
     by_run: tuple[tuple[float, float], ...]
     floor_error: float
     untried: Mapping[str, str]
-    taken_by_road: Mapping[str, float]
+    absorbed_by_road: Mapping[str, float]
     hidden: Mapping[str, float]
-    together: tuple[Finding, ...]
+    confounded: tuple[Finding, ...]
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
@@ -108,35 +108,35 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     nominal = problem.start(present)
     untried = _obstacles(problem, effects, present)
     left = {name: one for name, one in effects.items() if name not in untried}
-    alike = likenesses(problem, nominal, _trials(left))
-    if found := surely_two_roads(alike):
+    agreements = road_agreements(problem, nominal, _trials(left))
+    if found := certain_two_roads(agreements):
         one, other = (problem.runs[run].name for run in found)
         raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
-    before = now = fitted(problem.prepared(nominal), nominal)
+    before = now = fit(problem.preconditioned(nominal), nominal)
     errors = [before.problem.error(replace(nominal, roads=before.state.roads)), before.problem.error(before.state)]
     first: list[Candidate] = []
     taken: list[Candidate] = []
     while len(taken) < most_effects:
         progress(f"round {len(taken) + 1}: trying {len(left)} effects")
-        ranked = _ranked(trials(now.problem, now, _trials(left)))
+        ranked = _by_effect(screen(now.problem, now, _trials(left)))
         models = _fits(now, ranked, progress)
-        candidates = _judged(now, models, len(left), errors[-1])
+        candidates = _candidates(now, models, len(left), errors[-1])
         first = first or [*candidates, *(
-            _candidate(now.problem, _beside(now, ones[0].at), ones[0].gain, len(left), fitted=False)
+            _candidate(now.problem, _with_effect(now, ones[0].at), ones[0].gain, len(left), fitted=False)
             for name, ones in ranked.items() if name not in models)]
         best = next((one for one in candidates if one.helps(errors[-1])), None)
         if best is None:
             break
         taken.append(best)
         now = models[best.name]
-        now = replace(now, problem=now.problem.prepared(now.state))
+        now = replace(now, problem=now.problem.preconditioned(now.state))
         errors.append(now.problem.error(now.state))
         del left[best.name]
-    usual = {one.one.effect.name: one for one in trials(
+    usual = {one.one.effect.name: one for one in screen(
         now.problem, now, [chosen(one, one.usual) for one in left.values()])}
-    road = {name: one.beside_road for name, one in usual.items() if one.beside_road < TAKEN_BY_ROAD}
+    road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
     noise = now.problem.noise(now.state)
     return UnknownRoadDiagnosis(
         (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
@@ -144,8 +144,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         tuple(zip(now.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         noise.deviation_mps2 / problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
-        _together(now), now.state.noise_mps2, _excess(now, noise),
-        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in maybe_two_roads(alike)),
+        _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
+        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
     )
 
 
@@ -162,7 +162,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None:
             try:
-                problem.response((*present, chosen(effect, effect.usual)), problem.stands)
+                problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
             except ValueError:
                 why = "a car with it does not answer in proportion to the road, which takes a measured road"
         if why is not None:
@@ -177,7 +177,7 @@ def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:
     return [chosen(effect, values) for effect in effects.values() for values in effect.trials()]
 
 
-def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
+def _by_effect(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
     """Trials by the names of their effects, the most promising first."""
     found: dict[str, list[Trial]] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
@@ -185,8 +185,8 @@ def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
     return found
 
 
-def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
-          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, Fitted]:
+def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
+          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, RoadFit]:
     """The most promising effects fitted on top of the model, by name; the best of a few steps from each start goes on.
 
     most, share, least    so many at most, of those that promise this share of the best one, and so much
@@ -198,26 +198,26 @@ def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progres
     for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
         progress(f"fitting {name}")
         begins = [ranked[name][0].at, *(trial.one for trial in ranked[name][:starts])]
-        tries = [fitted(base.problem, _beside(base, one), first_steps) for one in begins]
+        tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
         best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
-        found[name] = fitted(best.problem, best.state)
+        found[name] = fit(best.problem, best.state)
     return found
 
 
-def _beside(base: Fitted, one: Chosen) -> RoadFitState:
+def _with_effect(base: RoadFit, one: Chosen) -> RoadFitState:
     """The model with an effect."""
     effects = (*base.state.effects, one)
     return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
 
 
-def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, error: float) -> list[Candidate]:
+def _candidates(base: RoadFit, models: Mapping[str, RoadFit], count: int, error: float) -> list[Candidate]:
     """Fitted effects as candidates of so many, best first, with those that explain about as much as each."""
     found = [_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count)
              for one in models.values()]
     found.sort(key=lambda one: -one.gain)
     there = [one for one in found if one.helps(error)]
     return [replace(one, confused_with=tuple(other.name for other in there if other is not one and one in there
-                                             and abs(other.gain - one.gain) < CONFUSED)) for one in found]
+                                             and abs(other.gain - one.gain) < INDISTINGUISHABLE)) for one in found]
 
 
 def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
@@ -231,14 +231,14 @@ def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, 
 # --- the residual ---
 
 
-def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
+def _with_errors(model: RoadFit) -> tuple[Chosen, ...]:
     """The effects of a model with standard errors."""
     first = len(model.state.logs)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
-    return with_errors(model.state.effects, model.moves, deviations)
+    return with_standard_errors(model.state.effects, model.moves, deviations)
 
 
-def _together(model: Fitted) -> tuple[Finding, ...]:
+def _confounded_numbers(model: RoadFit) -> tuple[Finding, ...]:
     """What these drives cannot tell of masses, springs and dampers when the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
@@ -250,7 +250,7 @@ def _together(model: Fitted) -> tuple[Finding, ...]:
     return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
 
 
-def _excess(model: Fitted, noise: Noise) -> float:
+def _excess(model: RoadFit, noise: Noise) -> float:
     """By what share what no road explains is above the noise; no more than that asks for no explanation where chance
     would make so much. Of a sample's freedom the recorder's filter leaves what it passes."""
     from scipy.stats import norm

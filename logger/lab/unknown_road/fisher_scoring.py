@@ -21,7 +21,7 @@ Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class RoadFit:
     """A state that was fitted, with the information on its numbers.
 
     moves          numbers of its effects
@@ -37,8 +37,8 @@ class Fitted:
     problem: SameRoad
 
 
-def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: float = 0.1,
-           many_rounds: int = 12) -> Fitted:
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: float = 0.1,
+           many_rounds: int = 12) -> RoadFit:
     """The most probable state, by so many of Fisher's steps from this one at most.
 
     settled        a step that promises less, in the log of the probability, is the last
@@ -55,10 +55,10 @@ def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: flo
 
     for count in range(steps):
         logs, effects, roads = at(here)
-        gains, slopes = sloped(problem, effects, moves, logs)
+        gains, slopes = response_and_slopes(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
-            problem = problem.prepared(RoadFitState(effects, logs, roads, gains))
-        score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
+            problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
+        score, data = problem.score_and_information(problem.table(gains, slopes), roads, information=True)
         off, precision = problem.prior_terms(logs, q, roads)
         score -= precision * off
         information = data + np.diag(precision)
@@ -68,7 +68,7 @@ def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: flo
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
     found = RoadFitState(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), data, information, problem)
+    return RoadFit(found, tuple(moves), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
@@ -86,7 +86,7 @@ def inverse(information: Array, ridge: float = 1e-6) -> Array:
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 
-def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
+def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
            step: float = 1e-3) -> tuple[Complex, Complex]:
     """A response (x, f) and its slopes (p + q, x, f) by the logs and the moves, over steps of this share."""
     gains = problem.response(effects, logs)

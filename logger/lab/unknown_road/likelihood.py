@@ -74,22 +74,22 @@ class RoadFitState:
 class SameRoad:
     """Drives over one road, a nominal vehicle, and what may be a little off.
 
-    stands    the vehicle as it stands, where fits begin, if that is another than was given
+    start_vehicle    the vehicle as it stands, where fits begin, if that is another than was given
 
     NotOneRoad unless each of the runs shares some seconds of the way with another.
     """
 
     def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
-                 stands: Vehicle | None = None) -> None:
-        stands = stands or vehicle
+                 start_vehicle: Vehicle | None = None) -> None:
+        start_vehicle = start_vehicle or vehicle
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
-        self.vehicle = replace(vehicle, contact_patch_m=stands.contact_patch_m)  # that is not free
+        self.vehicle = replace(vehicle, contact_patch_m=start_vehicle.contact_patch_m)  # that is not free
         known = VehiclePrior.of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
         self.prior = VehiclePrior(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
-                                  known.steps[kept], wall=False)
-        self.stands = self.prior.logs(self.vehicle, stands)
-        structure = compose(stands).structure
+                                  known.steps[kept], soft_bounds=False)
+        self.start_vehicle = self.prior.logs(self.vehicle, start_vehicle)
+        structure = compose(start_vehicle).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
         least_s = 3.0  # of a stretch, some periods of a body's bounce, to say anything of it
@@ -100,7 +100,7 @@ class SameRoad:
                              "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
-        nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
+        nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
         sizes = [1 + len(parts) for parts in self.stretches]
         ends = np.cumsum(sizes)
@@ -124,9 +124,9 @@ class SameRoad:
 
     def start(self, effects: Sequence[Chosen] = ()) -> RoadFitState:
         """The car as it stands on roads of a likely level."""
-        return RoadFitState(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
+        return RoadFitState(tuple(effects), self.start_vehicle, self._first, self.response(effects, self.start_vehicle))
 
-    def scored(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
+    def score_and_information(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
         """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
         the information (m, m) or zeros; nothing of the priors is in them."""
         p, self.rounds = len(table.slopes), 0
@@ -139,7 +139,7 @@ class SameRoad:
             matrix[np.ix_(whole, whole)] += known
         return slopes, matrix
 
-    def prepared(self, state: RoadFitState) -> SameRoad:
+    def preconditioned(self, state: RoadFitState) -> SameRoad:
         """The same drives, quick for models that are like this one."""
         other = copy(self)
         other._roads = []
@@ -189,7 +189,7 @@ class SameRoad:
         nodes, weights = np.polynomial.legendre.leggauss(3)
         for node, weight in zip(0.5 * (nodes + 1), 0.5 * weights, strict=True):
             table = self.table(before.gains + node * change, change[None])
-            slopes, _ = self.scored(table, before.roads + node * road_change, information=False)
+            slopes, _ = self.score_and_information(table, before.roads + node * road_change, information=False)
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 

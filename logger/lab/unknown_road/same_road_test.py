@@ -25,15 +25,15 @@ from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
 
-SEEN = 5.0
+AGREEMENT_SIGMA = 5.0
 """Standard deviations of chance from which on two drives are over one road: 3e-7 each time, and some hundred places and
 tens of cars are tried."""
-PLAIN = 2 * SEEN
+CERTAIN_SIGMA = 2 * AGREEMENT_SIGMA
 """Those that one road would have to make before drives that show less than half of them are over two."""
 
 
 @dataclass(frozen=True)
-class Likeness:
+class RoadAgreement:
     """What one run predicts of another one, in standard deviations of chance.
 
     run, by    numbers of the runs: that which is predicted, and that which predicts it
@@ -47,62 +47,62 @@ class Likeness:
     expected: float
 
     @property
-    def seen(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether that is more than chance."""
-        return self.found > SEEN
+        return self.found > AGREEMENT_SIGMA
 
 
-def likenesses(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[Likeness]:
+def road_agreements(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[RoadAgreement]:
     """Of all pairs of runs that share some of the way, each either way: through the car of a state or, where that shows
     two roads, with one of the effects that it may lack, whichever makes them most alike."""
-    found = _likenesses(problem, state)
+    found = _road_agreements(problem, state)
     for one in lacking:
-        if surely_two_roads(found) is None:
+        if certain_two_roads(found) is None:
             break
         effects = (*state.effects, one)
-        other = _likenesses(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
+        other = _road_agreements(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
         found = [replace(old, found=max(old.found, new.found)) for old, new in zip(found, other, strict=True)]
     return found
 
 
-def surely_two_roads(found: Sequence[Likeness]) -> tuple[int, int] | None:
+def certain_two_roads(found: Sequence[RoadAgreement]) -> tuple[int, int] | None:
     """The two runs that are most plainly over two roads; None if no two are."""
-    plain = {pair: most for pair, most in _unseen(found).items() if most > PLAIN}
+    plain = {pair: most for pair, most in _disagreeing_pairs(found).items() if most > CERTAIN_SIGMA}
     return max(plain, key=lambda pair: plain[pair]) if plain else None
 
 
-def maybe_two_roads(found: Sequence[Likeness]) -> list[tuple[int, int]]:
+def possible_two_roads(found: Sequence[RoadAgreement]) -> list[tuple[int, int]]:
     """Pairs of runs that may be over one road or two."""
-    return [pair for pair, most in _unseen(found).items() if most <= PLAIN]
+    return [pair for pair, most in _disagreeing_pairs(found).items() if most <= CERTAIN_SIGMA]
 
 
-def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
+def _disagreeing_pairs(found: Sequence[RoadAgreement]) -> dict[tuple[int, int], float]:
     """Pairs of runs of which neither predicts the other, and how well one would were they over one road."""
-    ways: defaultdict[tuple[int, int], list[Likeness]] = defaultdict(list)
+    ways: defaultdict[tuple[int, int], list[RoadAgreement]] = defaultdict(list)
     for one in found:
         ways[min(one.run, one.by), max(one.run, one.by)].append(one)
     return {pair: max(one.expected for one in both) for pair, both in ways.items()
-            if not any(one.seen for one in both)}
+            if not any(one.is_significant for one in both)}
 
 
-def _likenesses(problem: SameRoad, state: RoadFitState) -> list[Likeness]:
+def _road_agreements(problem: SameRoad, state: RoadFitState) -> list[RoadAgreement]:
     parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
     for run, by, read, predicted in problem.predicted_by_each(state):
         parts[run, by].append((read, predicted))
-    return [_likeness(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
+    return [_road_agreement(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
 
 
-def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
-              far_s: float = 1.0) -> Likeness:
+def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
+              far_s: float = 1.0) -> RoadAgreement:
     """Of what was read and predicted (n,) of each stretch: together, where places may be a little off yet, over what
     chance makes, as those show that are shifted by far."""
     near = round(near_s * rate_hz)
     like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:
-        ours, theirs = _even(read, predicted, rate_hz)
+        ours, theirs = _spectrally_flat(read, predicted, rate_hz)
         size = float(np.linalg.norm(ours))
         share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
-        ours, theirs = (_steady(one, rate_hz) for one in (ours, theirs))
+        ours, theirs = (_envelope_flat(one, rate_hz) for one in (ours, theirs))
         both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
         far = min(round(far_s * rate_hz), len(both) // 4)
         chance += float((both[far:-far] ** 2).mean())
@@ -110,11 +110,11 @@ def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: 
         expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
     deviation = float(np.sqrt(chance))
     if not deviation > 0:  # nothing is predicted
-        return Likeness(run, by, 0.0, 0.0)
-    return Likeness(run, by, float(like.max()) / deviation, expected / deviation)
+        return RoadAgreement(run, by, 0.0, 0.0)
+    return RoadAgreement(run, by, float(like.max()) / deviation, expected / deviation)
 
 
-def _even(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
+def _spectrally_flat(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
           width_hz: float = 1.5) -> tuple[Array, Array]:
     """What was read and what was predicted (n,), tapered by a tenth at each end, both over the root of the power that
     was read around each frequency that the recorder passes."""
@@ -129,7 +129,7 @@ def _even(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
     return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
 
 
-def _steady(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
+def _envelope_flat(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
     """Samples (n,) as strong all along: two roads that have a bump at about one place are two roads all the same."""
     envelope = np.sqrt(_smooth(samples**2, round(width_s * rate_hz)))
     return np.asarray(samples / np.maximum(envelope, 1e-300))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.selection.screening import scaled_by
-from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, sloped
+from logger.lab.selection.screening import scale_strength
+from logger.lab.unknown_road.fisher_scoring import RoadFit, inverse, response_and_slopes
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
 
@@ -20,25 +20,25 @@ class Trial:
     gain           what it promises, in minus twice the log-likelihood
     at             the values at which it does
     deviations     how many standard errors it stands out by at its values, all that is free being fitted
-    beside_road    the same share of its information (0 to 1) that roads and places do not take
+    share_beyond_road    the same share of its information (0 to 1) that roads and places do not take
     """
 
     one: Chosen
     gain: float
     at: Chosen
     deviations: float
-    beside_road: float
+    share_beyond_road: float
 
 
-def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
+def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Trial]:
     """Effects tried on top of a fitted model, by its slopes along the change that each makes in the response: a score
     test, the car's numbers and the roads' projected out."""
     state = base.state
-    gains, own = sloped(problem, state.effects, base.moves, state.logs)
+    gains, own = response_and_slopes(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
     table = problem.table(gains, np.array([*own, *changes]))
-    slopes, information = problem.scored(table, state.roads, information=True)
+    slopes, information = problem.score_and_information(table, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
     off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)
@@ -66,7 +66,7 @@ def _trial(one: Chosen, slope: float, left: float, alone: float, share: float, w
     if not left > 1e-4 * alone:
         return Trial(one, 0.0, one, 0.0, share)
     strength = float(np.clip(slope / left, weakest, strongest))
-    scaled = scaled_by(one, strength)
+    scaled = scale_strength(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one
     gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / PROBES)

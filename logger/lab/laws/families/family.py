@@ -22,13 +22,13 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
-Say = Callable[..., str]
+FormatNumber = Callable[..., str]
 """A number of the law in words, with its standard error and unit, by its name: ``say("yield_force_n")`` is "161 ± 4 N";
 ``say("yield_travel_m", 1000.0, "mm")`` the number in another unit."""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class LawContext:
     """What is known before a law is drafted: the fitted model, and what it does on the runs.
 
     posterior    what is fitted
@@ -58,7 +58,7 @@ class Look:
     def responses(self) -> list[Response]:
         """Motions of the suspensions and tires in each run."""
         return self.posterior.runs.respond(self.posterior.car(self.state.effects, self.state.logs),
-                                           self.posterior.moved_m(self.state.record))
+                                           self.posterior.distance_error_m(self.state.record))
 
     def reach(self, what: str, share: float) -> float:
         """Within which a motion stays for such a share of the time, of all wheels: ``travel_m``, ``rate_mps`` or
@@ -83,27 +83,27 @@ class Family(ABC):
 
     name        as the file's
     title       in a few words
-    akin        names of effects of the list that one of its laws may nearly be
+    related_effects        names of effects of the list that one of its laws may nearly be
     shown_by    the drive that shows it best, as an instruction
     """
 
     name: str
     title: str
-    akin: tuple[str, ...] = ()
+    related_effects: tuple[str, ...] = ()
     shown_by: str
 
     @abstractmethod
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         """Laws to be tried, simple ones first; none where such a law cannot be there."""
 
-    def narrower(self, draft: Draft, look: Look) -> list[Draft]:
+    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         """Variations of a law that promises something: a force at one axle alone."""
         if draft.kind != "ForceEffect" or draft.axle:
             return []
-        return [draft.of_axle(axle) for axle in look.axles]
+        return [draft.of_axle(axle) for axle in context.axles]
 
     @abstractmethod
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         """What it is, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm".
         Which axle it is at is added by others."""
 
