@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.chart_data import Curves, Line
+from logger.chart_data import CURVE_POINTS, CURVE_REACH, Curves, Line
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import LawContext
 from logger.vehicle.effect import Chosen, ForceEffect
@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 _AXES = {"rate": ("rate_mps", "rate of the suspension in m/s, positive in extension"),
          "travel": ("travel_m", "travel of the suspension in m, positive in extension"),
          "deflection": ("deflection_m", "height of the wheel over the road from rest in m")}
-_POINTS, _STEP = 201, 1e-4
+_STEP = 1e-4  # of a standard error, over which derivatives are taken
 _LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 4000
 
 
@@ -30,8 +30,8 @@ def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawConte
     if draft.at not in _AXES:
         return None
     motion, name = _AXES[draft.at]
-    reach = context.reach(motion, 0.999)
-    at = np.linspace(-reach, reach, _POINTS)
+    reach = context.reach(motion, CURVE_REACH)
+    at = np.linspace(-reach, reach, CURVE_POINTS)
     damping = context.vehicle.front.suspension_damping_n_s_per_m
     line = Line("learned", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
     return Curves(draft.title, name, "force in N", (line,))

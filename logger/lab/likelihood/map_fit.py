@@ -98,6 +98,12 @@ def fit_rounded_readings(found: LinearModel) -> LinearModel:
     return found if posterior is found.posterior else fit(LinearModel(posterior, found.state), found.numbers)
 
 
+def fit_model(posterior: Posterior, start: State, numbers: Sequence[Array] | None = None) -> LinearModel:
+    """A model aligned, fitted in full, and fitted again with its rounded readings taken for bounds; ``numbers`` as of
+    ``fit``."""
+    return fit_rounded_readings(fit(align(posterior, start), numbers))
+
+
 def relinearise(posterior: Posterior, state: State, numbers: Sequence[Array] | None, least: float) -> LinearModel:
     """The model linearised at a state that was fitted to first order; aligned again where its score is above the least
     so far, because its distances moved too far for first order."""

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit, fit_rounded_readings
+from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
@@ -112,7 +112,7 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
     fitted, measured = None, noise is None and runs is not None
     if runs is not None:
         progress("refitting the car's own numbers")
-        fitted = fit_rounded_readings(fit(align(runs, runs.start(there.effects))))
+        fitted = fit_model(runs, runs.start(there.effects))
         there = replace(there, logs=fitted.state.logs)
         noise = noise or SensorNoise(sensor_noise_of(fitted.posterior, fitted.state).deviation_mps2)
     noise = noise or usual_noise

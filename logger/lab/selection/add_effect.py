@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit, fit_rounded_readings, own_slopes
+from logger.lab.likelihood.map_fit import align, fit, fit_model, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
@@ -147,7 +147,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    before = fit_rounded_readings(fit(align(posterior, posterior.start(present))))
+    before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
     after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added))
     unbounded = posterior.without_soft_bounds()
