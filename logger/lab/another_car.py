@@ -46,11 +46,11 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
                 numbers: float, explains: float = 0.35, far_sigma: float = 6.0, several: int = 4) -> AnotherCar | None:
     """The other car that a record is of; None: it may be this one.
 
-    predictions    of the model (n,) per run
-    numbers        standard deviation of the car's numbers, as a share
-    explains       up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
+    predictions           of the model (n,) per run
+    numbers               standard deviation of the car's numbers, as a share
+    explains              up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
     far_sigma, several    so many numbers off by so many standard deviations are another car's (a judgement: a missing
-                   effect changes few numbers so far)
+                          effect changes few numbers so far)
     """
     if normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None

@@ -2,8 +2,8 @@
 
 Problem: the numbers of a car are never exact, and an error because of them says nothing about physics. Solution: the
 error is computed and broken down for the model as it stands; then the car's numbers and the distances of the runs are
-refitted under their priors, and the residuals of that are tested. A number that moves much farther than its prior allows
-is reported: a missing effect biases it.
+refitted under their priors, and the residuals of that are tested. A number that moves much farther than its prior
+allows is reported: a missing effect biases it.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A model with its residuals, its error (rms residual / rms measured, all samples that count) and the parts of that,
-    and its errors of other signals, by name."""
+    """A model with its residuals, its error (rms residual / rms measured, all samples that count) and the parts of
+    that, and its errors of other signals, by name."""
 
     residuals: ModelResiduals
     error: float

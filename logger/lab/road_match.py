@@ -2,8 +2,8 @@
 
 Problem: with a profile of another street, or one that is reversed or begins elsewhere, some effect always explains some
 of the residuals: wrong input is no physics. Solution: around the body's bounce, where a place that is a metre off does
-no harm, the measurement is correlated with a model's prediction. With the right road the correlation is high near lag 0,
-whatever effect is missing; with any other it is no higher there than at large lags, where it is chance and its
+no harm, the measurement is correlated with a model's prediction. With the right road the correlation is high near lag
+0, whatever effect is missing; with any other it is no higher there than at large lags, where it is chance and its
 variance shows how large chance is (the correlogram of unrelated series: M. S. Bartlett, Journal of the Royal
 Statistical Society 98, 1935).
 """
@@ -58,13 +58,14 @@ class RoadMatch:
 
     @property
     def is_upside_down(self) -> bool:
-        """Whether the run clearly correlates with reversed sign, by much more than as it is: a bounce half a period later
-        correlates with reversed sign as well."""
+        """Whether the run clearly correlates with reversed sign, by much more than as it is: a bounce half a period
+        later correlates with reversed sign as well."""
         return self.is_clear and self.turned - self.correlation > self.chance - self.mean_chance
 
 
 def pool(matches: Sequence[RoadMatch]) -> RoadMatch:
-    """Means over several runs, which may be significant together: the mean of maxima has a smaller variance than one."""
+    """Means over several runs, which may be significant together: the mean of maxima has a smaller variance than
+    one."""
     upright, turned, gain, chance, mean_chance, expected = map(
         float, np.mean([astuple(one) for one in matches], axis=0))
     of_all = mean_chance + (chance - mean_chance) / float(np.sqrt(len(matches)))
@@ -87,14 +88,14 @@ def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
 
 
 def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
-    """Frequency band below the bounce of a body, by its natural frequencies (b,) [Hz]: it moves with the road there, even
-    if dry friction blocks the suspension, which may reverse and multiply the motion around the bounce."""
+    """Frequency band below the bounce of a body, by its natural frequencies (b,) [Hz]: it moves with the road there,
+    even if dry friction blocks the suspension, which may reverse and multiply the motion around the bounce."""
     return bounce_band_hz(body_hz)[0], float(body_hz.min())
 
 
 def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0) -> RoadMatch:
-    """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance error
-    grows along the way, of its parts, each at a lag of its own.
+    """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance
+    error grows along the way, of its parts, each at a lag of its own.
 
     part_s    ten bounces of a body, in which a speed that is off by 0.1 m/s moves it by no more than a tenth of the
               wave that bounces it at 6 m/s

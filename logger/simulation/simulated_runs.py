@@ -59,8 +59,8 @@ class SimulatedRuns:
         ((1 + s) n,).
 
         distance_error_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
-        rough      step a car that rubs no finer than others: what a change does shows well enough by that
-        tracks     roads in place of the runs' own; runs are laid out again for each such object
+        rough               step a car that rubs no finer than others: what a change does shows well enough by that
+        tracks              roads in place of the runs' own; runs are laid out again for each such object
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._laid_out(car, distance_error_m, rough, tracks)

@@ -25,7 +25,7 @@ ends of its travel does most where it hardly ever is."""
 
 @dataclass(frozen=True)
 class Motion:
-    """What a force may go with.
+    """A motion that a force may depend on.
 
     at         its short name, as drafts have it
     name       in words
@@ -43,7 +43,7 @@ class Motion:
     method: str
 
     def words(self, size: float) -> str:
-        """A size of it: "12 mm"."""
+        """A size of the motion in words: "12 mm"."""
         factor, unit = self.shown
         return f"{factor * size:g} {unit}"
 
@@ -59,13 +59,14 @@ DEFLECTION = Motion("deflection", "tire's deflection", "deflection_m", "m", (100
 class CurveFamily(Family):
     """A force that is a curve of one motion.
 
-    motion        that it goes with
-    force         what it is in words: "damper force"
+    motion               that it goes with
+    force                what it is in words: "damper force"
     source, signature    of its drafts
-    usual_share   of the time that the motion stays within where the force is what its number says
-    reach_share   of the time; beyond twice what this gives, the force stays as it is there
-    powers        to be tried; ``power_ends``: what they may be
-    ends          points of a free curve that a sentence names, by their place among them, and where they are in words
+    usual_share          of the time that the motion stays within where the force is what its number says
+    reach_share          of the time; beyond twice what this gives, the force stays as it is there
+    powers               to be tried; ``power_ends``: what they may be
+    ends                 points of a free curve that a sentence names, by their place among them, and where they are in
+                         words
     """
 
     motion: Motion
@@ -80,7 +81,7 @@ class CurveFamily(Family):
 
     @abstractmethod
     def usual_force_n(self, context: LawContext, usual: float) -> float:
-        """What such a force usually is where the motion is ``usual`` [N]."""
+        """Usual size of such a force where the motion is ``usual`` [N]."""
 
     def drafts(self, context: LawContext) -> list[Draft]:
         def reach(share: float) -> float:

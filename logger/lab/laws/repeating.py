@@ -1,8 +1,7 @@
-"""What repeats in a residual, along the way or in time: where its fit may begin.
+"""Tones in a residual, along the way or in time: initial values for a fit.
 
-A tone whose frequency is not known to a fraction of a cycle over all of a run is no start for a fit by slopes. The
-residual of each run, white in its bands, is laid on the way in even steps and the periodograms of all runs are
-added; the loudest wave number is refined where the sum of squares of all coherent sums is largest.
+A fit by derivatives has to begin within a fraction of a cycle over all of a run. The periodograms of the whitened
+residuals of all runs are added, over the way or over the time; the frequency of the largest sum is refined.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 _SLOWEST_MPS = 1.0
 _FINER = 8
-"""Times the resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
+"""Grid points per resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
 _LOUD = 12.0
 """A peak with so many times the mean power of its neighbours: noise alone has one in some thousand in a hundred
 runs."""
@@ -35,17 +34,17 @@ def white_residuals(context: LawContext) -> list[Array]:
 
 
 def spatial_frequency(context: LawContext, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
-    """The wave number at which something repeats along the way, whatever the speed [1/m]; None where nothing does.
+    """The wave number of the strongest line along the way [1/m]; None where none is strong enough.
 
-    per_m          between these
-    speed_power    it grows with the speed to this power
+    per_m          range that is searched
+    speed_power    exponent of the growth of its amplitude with the speed
     """
     signals, ways = [], []
-    for run, residual, moved in zip(context.runs, white_residuals(context), context.posterior.distance_error_m(context.state.record),
-                                    strict=True):
+    for run, residual, error_m in zip(context.runs, white_residuals(context),
+                                      context.posterior.distance_error_m(context.state.record), strict=True):
         speed = np.maximum(run.speed_mps[run.first:], _SLOWEST_MPS)
         signals.append(residual * (speed / speed.mean()) ** speed_power)
-        ways.append((run.distance_m + moved)[run.first:])
+        ways.append((run.distance_m + error_m)[run.first:])
     longest_m = max(float(np.ptp(one)) for one in ways)
     if not longest_m > 0:
         return None
@@ -55,6 +54,7 @@ def spatial_frequency(context: LawContext, per_m: tuple[float, float], speed_pow
 
 
 def _peak(grid: Array, power: Array) -> float | None:
+    """Abscissa of the largest power, interpolated; None where it is not strong enough."""
     best = int(power.argmax())
     if power[best] < _LOUD * float(np.median(power)):
         return None
@@ -67,7 +67,7 @@ def _peak(grid: Array, power: Array) -> float | None:
 
 
 def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
-    """Of coherent sums over a way (n,) at wave numbers (g,)."""
+    """Periodogram of a signal (n,) over uneven places (n,) at even wave numbers (g,)."""
     found = np.empty(len(grid))
     # Over equal steps of a wave number the phase factor of each sample is multiplied by another one.
     step = np.exp(-2j * np.pi * (grid[1] - grid[0]) * way)
@@ -84,8 +84,8 @@ def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
 
 @dataclass(frozen=True)
 class Tone:
-    """A tone whose phase is 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], by how much
-    it is early and late (c, s) [s], and the period T of that [s]; power, in units of the noise's."""
+    """A tone of phase 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], the amplitudes of
+    its phase modulation (c, s) [s] and their period T [s]; its power, in units of the noise's."""
 
     frequency_hz: float
     wander_cos_s: float
@@ -109,10 +109,10 @@ _COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
 
 
 def tone_in_time(context: LawContext, hz: tuple[float, float], wanders: bool) -> Tone | None:
-    """The tone that is loudest, at the same time since each run began; None where none stands out.
+    """The strongest tone, with the same phase at the beginning of each run; None where none is strong enough.
 
-    hz         its mean frequency is between these
-    wanders    its frequency may wander by a sinusoid
+    hz         range of its mean frequency
+    wanders    its frequency may vary by a sinusoid
     """
     signals = white_residuals(context)
     rate = context.runs[0].rate_hz
@@ -129,6 +129,7 @@ def tone_in_time(context: LawContext, hz: tuple[float, float], wanders: bool) ->
 
 
 def _steady_tone(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+    """The tone of the largest periodogram."""
     size = _FINER * max(map(len, signals))
     power = sum(np.abs(np.fft.rfft(one, size)) ** 2 / len(one) for one in signals)
     f_hz = np.fft.rfftfreq(size, 1 / rate_hz)
@@ -138,7 +139,7 @@ def _steady_tone(signals: list[Array], rate_hz: float, hz: tuple[float, float]) 
 
 
 def _strongest_ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
-    """Where the powers of short windows add up to most along a frequency that goes up and down."""
+    """The modulated tone along which the power of short windows is largest."""
     size, hop = round(_WINDOW_S * rate_hz), round(_WINDOW_S * _HOP * rate_hz)
     taper = np.hanning(size + 1)[:-1]
     padded = round(rate_hz / _STEPS_HZ)
@@ -168,7 +169,7 @@ def _strongest_ridge(signals: list[Array], rate_hz: float, began_s: float, hz: t
 
 
 def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float) -> float:
-    """Power along a phase, coherent within so long."""
+    """Power of the tone with these numbers, summed coherently over pieces of this length."""
     found = 0.0
     for one in signals:
         time_s = began_s + np.arange(len(one)) / rate_hz
@@ -182,7 +183,8 @@ def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, c
 
 
 def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
-             wanders: bool) -> Array:
+            wanders: bool) -> Array:
+    """The numbers of a tone that maximise that power, by the simplex method."""
     from scipy.optimize import minimize
 
     lasts_s = min(coherent_s, max(map(len, signals)) / rate_hz)

@@ -1,7 +1,8 @@
 """Score tests of drafted laws: how much each would gain on top of a model, before it is fitted.
 
-A law with one strength is tried as an effect of the list is (``selection.screening``). A curve has many: the derivatives
-by all of them are taken at 0, and they are solved for together with the car's numbers (one Gauss-Newton step).
+A law with one strength is tried as an effect of the list is (``selection.screening``). A curve has many: the
+derivatives by all of them are taken at 0, and they are solved for together with the car's numbers (one Gauss-Newton
+step).
 """
 
 from __future__ import annotations

@@ -90,8 +90,8 @@ class RecordError:
     of the receiver if its places are a receiver's, the scale, the share of its roughness), then two of its recorder
     (gain, droop).
 
-    basis     what each of the distance's numbers adds to the distance (k - 2, n) [m]
-    knot_s    time between the knots of the spline
+    basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]
+    knot_s         time between the knots of the spline
     delay_std_s    standard error of the receiver's delay; None: places are not a receiver's
     """
 

@@ -36,11 +36,11 @@ SLOWEST_MPS = 0.5
 class Lags:
     """Windows (k,) of all runs in which the measurement correlates with the model.
 
-    run           number of the run it is in
-    middle        the sample in its middle
-    along_m       how far into the run [m]
+    run               number of the run it is in
+    middle            the sample in its middle
+    along_m           how far into the run [m]
     lag_s, error_s    how much later than the model the measurement is: the model is ahead where it is above 0
-    speed_mps     in the window; NaN on a rig
+    speed_mps         in the window; NaN on a rig
     """
 
     run: npt.NDArray[np.intp]
@@ -85,7 +85,7 @@ def offset_by_lag_m(run: Run, prediction: Array) -> Array:
 
 
 def offset_by_correlation_m(distance_m: Array, measured_mps2: Array, prediction: Array, road_m: tuple[float, float],
-            reach_m: float) -> float | None:
+                            reach_m: float) -> float | None:
     """The constant distance error within ``reach_m`` either way at which the measurement correlates most with a
     prediction (n,) [m]; None where the car hardly moved.
 

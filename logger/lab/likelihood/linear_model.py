@@ -31,8 +31,8 @@ the information of a run without either singular."""
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """The record error of one run at a state: its whitened derivatives (k, kept), their products (k, k), the gradient of
-    its numbers (k,), and these."""
+    """The record error of one run at a state: its whitened derivatives (k, kept), their products (k, k), the gradient
+    of its numbers (k,), and these."""
 
     error: RecordError
     white: Array
@@ -284,7 +284,8 @@ class LinearModel:
         own_projections = self.record_projections(columns)
         mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
             self.white, self._record_projections, columns, own_projections, strict=True)), np.zeros(self.count))
-        return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, own_projections, strict=True))
+        return mixed, sum(float(one @ one) - float((mine**2).sum())
+                          for one, mine in zip(own, own_projections, strict=True))
 
 
 def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array, step: float = 0.8,

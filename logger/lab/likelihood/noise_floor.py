@@ -34,7 +34,8 @@ _FILTERED = 0.75
 # highest band, and the sensor's own noise does not pass through the filter (judgements).
 _FLAT_SHARE, _FILTERED_SHARE = 0.22, 0.01
 UNEXPLAINED = 0.10
-"""A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's power."""
+"""A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's
+power."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,8 @@ class Posterior:
     """
 
     def __init__(self, runs: SimulatedRuns, vehicle: Vehicle, tolerance: Tolerance,
-                 start_vehicle: Vehicle | None = None, prior: VehiclePrior | None = None, readings: Sequence[Readings] | None = None) -> None:
+                 start_vehicle: Vehicle | None = None, prior: VehiclePrior | None = None,
+                 readings: Sequence[Readings] | None = None) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.start_vehicle = start_vehicle or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)

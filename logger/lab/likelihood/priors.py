@@ -22,11 +22,11 @@ _SOFT_BOUND_SIGMA, _SOFT_BOUND_WEIGHT = 2.0, 100.0
 """Beyond so many standard deviations a number costs the fourth power of what it is beyond, so many times, besides: half
 a deviation beyond costs 6, one costs 100 (a judgement: 95 % of right numbers lie within)."""
 UNUSUAL_SIGMA = 3.0
-"""More standard deviations of its prior are unusual of a nuisance parameter: of a dozen right numbers one goes as far in
-thirty comparisons (normal distribution)."""
+"""More standard deviations of its prior are unusual of a nuisance parameter: of a dozen right numbers one goes as far
+in thirty comparisons (normal distribution)."""
 CONFLICT_SIGMA = 4.0
-"""A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes as
-far in 1300 comparisons (normal distribution)."""
+"""A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
+as far in 1300 comparisons (normal distribution)."""
 
 
 @dataclass(frozen=True)

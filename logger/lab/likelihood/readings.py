@@ -30,15 +30,16 @@ from logger.runs import CLIPPED, READING, Bools, Run, normalised_rms
 Array = npt.NDArray[np.float64]
 
 BLURRED = 0.5
-"""From noise of so many steps on, rounding is noise as well. Its mean still follows the acceleration by at most
-exp(-2 pi^2 0.5^2) / pi = 0.2 % of a step (B. Widrow and I. Kollar, Quantization Noise, 2008); with noise of a third of a
-step by 3.5 %, and on a smooth road standard errors are half as large again (``tests.benchmarks.rounded_lab``)."""
+"""From noise of so many steps on, rounding is noise as well. Its mean still follows the acceleration by at most exp(-2
+pi^2 0.5^2) / pi = 0.2 % of a step (B. Widrow and I. Kollar, Quantization Noise, 2008); with noise of a third of a step
+by 3.5 %, and on a smooth road standard errors are half as large again (``tests.benchmarks.rounded_lab``)."""
 _ON_STEPS = 0.02
 """Readings farther from whole steps were levelled, filtered or resampled after they were rounded. A judgement: files
 write a step of 0.01 g to a thousandth or better."""
 _LEAST_SHARE = 1e-3
-"""Rounding that leaves a smaller share of the information is taken to leave this: nearly all readings are of one step."""
-_LEAST_NOISE, _MOST_NOISE = 0.01, 3.0  # steps between which the most likely noise is searched for: far beyond ``BLURRED``
+"""Rounding that leaves a smaller share of the information is taken to leave this: nearly all readings are of one
+step."""
+_LEAST_NOISE, _MOST_NOISE = 0.01, 3.0  # steps: ends of the search for the most likely noise, far from ``BLURRED``
 _ROUNDS = 8  # of noise and offset in turn; they end earlier where neither moves by a thousandth of a step
 
 
@@ -119,7 +120,8 @@ def _truncated(residual: Array, step: float, noise: float) -> tuple[Array, Array
     """Mean and variance (k,) of normal noise that is known to lie within half a step of residuals (k,)."""
     from logger.estimation.normal_distribution import within
 
-    return within(np.zeros_like(residual), np.full_like(residual, noise**2), residual - 0.5 * step, residual + 0.5 * step)
+    return within(np.zeros_like(residual), np.full_like(residual, noise**2), residual - 0.5 * step,
+                  residual + 0.5 * step)
 
 
 def _most_likely_noise(residual: Array, step: float, least: float) -> tuple[float, float]:

@@ -22,12 +22,12 @@ the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); 
 patch fall less, or come back. So a B of order m = 3 or more is somebody's filter: above it nothing is compared. One
 of lower order is left to the effects: its delay tells whether it is a sensor's.
 
-Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the
-phase of a causal one is off a straight line by half a radian and more. Over short windows, each aligned with the
-model, the mean cross-spectrum is compared with both phases, whatever constant delay there is besides. Where a filter takes away 5 % of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of
-one that was run forth and back x^m. What a causal filter does below that, a delay that grows towards the cut-off, is
-``sensor_bandwidth`` of the order that was found; what one without delay does there is within the tolerance of any
-recorder (``Tolerance.droop``).
+Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the phase
+of a causal one is off a straight line by half a radian and more. Over short windows, each aligned with the model, the
+mean cross-spectrum is compared with both phases, whatever constant delay there is besides. Where a filter takes away 5
+% of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of one that was run forth and back x^m.
+What a causal filter does below that, a delay that grows towards the cut-off, is ``sensor_bandwidth`` of the order that
+was found; what one without delay does there is within the tolerance of any recorder (``Tolerance.droop``).
 """
 
 from __future__ import annotations
@@ -58,16 +58,18 @@ _WIDTH_HZ, _LOWEST_HZ = 1.5, 1.0
 # finer one changes a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
 _ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
-# The grid of effects that imitate a filter: frequencies and damping ratios of a sensor on a spring, from the lowest that
-# cuts off within the band to twice the highest; first zeros of a contact patch, 12 Hz being 0.4 m at 5 m/s.
+# The grid of effects that imitate a filter: frequencies and damping ratios of a sensor on a spring, from the lowest
+# that cuts off within the band to twice the highest; first zeros of a contact patch, 12 Hz being 0.4 m at 5 m/s.
 _RINGS_AT_HZ, _RINGS_WITH = np.geomspace(8.0, 80.0, 45), np.geomspace(0.02, 0.7, 9)
 _NULLS_HZ = np.append(np.inf, np.geomspace(12.0, 120.0, 14))
-# The grid of the spectrum itself: gains around the median ratio, and how many levels of noise up to the median spectrum.
+# The grid of the spectrum itself: gains around the median ratio, and how many levels of noise up to the median
+# spectrum.
 _GAINS, _NOISES = np.array([0.4, 0.7, 1.0, 1.4, 2.0]), 8
 STEEPEST_EFFECT = 2.5
 """A filter of a higher order is none that a car or a sensor has (``sensor_bandwidth`` has order 2 at most)."""
-# Misfit of log S without a filter: so many times as much as with it, and so many dB more. Measured on 221 unfiltered runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the
-# factor is 3 at most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
+# Misfit of log S without a filter: so many times as much as with it, and so many dB more. Measured on 221 unfiltered
+# runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the factor is 3 at
+# most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
 _BETTER, _BETTER_DB = 3.5, 1.0
 # A sensor on a spring, over tires that are longer than the model's, may fall as steeply for a while. Measured: their
 # misfit is 0.2 to 0.87 of a filter's where they are the truth, and 0.97 to 20 of it where a filter is (the least with
@@ -257,7 +259,8 @@ class _Fits:
 
 def _fits(run: Run, prediction: Array) -> _Fits:
     """Misfits of a run's spectrum."""
-    (measured, nothing_measured), (model, nothing_predicted) = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
+    (measured, nothing_measured), (model, nothing_predicted) = (
+        _spectrum(run, one) for one in (run.measured_mps2, prediction))
     used = ~(nothing_measured & nothing_predicted)
     middles = np.asarray(_LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5), float)
     behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean

@@ -29,15 +29,15 @@ dry friction, whose force is delayed by part of a step. A judgement: with 1 %, s
 BLOCK_S = 3.0
 """Length of a block of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 HIGHEST_OF_RATE = 0.37
-"""Share of the rate up to which records are compared: above it recorders' filters differ. Below ``simulate.PASS_OF_RATE``,
-up to which a usual filter is flat."""
+"""Share of the rate up to which records are compared: above it recorders' filters differ. Below
+``simulate.PASS_OF_RATE``, up to which a usual filter is flat."""
 LOWEST_HZ = 0.4
 """Records are not compared below: a car hardly accelerates there, and sensors drift."""
 # Least noise: of the sensor's acceleration, and of another signal as a share of its own deviation. No sensor has less
 # than a ten-millionth of g; simulated records without noise need a level above 0.
 _LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
-# Edges of the bands at 100 samples a second [Hz]: from half of the frequency wide at the bottom to a tenth at the top, as
-# resonances with a damping ratio of 0.3 (the body) and 0.1 (the wheels) are.
+# Edges of the bands at 100 samples a second [Hz]: from half of the frequency wide at the bottom to a tenth at the top,
+# as resonances with a damping ratio of 0.3 (the body) and 0.1 (the wheels) are.
 _EDGES_HZ = (LOWEST_HZ, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0,
              27.5, 30.0, 33.5, 37.0)
 # Shares of the rate between which neither a car nor the recorder's filter leaves anything (``simulate.recorder_gain``).
@@ -94,8 +94,8 @@ class Bands:
         return float(self.freedom @ (np.log(level) + power / level - 1))
 
     def noise_band_power(self, residual: Array) -> tuple[float, float]:
-        """Mean power of a residual at the highest frequencies, where only the sensor's noise is, as if it were white, and
-        its degrees of freedom; both 0 where these are outside of the pass band."""
+        """Mean power of a residual at the highest frequencies, where only the sensor's noise is, as if it were white,
+        and its degrees of freedom; both 0 where these are outside of the pass band."""
         if not len(self._noise_lines):
             return 0.0, 0.0
         freedom = 2 * len(self._noise_lines) / self._size * (self.count - self.first) * self._share

@@ -13,8 +13,8 @@ Array = npt.NDArray[np.float64]
 
 
 def block_means(residuals: ModelResiduals, signals: Sequence[Array], blocks: int = 1) -> Array:
-    """Means of signals [(n,), ...] over so many blocks at a time, all runs one after the other (b,); an incomplete block
-    at an end is left out."""
+    """Means of signals [(n,), ...] over so many blocks at a time, all runs one after the other (b,); an incomplete
+    block at an end is left out."""
     size = max(2, round(blocks * INDEPENDENT_S * residuals.rate_hz))
     return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
 

@@ -26,8 +26,8 @@ from logger.vehicle.simulate import PASS_OF_RATE
 Array = npt.NDArray[np.float64]
 
 INDEPENDENT_S = 1.0
-"""Residuals so far apart count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps an
-eighth of its motion after that time."""
+"""Residuals so far apart count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps
+an eighth of its motion after that time."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class Part:
     """A part of the data: its share of the residual power, and its error (rms residual / rms measured, in it; NaN where
     nothing was measured).
 
-    low, high    its ends, in the unit of the list it stands in
+    low, high        its ends, in the unit of the list it stands in
     residual_mps2    rms of the residual in it
-    samples      in it; of a band all
-    name         of a band, or of the run that a place is in; else empty
+    samples          in it; of a band all
+    name             of a band, or of the run that a place is in; else empty
     """
 
     low: float

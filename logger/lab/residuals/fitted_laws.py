@@ -38,8 +38,8 @@ class ForceCurve:
 
 @dataclass(frozen=True, eq=False)
 class FittedCar:
-    """moved: the relative change of each of the car's numbers, and its tolerance; curves: of suspensions whose laws differ
-    from the file's."""
+    """moved: the relative change of each of the car's numbers, and its tolerance; curves: of suspensions whose laws
+    differ from the file's."""
 
     moved: Mapping[str, tuple[float, float]]
     curves: tuple[ForceCurve, ...]

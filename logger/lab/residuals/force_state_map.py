@@ -26,8 +26,8 @@ Array = npt.NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
 
 _KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])
-"""Knots of a curve, in units of the r.m.s. of its coordinate: closer together where more samples are, the outermost ones
-where half a per cent of a normal distribution is beyond (its quantile there is 2.81)."""
+"""Knots of a curve, in units of the r.m.s. of its coordinate: closer together where more samples are, the outermost
+ones where half a per cent of a normal distribution is beyond (its quantile there is 2.81)."""
 
 
 @dataclass(frozen=True, eq=False)

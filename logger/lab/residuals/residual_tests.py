@@ -104,8 +104,8 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    """The largest autocorrelation; one of 0.1 explains a hundredth of the power from a sample before. Filtered residuals
-    are not tested: they are not white, whatever they were."""
+    """The largest autocorrelation; one of 0.1 explains a hundredth of the power from a sample before. Filtered
+    residuals are not tested: they are not white, whatever they were."""
     if not residuals.whole:
         return ResidualTest("whiteness")
     rho = autocorrelations(residuals.residual, LAGS)
@@ -146,8 +146,8 @@ def _skewness(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
-    """The strongest spectral line of all runs, compared with the frequencies within a width on either side, about what a
-    spectrum of segments resolves."""
+    """The strongest spectral line of all runs, compared with the frequencies within a width on either side, about what
+    a spectrum of segments resolves."""
     names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
@@ -187,8 +187,8 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
-    """A constant lag; not tested where it drifts. ``least_s`` is a third of a sample at 100 samples a second: clocks are
-    no better. A lag by a constant length is a wrong place, no part of the car."""
+    """A constant lag; not tested where it drifts. ``least_s`` is a third of a sample at 100 samples a second: clocks
+    are no better. A lag by a constant length is a wrong place, no part of the car."""
     time, length, is_time = constant_lag(alignment)
     trend, unit = (length, "m") if is_time is False else (time, "s")
     return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
@@ -252,7 +252,8 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 
 
 def _force_by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
-    """The largest missing force of a curve that is known to a third of itself, else 0; ``bend``: curvature of the law."""
+    """The largest missing force of a curve that is known to a third of itself, else 0; ``bend``: curvature of the
+    law."""
     known = np.abs(curve.force_n) > 3 * curve.error_n
     return ResidualTest(f"force by {coordinate}", float(np.abs(curve.force_n[known]).max(initial=0.0)), "N", None,
                         curve.p_value, curve.share > LEAST_SHARE, True, {"curve": curve, "bend": bend})

@@ -3,10 +3,10 @@
 Problem: records are not compared below 0.4 Hz (``likelihood.whittle``), because a body on springs hardly accelerates
 there: an acceleration is its travel times (2 pi f)2, so that even 5 cm at 0.1 Hz are 0.02 m/s2. A sensor that warms up,
 or whose zero jumps, is strongest there, and an error counts that. Solution: the residual of a run is transformed to the
-cosines below that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on Computers C-23,
-1974). Of several forms of drift the one with the least BIC (G. Schwarz, Annals of Statistics 6, 1978) is chosen; the noise is
-white there, no less than between 0.4 and 0.6 Hz. The power of a random walk falls with the square of a coefficient's
-number; it is estimated by N. Wiener's filter.
+cosines below that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on
+Computers C-23, 1974). Of several forms of drift the one with the least BIC (G. Schwarz, Annals of Statistics 6, 1978)
+is chosen; the noise is white there, no less than between 0.4 and 0.6 Hz. The power of a random walk falls with the
+square of a coefficient's number; it is estimated by N. Wiener's filter.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ def periodogram(samples: Array) -> Array:
 
 
 def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
-    """The strongest line of a periodogram: its number, and a bound on the probability of one so strong by chance (above 1
-    for weak ones): the ratio of its power to the mean of its neighbours is F(2, 2 m) in noise, Bonferroni over all.
+    """The strongest line of a periodogram: its number, and a bound on the probability of one so strong by chance (above
+    1 for weak ones): the ratio of its power to the mean of its neighbours is F(2, 2 m) in noise, Bonferroni over all.
 
     power         (f,) of any unit
     among         which frequencies are tested, of those with enough neighbours (f,); None: all

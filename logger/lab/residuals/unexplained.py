@@ -25,9 +25,9 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SpatialLine:
-    """A line at a wave number, in the run where it is most significant: the wave number [1/m], the run's usual speed, the
-    p-value (1 where runs at other speeds do not have it), and the powers (n,) at all wave numbers (n,) [1/m] over their
-    mean.
+    """A line at a wave number, in the run where it is most significant: the wave number [1/m], the run's usual speed,
+    the p-value (1 where runs at other speeds do not have it), and the powers (n,) at all wave numbers (n,) [1/m] over
+    their mean.
 
     steady    the speed hardly changed, so that it may as well be a line in time
     """
@@ -70,8 +70,8 @@ def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
 
 def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
                     per_m: tuple[float, float] = (0.3, 2.2)) -> SpatialLine | None:
-    """The strongest line along the way. A tone in time is distinguished from it where the speed changes, or where another
-    run has another speed.
+    """The strongest line along the way. A tone in time is distinguished from it where the speed changes, or where
+    another run has another speed.
 
     slowest_mps    runs that are slower somewhere are not tested
     per_m          wave numbers that are tested [1/m]: one to three in a turn of a wheel of 0.22 to 0.5 m radius

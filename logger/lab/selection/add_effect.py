@@ -68,21 +68,22 @@ class Number:
 class AddedEffects:
     """A vehicle with effects added.
 
-    vehicle             with its numbers refitted
-    effects             all, with values and standard errors
-    names               of those that were added
-    numbers             of the car
-    error_before        of the vehicle and effects as they were
-    error_refitted      of those with their numbers refitted and the distance errors taken out
-    error_after         of the model with the effects, fitted in the same way
-    error_as_written    of that model on the distances as recorded: what a comparison with it begins at
-    noise_floor_error   the error that the sensor's noise makes
-    p_value             bound on the probability that noise alone gains as much
+    vehicle                        with its numbers refitted
+    effects                        all, with values and standard errors
+    names                          of those that were added
+    numbers                        of the car
+    error_before                   of the vehicle and effects as they were
+    error_refitted                 of those with their numbers refitted and the distance errors taken out
+    error_after                    of the model with the effects, fitted in the same way
+    error_as_written               of that model on the distances as recorded: what a comparison with it begins at
+    noise_floor_error              the error that the sensor's noise makes
+    p_value                        bound on the probability that noise alone gains as much
     unseen_before, unseen_after    cross-validation without and with the effects; None: not known
-    band                what of the runs was compared; None: all of it
-    removed             what is taken out of the errors before they are judged: drift, wrong distances
-    errors              of the numbers of vehicle and effects together
-    signals             errors of signals beside the sensor's acceleration, by name: refitted without and with
+    band                           what of the runs was compared; None: all of it
+    removed                        what is taken out of the errors before they are judged: drift, wrong distances
+    errors                         of the numbers of vehicle and effects together
+    signals                        errors of signals beside the sensor's acceleration, by name: refitted without and
+                                   with
     """
 
     vehicle: Vehicle

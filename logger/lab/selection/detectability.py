@@ -17,8 +17,9 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
 DETECTABLE_SIGMA = 6.0
-"""An effect of a smaller expected significance would hardly be found among twenty. Derived: a search asks for 20 (2 ln of
-twenty over ``FALSE_ALARM``) and each of two numbers costs the logarithm of some 4000 degrees of freedom: 36, rounded."""
+"""An effect of a smaller expected significance would hardly be found among twenty. Derived: a search asks for 20 (2 ln
+of twenty over ``FALSE_ALARM``) and each of two numbers costs the logarithm of some 4000 degrees of freedom: 36,
+rounded."""
 _NO_CHANGE = 0.1  # standard deviations, a sixtieth of what is detectable: the vehicle has these values already
 
 
@@ -54,8 +55,8 @@ class _Sensitivity:
         self._here = self._predicted(self._state.effects)
 
     def of(self, effect: Effect) -> float:
-        """Expected significance at the usual strength; where there is none, or the vehicle has it already, the largest of
-        the values that a search begins at."""
+        """Expected significance at the usual strength; where there is none, or the vehicle has it already, the largest
+        of the values that a search begins at."""
         found = self._deviations(chosen(effect, effect.usual))
         if is_uninformative_at_usual(effect, found):
             found = max(self._deviations(chosen(effect, values)) for values in effect.trials())

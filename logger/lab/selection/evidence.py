@@ -13,18 +13,19 @@ from __future__ import annotations
 import numpy as np
 
 FALSE_ALARM = 0.001
-"""Probability, at most, that noise alone looks like an effect, all candidates together. A judgement: one false name in a
-thousand diagnoses."""
+"""Probability, at most, that noise alone looks like an effect, all candidates together. A judgement: one false name in
+a thousand diagnoses."""
 IMITATION = 0.1
-"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing. A judgement."""
+"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing. A
+judgement."""
 INDISTINGUISHABLE = 10.0
 """Models whose scores differ by less cannot be distinguished (R. E. Kass and A. E. Raftery 1995: 2 ln B > 10 is very
 strong evidence)."""
 
 
 def probability_by_chance(gain: float, candidates: int) -> float:
-    """Bound on the probability that noise alone gains so much, in minus twice the log of the evidence, with any of so many
-    candidates."""
+    """Bound on the probability that noise alone gains so much, in minus twice the log of the evidence, with any of so
+    many candidates."""
     return float(min(1.0, candidates * np.exp(-0.5 * max(gain, 0.0))))
 
 

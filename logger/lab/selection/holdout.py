@@ -24,13 +24,14 @@ Array = npt.NDArray[np.float64]
 # A relative difference below it is a rounding: errors are printed to two digits or three.
 _ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
-"""Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every set."""
+"""Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
+set."""
 
 
 @dataclass(frozen=True)
 class HoldOut:
-    """A model on held-out stretches, all of them in turn: its normalised r.m.s. error, and minus twice the log-likelihood
-    of its residuals."""
+    """A model on held-out stretches, all of them in turn: its normalised r.m.s. error, and minus twice the
+    log-likelihood of its residuals."""
 
     error: float
     deviance: float

@@ -42,8 +42,8 @@ Complex = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.intp]
 
 PROBES = 8
-"""Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and is
-divided by that. A judgement: fits take a time in proportion."""
+"""Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
+is divided by that. A judgement: fits take a time in proportion."""
 
 
 class NotOneRoad(ValueError):
@@ -149,8 +149,8 @@ class SameRoad:
         return other
 
     def _at(self, table: Tabulated, roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
-        """Every stretch under a car of this response: its road, its numbers, their indices among those of all roads, and
-        the runs of its drives."""
+        """Every stretch under a car of this response: its road, its numbers, their indices among those of all roads,
+        and the runs of its drives."""
         for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
             own = roads[part]
             at = RoadState(np.zeros(len(table.slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
@@ -207,8 +207,8 @@ class SameRoad:
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
     def errors(self, state: RoadFitState) -> list[float]:
-        """Leave-one-out error of every run, rms(read - predicted) / rms(read), the prediction being by the other drives;
-        nan for one that no other shares a stretch with."""
+        """Leave-one-out error of every run, rms(read - predicted) / rms(read), the prediction being by the other
+        drives; nan for one that no other shares a stretch with."""
         drives = list(self.predicted_by_others(state))
         return [_error([one for one in drives if one[0] == run]) for run in range(len(self.runs))]
 
@@ -258,8 +258,8 @@ class SameRoad:
         return first
 
     def _offsets(self, nominal: Tabulated, first: Array) -> Array:
-        """Offsets of each run's places [m] from those of the first run of the stretch that most runs share; of runs that
-        are not over that one, by way of runs that share another stretch with both."""
+        """Offsets of each run's places [m] from those of the first run of the stretch that most runs share; of runs
+        that are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}
         open_ones = list(self._at(nominal, first))
         while open_ones := [one for one in open_ones if any(run not in offsets for run in one[-1])]:

@@ -25,8 +25,8 @@ from logger.vehicle.simulate import PASS_OF_RATE
 Array = npt.NDArray[np.float64]
 
 AGREEMENT_SIGMA = 5.0
-"""Standard deviations of chance from which on two drives are over one road: a p-value of 3e-7, and some hundred lags and
-tens of cars are tried."""
+"""Standard deviations of chance from which on two drives are over one road: a p-value of 3e-7, and some hundred lags
+and tens of cars are tried."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,8 @@ def possible_two_roads(found: Sequence[RoadAgreement]) -> list[tuple[int, int]]:
 
 
 def _is_certain(expected: float) -> bool:
-    """Whether one road would have shown: with twice what is significant, as drives that disagree show less than half."""
+    """Whether one road would have shown: with twice what is significant, as drives that disagree show less than
+    half."""
     return expected > 2 * AGREEMENT_SIGMA
 
 
@@ -97,8 +98,8 @@ def _road_agreements(problem: SameRoad, state: RoadFitState) -> list[RoadAgreeme
 
 def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
               far_s: float = 1.0) -> RoadAgreement:
-    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within ``near_s``, as
-    places may be a little off, over the r.m.s. correlation beyond ``far_s``."""
+    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within ``near_s``,
+    as places may be a little off, over the r.m.s. correlation beyond ``far_s``."""
     near = round(near_s * rate_hz)
     correlation, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:
@@ -119,8 +120,8 @@ def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rat
 
 def _spectrally_flat(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
           width_hz: float = 1.5) -> tuple[Array, Array]:
-    """What was read and what was predicted (n,), tapered by a tenth at each end, both divided by the smoothed spectrum of
-    what was read, at the frequencies that the recorder passes."""
+    """What was read and what was predicted (n,), tapered by a tenth at each end, both divided by the smoothed spectrum
+    of what was read, at the frequencies that the recorder passes."""
     n = len(read)
     ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.1 * n)
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2

@@ -43,7 +43,8 @@ def drafts() -> list[Draft]:
     posterior = posterior_of(secret_runs())
     context = LawContext(posterior, posterior.start())
     found = [(family, draft) for family in FAMILIES.values() for draft in family.drafts(context)]
-    return [*(draft for _, draft in found), *(more for family, draft in found for more in family.narrower(draft, context))]
+    return [*(draft for _, draft in found),
+            *(more for family, draft in found for more in family.narrower(draft, context))]
 
 
 @pytest.mark.parametrize("draft", drafts(), ids=lambda draft: f"{draft.name}-{draft.variant}")

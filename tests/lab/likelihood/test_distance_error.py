@@ -159,7 +159,8 @@ def test_a_start_that_is_far_off_is_no_walk() -> None:
     true = noisy_runs()
     late = [replace(run, distance_m=run.distance_m + off) for run, off in zip(true, (0.06, -0.09), strict=True)]
     posterior, state = laid(late)
-    assert worst_rms([one + off for one, off in zip(posterior.distance_error_m(state.record), (0.06, -0.09), strict=True)],
+    found_m = posterior.distance_error_m(state.record)
+    assert worst_rms([one + off for one, off in zip(found_m, (0.06, -0.09), strict=True)],
                      true) < 0.005
     assert state.size.start_m > 3 * USUAL.start_m and state.size.walk_m < USUAL.walk_m
 
@@ -293,7 +294,8 @@ def test_the_determinant_of_a_receiver_is_that_of_its_precision(size: ErrorSize)
 def test_what_a_receiver_may_be_off_by_is_not_unusual() -> None:
     error = RecordError.of(replace(RUN, facts=RECEIVER), Tolerance())
     k = error.coefficients_of(np.full(RUN.count, 2.0))
-    assert unusual_distance_error_m([error], [k]) == 0.0 < unusual_distance_error_m([ERROR], [ERROR.coefficients_of(np.full(RUN.count, 2.0))])
+    farther = ERROR.coefficients_of(np.full(RUN.count, 2.0))
+    assert unusual_distance_error_m([error], [k]) == 0.0 < unusual_distance_error_m([ERROR], [farther])
 
 
 @pytest.mark.slow
@@ -302,7 +304,8 @@ def test_runs_are_found_metres_off_and_nothing_is_made_of_it(seed: int) -> None:
     truth = noisy_runs(lasts_s=20.0)
     runs = [by_receiver(run, 10 * seed + number, 0.06) for number, run in enumerate(truth)]
     posterior, state = laid(runs)
-    left = [one - moved for one, moved in zip(off_m(runs, truth), posterior.distance_error_m(state.record), strict=True)]
+    found_m = posterior.distance_error_m(state.record)
+    left = [one - moved for one, moved in zip(off_m(runs, truth), found_m, strict=True)]
     assert worst_rms(left, truth) < 0.05
     for one in (chosen(TIME_OFFSET, TIME_OFFSET.usual), chosen(SPEED_SCALE, SPEED_SCALE.usual)):
         assert gain_of(runs, one)[0] < 10.0

@@ -137,7 +137,8 @@ def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> Non
     columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
     occam_factor = np.linalg.slogdet(columns @ columns.T + precision)[1] - np.linalg.slogdet(precision)[1]
     state = one.linear.state
-    expected = one.posterior.deviance(state) + one.posterior.cost(state) + occam_factor + 2 * np.log(one.posterior.freedom)
+    expected = (one.posterior.deviance(state) + one.posterior.cost(state) + occam_factor
+                + 2 * np.log(one.posterior.freedom))
     assert one.linear.score == pytest.approx(expected, abs=1e-6)
 
 
@@ -181,7 +182,8 @@ def test_without_the_wall_only_the_prior_is_another() -> None:
     far = 3.0 * one.posterior.prior.deviations
     loose = one.linear.without_soft_bounds()
     soft_bounds = one.posterior.prior.curvature(far) - one.posterior.prior.without_soft_bounds().curvature(far)
-    assert one.linear.information(far) - loose.information(far) == pytest.approx(np.diag(soft_bounds), rel=1e-6, abs=1e-3)
+    assert one.linear.information(far) - loose.information(far) == pytest.approx(
+        np.diag(soft_bounds), rel=1e-6, abs=1e-3)
     assert loose.objective(one.state.predictions, far) < one.linear.objective(one.state.predictions, far)
 
 

@@ -140,7 +140,8 @@ def test_each_sensor_has_a_noise_of_its_own() -> None:
     residuals = [white(level=0.25), white(seed=2)]
     posterior, state = leaving(*residuals, facts=[RecordFacts(range_mps2=20.0), RecordFacts(range_mps2=40.0)])
     assert excess_over_noise(posterior, state, 1e-3) < UNEXPLAINED
-    assert sensor_noise_of(posterior, state).deviation_mps2 == pytest.approx(np.sqrt((0.25**2 + LEVEL**2) / 2), rel=0.05)
+    noise = sensor_noise_of(posterior, state)
+    assert noise.deviation_mps2 == pytest.approx(np.sqrt((0.25**2 + LEVEL**2) / 2), rel=0.05)
     assert gain_of_full_explanation(posterior, state) == 0
     posterior, state = leaving(*residuals)
     assert excess_over_noise(posterior, state, 1e-3) > UNEXPLAINED

@@ -111,7 +111,8 @@ def test_noise_is_reported_without_rounding_and_as_it_was_read() -> None:
     state = posterior.start()
     beside = posterior.with_rounding_at(state)
     assert sensor_noise_of(beside, state).deviation_mps2 == pytest.approx(0.1, rel=0.05)
-    assert sensor_noise_with_rounding(beside, state).deviation_mps2 == pytest.approx(np.hypot(0.1, STEP / np.sqrt(12)), rel=0.05)
+    with_rounding = sensor_noise_with_rounding(beside, state)
+    assert with_rounding.deviation_mps2 == pytest.approx(np.hypot(0.1, STEP / np.sqrt(12)), rel=0.05)
     assert beside.error(state) == posterior.error(state)
 
 

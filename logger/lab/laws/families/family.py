@@ -1,4 +1,4 @@
-"""What a family of laws is to the search that learns one.
+"""The interface of a family of laws.
 
 A family is one file that offers ``FAMILY``: in the field's words what it is, the laws to be tried (``drafts``), given
 what the runs show of the car's motions, and the sentence with numbers for one that was found.
@@ -29,10 +29,10 @@ FormatNumber = Callable[..., str]
 
 @dataclass(frozen=True, eq=False)
 class LawContext:
-    """What is known before a law is drafted: the fitted model, and what it does on the runs.
+    """The fitted model without a law, from which laws are drafted.
 
-    posterior    what is fitted
-    state        the model as it was fitted without the law
+    posterior    of the runs
+    state        the fitted model
     """
 
     posterior: Posterior
@@ -40,12 +40,12 @@ class LawContext:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car, as it was fitted."""
+        """The fitted car."""
         return self.posterior.prior.vehicle(self.posterior.vehicle, self.state.logs)
 
     @property
     def runs(self) -> Sequence[Run]:
-        """Those that were measured."""
+        """The measured runs."""
         return self.posterior.runs.runs
 
     @cached_property
@@ -61,15 +61,15 @@ class LawContext:
                                            self.posterior.distance_error_m(self.state.record))
 
     def reach(self, what: str, share: float) -> float:
-        """Within which a motion stays for such a share of the time, of all wheels: ``travel_m``, ``rate_mps`` or
-        ``deflection_m``; rounded to two digits, as it stands in a file."""
+        """Quantile of the size of a motion of all wheels (``travel_m``, ``rate_mps`` or ``deflection_m``) for a share
+        of the time, rounded to two digits, as it stands in a file."""
         size = np.concatenate([np.abs(getattr(one, what)[run.first:]).ravel()
                                for run, one in zip(self.runs, self.responses, strict=True)])
         return rounded(float(np.quantile(size, share)))
 
     @property
     def axles(self) -> tuple[str, ...]:
-        """Axles that a law may be of alone."""
+        """Axles that a law may act on alone."""
         return () if self.vehicle.rear is None else ("front", "rear")
 
     @property
@@ -81,10 +81,10 @@ class LawContext:
 class Family(ABC):
     """A family of laws.
 
-    name        as the file's
-    title       in a few words
-    related_effects        names of effects of the list that one of its laws may nearly be
-    shown_by    the drive that shows it best, as an instruction
+    name               as the file's
+    title              in a few words
+    related_effects    names of effects of the list that one of its laws may nearly be
+    shown_by           the drive that shows it best, as an instruction
     """
 
     name: str
@@ -105,7 +105,7 @@ class Family(ABC):
     @abstractmethod
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         """What it is, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm".
-        Which axle it is at is added by others."""
+        The axle is added by the caller."""
 
 
 def rounded(value: float, digits: int = 2) -> float:

@@ -55,7 +55,8 @@ class Hum(Family):
                     Parameter("early_sin_s", tone.wander_sin_s, -20.0, 20.0, None, Scale.LINEAR, (tone.wander_sin_s,),
                               "by how much it is early a quarter of a period later", step=_STEP_S),
                     _shape("period_s", tone.period_s, "in which its frequency goes up and down", step=10 * _STEP)]
-            drafts += self._drafts(context, numbers, _WANDERS if wanders else _STEADY, "wanders" if wanders else "steady",
+            cycles, variant = (_WANDERS, "wanders") if wanders else (_STEADY, "steady")
+            drafts += self._drafts(context, numbers, cycles, variant,
                                    "a tone that is there whatever the speed and the road")
         per_m = spatial_frequency(context, _PER_M) if context.is_driven else None
         if per_m is not None:

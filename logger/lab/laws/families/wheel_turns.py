@@ -43,7 +43,8 @@ class WheelTurns(Family):
     def drafts(self, context: LawContext) -> list[Draft]:
         if not context.is_driven:
             return []
-        per_m = spatial_frequency(context, (1 / (2 * np.pi * _RADII_M[1]), 1 / (2 * np.pi * _RADII_M[0])), speed_power=2)
+        per_m = spatial_frequency(context, (1 / (2 * np.pi * _RADII_M[1]), 1 / (2 * np.pi * _RADII_M[0])),
+                                  speed_power=2)
         if per_m is None:
             return []
         radius_m = 1 / (2 * np.pi * per_m)
