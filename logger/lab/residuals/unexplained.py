@@ -104,8 +104,8 @@ def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
     if not best.steady or not others:
         return best
     # A tapered line is two ordinates wide.
-    recurs = any(one.found and abs(one.at_per_m - best.at_per_m) < 2 * max(np.diff(line.per_m[:2])[0]
-                for line in (one, best)) for one in others)
+    recurs = any(one.found and abs(one.at_per_m - best.at_per_m) < 2 * max(
+        np.diff(line.per_m[:2])[0] for line in (one, best)) for one in others)
     return replace(best, steady=False) if recurs else replace(best, p_value=1.0)
 
 
