@@ -144,7 +144,7 @@ class Bench:
         return replace(self, effects={**self.effects, effect.name: effect},
                        files={**self.files, effect.name: file} if file is not None else self.files)
 
-    def search_effects(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
+    def search_values(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
         """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
         from logger.lab.diagnosis import refit
         from logger.lab.selection.candidate_fit import fit_roughly, refine

@@ -255,7 +255,7 @@ def add_effect(
     effect, file = bench.asked_for(str(name), values, str(name))
     bench = bench.with_effect(effect, file)
     is_given = set(values) >= {one.name for one in effect.parameters}
-    found = bench.added(bench.search_effects(effect, values, progress), 1 if is_given else len(effect.trials()),
+    found = bench.added(bench.search_values(effect, values, progress), 1 if is_given else len(effect.trials()),
                         progress)
     return addition_of(found, model_of(bench.model_with(found)))
 

@@ -296,7 +296,7 @@ def _vehicle_file(out: Path, number: int) -> Path:
 
 def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
     with progress() as tell:
-        return given.search_effects(given.effects[name], {}, tell)
+        return given.search_values(given.effects[name], {}, tell)
 
 
 def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:

@@ -36,13 +36,13 @@ class SameRoadDiagnosis(Diagnosis):
     An error is rms(measured - model) / rms(measured) of each drive over the road estimated from the other drives.
 
     run_errors       by name of the run: error before, and with the effects that were found
-    absorbed_by_road    effects that another road would imitate, and the share of their information that remains with it
+    taken_by_road    effects that another road would imitate, and the share of their information that remains with it
     not_tried        effects that could not be tried, and why
     cannot_tell      sentences: what these drives do not show
     """
 
     run_errors: Mapping[str, tuple[float, float]]
-    absorbed_by_road: Mapping[str, float]
+    taken_by_road: Mapping[str, float]
     not_tried: Mapping[str, str]
     cannot_tell: tuple[str, ...]
 
@@ -77,7 +77,7 @@ def diagnose_same_road(
     summary = as_json(found)
     return SameRoadDiagnosis(
         "\n".join(same_road_lines(found, names, None)), summary, **diagnosis_fields(summary),
-        run_errors=dict(zip(names, found.by_run, strict=True)), absorbed_by_road=summary["taken_by_road"],
+        run_errors=dict(zip(names, found.by_run, strict=True)), taken_by_road=summary["taken_by_road"],
         not_tried=summary["not_tried"], cannot_tell=tuple(cannot_tell(found)))
 
 

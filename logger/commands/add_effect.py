@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     given = given.with_effect(effect, file)
     with progress() as tell:
         is_given = set(values) >= {one.name for one in effect.parameters}
-        found = given.added(given.search_effects(effect, values, tell), 1 if is_given else len(effect.trials()), tell)
+        found = given.added(given.search_values(effect, values, tell), 1 if is_given else len(effect.trials()), tell)
     write_model(args.out, given.model_with(found))
     if args.json:
         print(json.dumps(as_json(found) | {"vehicle": str(args.out)}, allow_nan=False))

@@ -58,7 +58,7 @@ class SimulatedRuns:
         """What would have been recorded in each run, whole, in its pass band (n,) [m/s2]; of one with more signals all
         ((1 + s) n,).
 
-        distance_error_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
+        distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
         rough               step a car that rubs no finer than others: what a change does shows well enough by that
         tracks              roads in place of the runs' own; runs are laid out again for each such object
         """
