@@ -212,40 +212,32 @@ class RecordError:
 class RigRecordError(RecordError):
     """How the record of a run on a rig may be off: numbers k of its recorder (gain, droop) alone. What moves a rig is
     recorded by the same clock as what the rig does, so that there is no distance error; one that was fitted
-    nevertheless would absorb physics."""
+    nevertheless would absorb physics. Methods as of ``RecordError``."""
 
     @property
     def spline_count(self) -> int:
-        """None: there is no distance."""
         return 0
 
     @property
     def trend(self) -> Array:
-        """There is none (2, 0)."""
         return np.empty((2, 0))
 
     def precision(self, size: ErrorSize) -> Array:
-        """Inverse covariance of k (2, 2)."""
         return np.diag([self.tolerance.gain**-2, self.tolerance.droop**-2])
 
     def trend_precisions(self, size: ErrorSize) -> Array:
-        """None (0,)."""
         return np.empty(0)
 
     def log_determinant(self, size: ErrorSize) -> float:
-        """Logarithm of the determinant of the precision."""
         return -2 * float(np.log([self.tolerance.gain, self.tolerance.droop]).sum())
 
     def distance_error_m(self, k: Array) -> Array:
-        """Zeros (n,)."""
         return np.zeros(self.run.count)
 
     def without_trend(self, k: Array) -> Array:
-        """The same numbers (2,)."""
         return k
 
     def coefficients_of(self, distance_error_m: Array) -> Array:
-        """An exact recorder (2,)."""
         return np.zeros(self.count)
 
 

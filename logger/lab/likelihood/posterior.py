@@ -11,8 +11,7 @@ import numpy.typing as npt
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
-from logger.lab.likelihood.signals import bands_of
-from logger.lab.likelihood.whittle import deviance
+from logger.lab.likelihood.signals import bands_of, deviance
 from logger.runs import normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose

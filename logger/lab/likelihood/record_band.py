@@ -54,13 +54,15 @@ _LEAST_POWER = 1e-9
 # Bands of log S: so wide, from the body's bounce on. Wide enough for four lines of a block each, narrow enough for six
 # of them below 10 Hz, where the gain is estimated.
 _WIDTH_HZ, _LOWEST_HZ = 1.5, 1.0
-# The grid of filters: logarithmic step and lowest of the cut-offs, and the highest as a share of the rate; orders. A
-# finer one changes a cut-off by less than 2 %.
+# The grid of filters: logarithmic step and lowest of the cut-offs, and the highest as a share of the rate. A finer one
+# changes a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
+# Orders: of usual filters, up to one of order 8 that was run forth and back.
 _ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
 # The grid of effects that imitate a filter: frequencies and damping ratios of a sensor on a spring, from the lowest
-# that cuts off within the band to twice the highest; first zeros of a contact patch, 12 Hz being 0.4 m at 5 m/s.
+# that cuts off within the band to twice the highest ...
 _RINGS_AT_HZ, _RINGS_WITH = np.geomspace(8.0, 80.0, 45), np.geomspace(0.02, 0.7, 9)
+# ... and first zeros of a contact patch, which averages over its length: 12 Hz is 0.4 m at 5 m/s.
 _NULLS_HZ = np.append(np.inf, np.geomspace(12.0, 120.0, 14))
 # The grid of the spectrum itself: gains around the median ratio, and how many levels of noise up to the median
 # spectrum.

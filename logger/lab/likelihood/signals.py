@@ -28,8 +28,13 @@ def bands_of(run: Run) -> Bands | JointBands:
     return JointBands([Bands(run), *(Bands(run, index) for index in range(len(run.signals)))])
 
 
+def deviance(bands: Sequence[Bands | JointBands], residuals: Sequence[Array]) -> float:
+    """Minus twice the log-likelihood of residuals (n,) of several runs, without its constant."""
+    return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))
+
+
 class JointBands:
-    """The bands of several signals of one run, as ``Bands`` of the signals joined."""
+    """The bands (b,) of several signals of one run. Methods as of ``Bands``, of the signals joined."""
 
     def __init__(self, each: Sequence[Bands]) -> None:
         self.each = list(each)
@@ -41,35 +46,29 @@ class JointBands:
         return np.split(joined, len(self.each), axis=-1)
 
     def power(self, residual: Array) -> Array:
-        """As ``Bands``, of all bands (b,)."""
         return np.concatenate([one.power(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
     def levels(self, residual: Array) -> Array:
-        """As ``Bands``."""
         return np.maximum(self.power(residual), self.floor)
 
     def deviance(self, residual: Array) -> float:
-        """As ``Bands``."""
         return sum(one.deviance(part) for one, part in zip(self.each, self.parts(residual), strict=True))
 
     def whitener(self, residual: Array) -> JointWhitener:
-        """As ``Bands``."""
         return JointWhitener([one.whitener(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
 class JointWhitener:
-    """Weighs each band of each signal of one run by its level."""
+    """Whitens several signals of one run. Methods as of ``Whitener``, of the signals joined."""
 
     each: list[Whitener]
 
     def __call__(self, samples: Array) -> Array:
-        """As ``Whitener``, of signals that are joined."""
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
 
     def in_time(self, samples: Array) -> Array:
-        """As ``Whitener``, of signals that are joined."""
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one.in_time(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
 

@@ -10,9 +10,7 @@ filtered away, or what shall not be compared, holds no information.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import count, pairwise, takewhile
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -155,15 +153,3 @@ class Whitener:
     def _spectrum(self, samples: Array) -> npt.NDArray[np.complex128]:
         """Spectrum of the samples that count, at the frequencies of the bands."""
         return np.fft.rfft(samples[..., self._first:], self._padded, axis=-1)[..., self._inside]
-
-
-class ResidualLikelihood(Protocol):
-    """Bands of one signal or of several."""
-
-    def deviance(self, residual: Array) -> float:
-        """As ``Bands``."""
-
-
-def deviance(bands: Sequence[ResidualLikelihood], residuals: Sequence[Array]) -> float:
-    """Minus twice the log-likelihood of residuals (n,) of several runs, without its constant."""
-    return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))

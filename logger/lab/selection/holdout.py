@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.readings import error_with_rounding_noise
-from logger.lab.likelihood.whittle import deviance
+from logger.lab.likelihood.signals import deviance
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,8 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import welch
 
-from logger.lab.likelihood.whittle import DISCREPANCY, Bands, deviance
+from logger.lab.likelihood.signals import deviance
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import Run

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, effect_slopes, fit
-from logger.lab.likelihood.whittle import deviance
+from logger.lab.likelihood.signals import deviance
 from logger.lab.selection.holdout import cross_validate, folds
 from logger.runs import Run, normalised_rms
 from logger.vehicle.effect import Chosen
