@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     given = bench(args, searches="ridelog diagnose")
     if args.out is not None:
         check_out(args.out, args.runs, given.files_read)
-    with progress() as tell:
-        found = given.diagnosed(tell)
+    with progress() as notify:
+        found = given.diagnosed(notify)
     if args.out is not None:
         from logger.report.diagnosis_page import page
 

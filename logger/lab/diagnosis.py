@@ -92,7 +92,7 @@ class Diagnosis:
     undetectable         effects that these runs could not show at their usual strength
     shape                of the unexplained residual; None where it is noise
     removed              sensor drift, distance error and filtering, removed from the error before it is judged
-    signals              errors of signals beside the sensor's acceleration, by name
+    signals              errors of other signals than the sensor's acceleration, by name
     band                 in which the runs were compared; None: all
     car                  numbers and laws as fitted
     """
@@ -154,7 +154,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
+                   progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
              ) -> tuple[Search, Selection]:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
@@ -267,7 +267,7 @@ def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[Candi
     there = one.hold_out
     p_value = probability_by_chance(one.gain, count)
     rivals = tuple(other.effect.name for other in fits
-                  if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
+                   if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
     return Candidate(one.effect, one.chosen.values, there.error, p_value, one.gain, before.deviance - there.deviance,
                      rivals)
 

@@ -59,7 +59,7 @@ DEFLECTION = Motion("deflection", "tire's deflection", "deflection_m", "m", (100
 class CurveFamily(Family):
     """A force that is a curve of one motion.
 
-    motion               that it goes with
+    motion               that it depends on
     force                what it is in words: "damper force"
     source, signature    of its drafts
     usual_share          of the time that the motion stays within where the force is what its number says
@@ -102,7 +102,7 @@ class CurveFamily(Family):
         return f"a {self.force} that follows a free curve of the {motion}, {ends}"
 
     def _power(self, reference: float, reach: float, size_n: float) -> Draft:
-        """A force that grows with a power of what moves, alike both ways, as far as ``reach``."""
+        """A force that grows with a power of the motion, symmetric, constant beyond ``reach``."""
         functions = f"""
 def force_n(p, at):
     size = np.minimum(np.abs(at), {rounded(reach)!r}) / {reference!r}

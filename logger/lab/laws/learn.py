@@ -99,19 +99,18 @@ class Nearest:
 class Law:
     """A law that was chosen.
 
-    one        with the numbers of the search
-    beside     known effects that are missing as well, with theirs
-    gain       of minus twice the log of the evidence over the model without it
-    listed     what the known effects alone gain over the car without any, and ``with_law`` what the law and those
-               beside it gain
-    rivals     laws of other families that explain as well
-    nearest    the known effect that comes nearest in its place; None: none does anything
+    one         the law with the numbers of the search
+    effects     known effects that are missing as well, with their numbers
+    gain        of minus twice the log of the evidence over the model without it
+    listed      gain of the known effects alone over the car without any; ``with_law``: of the law and its effects
+    rivals      laws of other families that explain as well
+    nearest     the known effect that gains most in its place; None: none gains anything
     """
 
     family: Family
     draft: Draft
     one: Chosen
-    beside: tuple[Chosen, ...]
+    effects: tuple[Chosen, ...]
     gain: float
     listed: float
     with_law: float
@@ -178,7 +177,7 @@ def exceeds_noise(model: Baseline) -> bool:
 class _LawChoice:
     """The choice of a law, after the search among the known effects.
 
-    kept    laws that were fitted, and beside which models
+    kept    models, with the laws that were fitted on top of each
     """
 
     search: Search
@@ -219,11 +218,11 @@ class _LawChoice:
         if best.draft.name not in gains or model.score > least:
             return None, None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
-        beside = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
+        effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
         rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        law = Law(best.family, best.draft, one, beside, gains[best.draft.name], before - now, before - model.score,
+        law = Law(best.family, best.draft, one, effects, gains[best.draft.name], before - now, before - model.score,
                   rivals, self._nearest(model, best, gains[best.draft.name]))
         return law, model
 

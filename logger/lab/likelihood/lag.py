@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 WINDOW_S = 2.56
 """Length of a window: 256 samples at 100 Hz, a quick transform, two to four bounces of a body."""
 _LEAST_FREEDOM = 5
-"""Fewer degrees of freedom tell no slope: Student's t at 5 % is above 2.6 there. A judgement."""
+"""No slope is estimated with fewer degrees of freedom: Student's t at 5 % is above 2.6 there. A judgement."""
 _LEAST_READ = 0.9
 """Share of a window that has to be read, lest the filling of the rest decides; a tenth moves a lag by less than its
 error."""

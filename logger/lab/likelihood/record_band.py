@@ -20,7 +20,7 @@ nothing. Nor may a sensor on a bracket (``sensor_mount_resonance``) together wit
 What is a filter, and what a slow sensor? No part of a car or of a sensor falls faster than with the fourth power of
 the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); a rubber mount or a tire's contact
 patch fall less, or come back. So a B of order m = 3 or more is somebody's filter: above it nothing is compared. One
-of lower order is left to the effects: its delay tells whether it is a sensor's.
+of lower order is left to the effects: its delay shows whether it is a sensor's.
 
 Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the phase
 of a causal one is off a straight line by half a radian and more. Over short windows, each aligned with the model, the

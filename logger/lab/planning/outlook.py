@@ -75,7 +75,7 @@ class Outlook:
     pairwise: Array
 
     def scaled_to(self, detectability: Array) -> Outlook:
-        """The outlook with other detectabilities (e,); what remains of each after another one is scaled alike."""
+        """The outlook with other detectabilities (e,); what remains of each is scaled in proportion."""
         share = detectability / np.maximum(self.detectability, _TINY)
         return Outlook(detectability, self.pairwise * share[:, None])
 

@@ -75,15 +75,14 @@ class AddedEffects:
     error_before                   of the vehicle and effects as they were
     error_refitted                 of those with their numbers refitted and the distance errors taken out
     error_after                    of the model with the effects, fitted in the same way
-    error_as_written               of that model on the distances as recorded: what a comparison with it begins at
+    error_as_written               of that model at the recorded distances: the error of a comparison with it
     noise_floor_error              the error that the sensor's noise makes
     p_value                        bound on the probability that noise alone gains as much
     unseen_before, unseen_after    cross-validation without and with the effects; None: not known
-    band                           what of the runs was compared; None: all of it
-    removed                        what is taken out of the errors before they are judged: drift, wrong distances
+    band                           in which the runs were compared; None: all
+    removed                        sensor drift, distance error and filtering, removed from the errors
     errors                         of the numbers of vehicle and effects together
-    signals                        errors of signals beside the sensor's acceleration, by name: refitted without and
-                                   with
+    signals                        errors of other signals than the sensor's acceleration, without and with the effects
     """
 
     vehicle: Vehicle

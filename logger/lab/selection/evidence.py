@@ -1,11 +1,11 @@
 """The score by which models are chosen, and when a gain in it says that an effect is there.
 
-Problem: among twenty candidates at some hundred values, one always gains by chance, and beside something that nobody
-knows several gain a little by imitating it. Solution: models are scored by their evidence, in which each number counts
-(``LinearModel.score``). A ratio of evidences of B or more comes by chance in less than one of B cases (A. Markov's
-inequality; V. Vovk and R. Wang, Annals of Statistics 49, 2021, call it an e-value), so that 1 / B times the number of
-candidates bounds how often noise alone looks like any of them (Bonferroni). What is unmodelled competes as well: an
-effect has to gain more than imitations do.
+Problem: among twenty candidates at some hundred values, one always gains by chance, and where something unknown is
+missing several gain a little by imitating it. Solution: models are scored by their evidence, in which each number
+counts (``LinearModel.score``). A ratio of evidences of B or more comes by chance in less than one of B cases (A.
+Markov's inequality; V. Vovk and R. Wang, Annals of Statistics 49, 2021, call it an e-value), so that 1 / B times the
+number of candidates bounds how often noise alone looks like any of them (Bonferroni). What is unmodelled competes as
+well: an effect has to gain more than imitations do.
 """
 
 from __future__ import annotations

@@ -71,9 +71,9 @@ class UnknownRoadDiagnosis:
     by_run        error of each run, before and after
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
-    confounded    what these drives cannot tell of the car's numbers
+    confounded    what these drives cannot identify of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
-    doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
+    doubtful      pairs of runs that may be over one road or two, by name
     """
 
     candidates: tuple[Candidate, ...]

@@ -73,7 +73,7 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
     found = learned([chosen(QuadraticDamping(), {})], rougher=2.0)
     law = found.law
     assert law is not None
-    assert law.family.name == "force_by_rate" and not law.beside and not law.draft.axle
+    assert law.family.name == "force_by_rate" and not law.effects and not law.draft.axle
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
     true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
     assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)

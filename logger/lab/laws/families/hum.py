@@ -67,7 +67,7 @@ class Hum(Family):
 
     def _drafts(self, context: LawContext, numbers: list[Parameter], cycles: str, variant: str, signature: str,
                 **more: Any) -> list[Draft]:
-        """A tone that begins in all runs alike, and one that begins in each elsewhere."""
+        """A tone of one phase at the beginning of all runs, and one of another phase in each."""
         size = rounded(float(np.std(np.concatenate(context.residuals))))
 
         def draft(runs: Sequence[str], variant: str) -> Draft:
