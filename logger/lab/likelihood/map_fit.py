@@ -19,7 +19,7 @@ import numpy.typing as npt
 from logger.fitting.levenberg_marquardt import minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
-from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen
@@ -238,14 +238,8 @@ def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, m
     posterior = linear.posterior
     predict = partial(posterior.predict, logs=logs, record=record, rough=True)
     before = predict(effects) if posterior.car(effects, logs).rubs else fine
-    here = coordinates_of(effects, moves)
-    found = [np.empty((len(moves), len(one))) for one in before]
-    for index, step in enumerate(steps_of(effects, moves)):
-        there = here.copy()
-        there[index] += step
-        for column, high, low in zip(found, predict(moved(effects, moves, there)), before, strict=True):
-            column[index] = (high - low) / step
-    return found
+    return derivatives(lambda there: predict(moved(effects, moves, there)), coordinates_of(effects, moves),
+                       steps_of(effects, moves), before)
 
 
 def own_slopes(linear: LinearModel) -> list[Array] | None:

@@ -153,13 +153,21 @@ class Posterior:
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
         """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, by differences over
         steps (p,) of rough simulations, which are near enough."""
-        found = [np.empty((len(steps), run.joined_count)) for run in self.runs.runs]
-        moved = self.distance_error_m(state.record)
-        here = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
-        for index, step in enumerate(steps):
-            logs = state.logs.copy()
-            logs[index] += step
-            there = self.runs.predict(self.car(state.effects, logs), moved, rough=True)
-            for column, high, low in zip(found, there, here, strict=True):
-                column[index] = (high - low) / step
-        return found
+        error_m = self.distance_error_m(state.record)
+
+        def predict(logs: Array) -> list[Array]:
+            return self.runs.predict(self.car(state.effects, logs), error_m, rough=True)
+
+        return derivatives(predict, state.logs, steps, predict(state.logs))
+
+
+def derivatives(predict: Callable[[Array], Sequence[Array]], here: Array, steps: Array,
+                predictions: Sequence[Array]) -> list[Array]:
+    """Derivatives (m, n) per run of predictions (n,) by numbers (m,), by differences over steps (m,)."""
+    found = [np.empty((len(steps), len(one))) for one in predictions]
+    for index, step in enumerate(steps):
+        there = here.copy()
+        there[index] += step
+        for column, high, low in zip(found, predict(there), predictions, strict=True):
+            column[index] = (high - low) / step
+    return found
