@@ -28,7 +28,7 @@ shorter)."""
 
 @dataclass(frozen=True)
 class Signal:
-    """One more signal that was measured, beside the acceleration of the sensor.
+    """A measured signal other than the acceleration of the sensor.
 
     name              of its column, which ends in its unit
     measures          ``acceleration`` [m/s2], ``travel`` (extension of a suspension) [m], ``pitch_rate`` (nose up) or
@@ -178,7 +178,7 @@ class Run:
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What was measured beside the acceleration of the sensor."""
+        """The measured signals other than the acceleration of the sensor."""
         return self.facts.signals
 
     @property

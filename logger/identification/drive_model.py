@@ -70,7 +70,7 @@ class DriveModel:
         raise NotImplementedError
 
     def observed(self, run: int, prediction: Array) -> Array:
-        """A prediction (n,) of a record, counted from 0, as far as its readings tell: as it was measured where nothing
+        """A prediction (n,) of a record, counted from 0, where it has readings: as it was measured where nothing
         was read, and where a clipped reading is reached."""
         record = self.records[run]
         if record.usable is None:

@@ -59,7 +59,7 @@ def looks_like(found: Diagnosis) -> list[str]:
 
 
 def untested(found: Diagnosis) -> list[str]:
-    """What these runs cannot tell of, and which drive would."""
+    """Effects that these runs cannot show, and which drive would."""
     lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
     lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
               f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed. To see it: "

@@ -41,7 +41,7 @@ def _steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
 
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
-    """What these drives cannot tell, in sentences."""
+    """What these drives cannot show or identify, in sentences."""
     lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
              "noise." for one, other in found.doubtful]
     if found.absorbed_by_road:
