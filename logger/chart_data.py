@@ -10,6 +10,9 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 MOST_POINTS = 4000
+CURVE_POINTS, CURVE_REACH = 201, 0.999
+"""Of a force curve: points that look smooth at the width of a page, and the share of the time that motions stay within
+its ends."""
 
 CLASS_COLOURS = ("#2f6db5", "#58a9d4", "#f2c744", "#ef8d32", "#d0402b", "#9e1b5e", "#651a70", "#35104a")
 """Of classes from best to worst: from blue over yellow and red to purple, distinguishable with any common colour

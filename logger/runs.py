@@ -19,12 +19,16 @@ NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
 """What a sample may be: none, a reading, or one that only says that there was at least as much."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
-_EVEN = 1e-3
+EVEN_SAMPLES = 1e-3
+"""A time within so many samples of one is at that sample: rates are read off times that were rounded."""
+RECEIVER_ERROR_LASTS_S = 60.0
+"""Correlation time of the errors of a receiver's places (a judgement: the ionosphere's is longer, reflections'
+shorter)."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One more signal that was measured, beside the acceleration of the sensor.
+    """A measured signal other than the acceleration of the sensor.
 
     name              of its column, which ends in its unit
     measures          ``acceleration`` [m/s2], ``travel`` (extension of a suspension) [m], ``pitch_rate`` (nose up) or
@@ -129,7 +133,7 @@ class Run:
     @property
     def first(self) -> int:
         """The first sample that is not left out."""
-        return int(np.ceil(self.skip_s * self.rate_hz - _EVEN))
+        return int(np.ceil(self.skip_s * self.rate_hz - EVEN_SAMPLES))
 
     @property
     def count(self) -> int:
@@ -156,24 +160,25 @@ class Run:
         """Of which samples (n,) something was read."""
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
 
-    def left_by(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
-        """What a prediction (n,), or more signals joined to it, leaves of what was measured, or of other readings (n,)
-        of the sensor in its place [m/s2]: nothing where nothing was read, and of a clipped reading only what it falls
-        short of it by."""
+    def residual(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
+        """Measured minus predicted (n,), or of more signals joined to it [m/s2]; with ``measured_mps2`` (n,), of these
+        readings in place of the sensor's. It is 0 where nothing was read, and of a clipped reading what the prediction
+        falls short of it by."""
         main = self.main(prediction)
-        left = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - main
+        residual = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - main
         if self.usable is not None:
             way = np.sign(self.measured_mps2)
             short = way * (self.measured_mps2 - main) - 0.5 * (self.facts.step_mps2 or 0.0)  # it may be rounded up
-            left = np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0), np.where(self.read, left, 0.0))
+            residual = np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0),
+                                np.where(self.read, residual, 0.0))
         if len(main) == len(prediction):
-            return left
+            return residual
         others = (self.more - prediction[self.count :].reshape(-1, self.count)) * self.read
-        return np.concatenate([left, others.ravel()])
+        return np.concatenate([residual, others.ravel()])
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What was measured beside the acceleration of the sensor."""
+        """The measured signals other than the acceleration of the sensor."""
         return self.facts.signals
 
     @property
@@ -228,7 +233,7 @@ def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> f
 
     NaN where nothing but zeros was measured."""
     pairs = zip(runs, predictions, strict=True)
-    return normalised_rms([run.left_by(run.main(one))[run.first:] for run, one in pairs],
+    return normalised_rms([run.residual(run.main(one))[run.first:] for run, one in pairs],
                           [run.kept_readings_mps2 for run in runs])
 
 

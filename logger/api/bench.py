@@ -31,12 +31,12 @@ _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
 
-Tell = Callable[[str], None]
-"""Told what is under way."""
+Notify = Callable[[str], None]
+"""Takes a message on the progress of some work."""
 
 
-def unsaid(_words: str) -> None:
-    """Told to nobody."""
+def silent(_words: str) -> None:
+    """Ignore a message."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +107,13 @@ class Bench:
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
                            Tolerance(numbers=self.numbers))
 
-    def diagnosed(self, tell: Tell = unsaid, left_out: frozenset[str] = frozenset()) -> Diagnosis:
+    def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> Diagnosis:
         """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
         from logger.lab.diagnosis import diagnose
 
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
         with self.blamed():
-            return diagnose(self.posterior(searches=True), effects, self.model.effects, tell)
+            return diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
 
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
         """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
@@ -144,33 +144,33 @@ class Bench:
         return replace(self, effects={**self.effects, effect.name: effect},
                        files={**self.files, effect.name: file} if file is not None else self.files)
 
-    def searched(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
+    def search_values(self, effect: Effect, values: Mapping[str, float], notify: Notify = silent) -> Chosen:
         """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
-        from logger.lab.diagnosis import refitted
-        from logger.lab.selection.candidate_fit import refined, roughly_fitted
-        from logger.lab.selection.screening import misalignment, screened
+        from logger.lab.diagnosis import refit
+        from logger.lab.selection.candidate_fit import fit_roughly, refine
+        from logger.lab.selection.screening import misalignment, screen
         from logger.vehicle.effect import chosen
 
         if set(values) >= {one.name for one in effect.parameters}:
             return chosen(effect, values)
         with self.blamed():
             posterior = self.posterior(searches=True)
-            tell("refitting the car's own numbers")
+            notify("refitting the car's own numbers")
             nominal = posterior.start(self.model.effects)
             seen = misalignment(posterior, nominal)
-            base = refitted(posterior, nominal)
-            tell(f"searching for {effect.name}")
-            tries = roughly_fitted(base.score, base, screened(base, effect, [seen]))
+            base = refit(posterior, nominal)
+            notify(f"searching for {effect.name}")
+            tries = fit_roughly(base.score, base, screen(base, effect, [seen]))
         choices = {one.name for one in effect.parameters if one.choices} & set(values)
         said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
-        best = max((refined(base.score, one) for one in said or tries), key=lambda one: one.gain)
+        best = max((refine(base.score, one) for one in said or tries), key=lambda one: one.gain)
         return chosen(effect, {**best.chosen.values, **values})
 
-    def added(self, start: Chosen, candidates: int, tell: Tell = unsaid) -> AddedEffects:
+    def added(self, start: Chosen, candidates: int, notify: Notify = silent) -> AddedEffects:
         """The effect fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
         from logger.lab.selection.add_effect import add
 
-        tell(f"fitting the car without and with {start.effect.name}")
+        notify(f"fitting the car without and with {start.effect.name}")
         with self.blamed():
             return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 
@@ -200,7 +200,7 @@ class Bench:
 
 
 def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str], numbers: float,
-             searches: str | None = None, warn: Tell = unsaid, low_pass_hz: float | None = None,
+             searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
     low-passed, or that say so, only the band that remains is compared.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import Tell, unsaid
+from logger.api.bench import Notify, silent
 from logger.api.ranges import LOW_PASS, MASS_FACTOR, PASSENGERS, SEED
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
@@ -92,7 +92,7 @@ class Question:
 
 def calibrate(
     vehicle: Model | Path | str, *, window_m: float = WINDOW_M, low_pass_hz: float | None = None, passengers: int = 0,
-    sprung_mass_factor: float = 1.0, seed: int = 1, recompute: bool = False, progress: Tell = unsaid,
+    sprung_mass_factor: float = 1.0, seed: int = 1, recompute: bool = False, progress: Notify = silent,
 ) -> Calibration:
     """How much a vehicle shakes on roads of known roughness: its model drives over random roads of IRI 1 to 10 m/km, at
     10 to 70 mph.
@@ -139,12 +139,12 @@ def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
     return Slopes(*(np.array([getattr(line, one.name) for line in lines]) for one in fields(Slopes)))
 
 
-def calibrated(model: vehicle_file.Model, path: Path | None, question: Question, tell: Tell = unsaid) -> Calibrated:
+def calibrated(model: vehicle_file.Model, path: Path | None, question: Question, notify: Notify = silent) -> Calibrated:
     """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has, and for a
     vehicle that lacks what its model or an effect needs.
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
-    tell    called with where they are from
+    notify    called with where they are from
     """
     from logger.estimation.rms_calibration import CalibrationSettings, loaded
     from logger.report.calibration_text import Calibrated, Load
@@ -157,7 +157,7 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Question,
     vehicle = model.vehicle
     if any(one.file is not None for one in model.effects):
         path = None  # what is in that file may change
-    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute, tell)
+    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute, notify)
     plain = _answer(ask, vehicle, vehicle.name)
     people, factor = question.passengers, question.sprung_mass_factor
     if not people and factor == 1.0:
@@ -177,7 +177,7 @@ class _Ask:
     gain: Callable[[Array], Array]
     settings: CalibrationSettings
     recompute: bool
-    tell: Tell
+    notify: Notify
 
 
 def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
@@ -190,7 +190,7 @@ def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, 
     key = fingerprint(vehicle, ask.gain, ask.settings, ask.effects)
     found = None if ask.recompute else find(kept_in, key)
     if found is not None:
-        ask.tell(f"{title}: found in {found.path}")
+        ask.notify(f"{title}: found in {found.path}")
         return found.speeds
     started_s = time.perf_counter()
     try:
@@ -201,5 +201,5 @@ def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, 
     path = keep(kept_in, key, speeds)
     where = (f"kept in {path}" if path else "not kept" if not kept_in else
              f"not kept: {' or '.join(map(str, kept_in))} cannot be written")
-    ask.tell(f"{title}: computed in {took_s:.1f} s, {where}")
+    ask.notify(f"{title}: computed in {took_s:.1f} s, {where}")
     return speeds

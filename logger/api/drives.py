@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import Tell, unsaid
+from logger.api.bench import Notify, silent
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
@@ -360,7 +360,7 @@ def step_of(run: Run, said_mps2: float | None) -> float:
 
 
 def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False,
-             warn: Tell = unsaid, anyway: bool = False) -> Assessment:
+             warn: Notify = silent, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
     ``anyway`` (then ``warn`` is called)."""
@@ -382,7 +382,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
         raise BadInput(f"{model.vehicle.name}: {error}") from None
 
 
-def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Tell,
+def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Notify,
                 anyway: bool) -> None:
     """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
     left out: whether it is the road can be decided without them, and some take long."""

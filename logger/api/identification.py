@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import slow_words, unsaid
+from logger.api.bench import silent, slow_words
 from logger.api.drives import Run, read_run
 from logger.api.model_checks import check_roads
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
@@ -204,7 +204,7 @@ def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s
 
 
 def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                      warn: Callable[[str], None] = unsaid) -> FittedNumbers:
+                      warn: Callable[[str], None] = silent) -> FittedNumbers:
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
 
     word    by which the user knows the vehicle

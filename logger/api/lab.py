@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.bench import Bench, Tell, among, bench_of, deviation_of, unsaid
+from logger.api.bench import Bench, Notify, among, bench_of, deviation_of, silent
 from logger.api.drives import Run, read_run
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
@@ -135,7 +135,7 @@ class Diagnosis(CommandResult):
 def diagnose(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
     effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None,
-    progress: Tell = unsaid, anyway: bool = False,
+    progress: Notify = silent, anyway: bool = False,
 ) -> Diagnosis:
     """Which physical effect a model lacks: each that is known is tried, and judged on what no fit saw. It takes from
     seconds to minutes, and the compiler of the ``lab`` extra.
@@ -232,7 +232,7 @@ class AddedEffect(CommandResult):
 
 def add_effect(
     name: Path | str, vehicle: Model | Path | str, runs: Runs, *, start: Mapping[str, float] | None = None,
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False,
 ) -> AddedEffect:
     """Add a physical effect to a model: fitted with the car's numbers on all of the runs.
@@ -255,7 +255,8 @@ def add_effect(
     effect, file = bench.asked_for(str(name), values, str(name))
     bench = bench.with_effect(effect, file)
     is_given = set(values) >= {one.name for one in effect.parameters}
-    found = bench.added(bench.searched(effect, values, progress), 1 if is_given else len(effect.trials()), progress)
+    found = bench.added(bench.search_values(effect, values, progress), 1 if is_given else len(effect.trials()),
+                        progress)
     return addition_of(found, model_of(bench.model_with(found)))
 
 

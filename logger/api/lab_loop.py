@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.bench import Bench, Tell, among, unsaid
+from logger.api.bench import Bench, Notify, among, silent
 from logger.api.lab import (
     AddedEffect,
     Comparison,
@@ -31,7 +31,7 @@ from logger.store.formats import vehicle_file as vehicle_format
 if TYPE_CHECKING:
     from logger.lab import compare, diagnosis
     from logger.lab.selection.add_effect import AddedEffects
-    from logger.lab.session import Round, SoughtLaw, Story
+    from logger.lab.session import LawSearch, Round, Story
     from logger.report.html import Html
     from logger.vehicle.effect import Chosen
 
@@ -44,7 +44,7 @@ Ask = Callable[[Bench, str], str | None]
 """Which effect to add where one was found missing: its name or another's, or None for none."""
 Learns = Callable[[], bool]
 """Whether a law is to be learned where no effect explains what is missing."""
-Progress = Callable[[], AbstractContextManager[Tell]]
+Progress = Callable[[], AbstractContextManager[Notify]]
 Explain = Callable[[str, str, str], str]
 """What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
 added, and the vehicle file that is read, or written where an effect is added; of learn the law's file."""
@@ -89,7 +89,7 @@ class LabStory(CommandResult):
 def lab(
     vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False, learns: bool = True,
 ) -> LabStory:
     """The lab's whole loop: compare, diagnose, learn a law where no effect explains what is missing, add what is
@@ -169,47 +169,47 @@ def always() -> bool:
     return True
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain = unexplained,
+def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = unexplained,
          learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
     """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
 
     learns      asked once, where no effect explains what is missing
-    tell        called with what was found
+    notify        called with what was found
     progress    context around what takes long, called with what is under way
     explain     what to say of each step in addition to what it finds
     """
     from logger.report.session_text import ending
     from logger.report.story_page import page
 
-    story, model = go_through(given, out, ask, tell, progress, explain, learns)
+    story, model = go_through(given, out, ask, notify, progress, explain, learns)
     write_text(out / STORY, page(story))
-    tell(chapter("The end", explain("end", "", "")))
-    tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
+    notify(chapter("The end", explain("end", "", "")))
+    notify([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
     return story, model
 
 
-def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain,
+def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,
                learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
     """The same without its end and its page."""
     from logger.lab.session import Story
     from logger.report.lab_text import diagnosis_lines
 
     word = given.word
-    tell(chapter("Compare", explain("compare", "", word)))
+    notify(chapter("Compare", explain("compare", "", word)))
     first = _compared(given, progress)
-    tell(_comparison_lines(first))
+    notify(_comparison_lines(first))
     diagnoses: list[diagnosis.Diagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
-    law: SoughtLaw | None = None
-    step = _Step(given, out, tell, progress, explain)
+    law: LawSearch | None = None
+    step = _Step(given, out, notify, progress, explain)
     going = asked = True
     while going and len(rounds) < MOST_ROUNDS:
         going = False
-        tell(chapter("Diagnose", explain("diagnose", "", word)))
+        notify(chapter("Diagnose", explain("diagnose", "", word)))
         diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
-        tell(diagnosis_lines(diagnoses[-1], _SHOWN))
-        if diagnoses[-1].left_over and asked:
+        notify(diagnosis_lines(diagnoses[-1], _SHOWN))
+        if diagnoses[-1].exceeds_noise and asked:
             asked = False
             if learns():
                 step, law, made = step.learned()
@@ -240,40 +240,40 @@ class _Step:
 
     given: Bench
     out: Path
-    tell: Say
+    notify: Say
     progress: Progress
     explain: Explain
 
     def added(self, name: str, start: Chosen | None, number: int) -> tuple[_Step, Round]:
         """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
         file = _vehicle_file(self.out, number)
-        self.tell(chapter(f"Add {name}", self.explain("add", name, str(file))))
+        self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
         begin = start or _searched(self.given, name, self.progress)
-        with self.progress() as tell:
-            addition = self.given.added(begin, len(begin.effect.trials()), tell)
+        with self.progress() as notify:
+            addition = self.given.added(begin, len(begin.effect.trials()), notify)
         return self._with(addition, name, file)
 
-    def learned(self) -> tuple[_Step, SoughtLaw, list[Round]]:
+    def learned(self) -> tuple[_Step, LawSearch, list[Round]]:
         """A law learned, written and added, with what is missing beside it; or none."""
         from logger.api.learning import learned, picture_of, with_law
-        from logger.lab.session import SoughtLaw
+        from logger.lab.session import LawSearch
         from logger.report.law_text import law_lines, source_of
 
         file = self.out / LAW
-        self.tell(chapter("Learn a law", self.explain("learn", "", str(file))))
-        with self.progress() as tell:
-            found = learned(self.given, tell)
-        self.tell(law_lines(found.learning, found.addition))
+        self.notify(chapter("Learn a law", self.explain("learn", "", str(file))))
+        with self.progress() as notify:
+            found = learned(self.given, notify)
+        self.notify(law_lines(found.learning, found.addition))
         if found.addition is None:
-            return self, SoughtLaw(found.learning, None, None, ""), []
+            return self, LawSearch(found.learning, None, None, ""), []
         write_text(file, source_of(found.learning, found.addition))
-        self.tell(["", f"Law: {file}"])
+        self.notify(["", f"Law: {file}"])
         knows, addition = with_law(self.given, found.addition, file)
         name = " and ".join(addition.names)
         vehicle = _vehicle_file(self.out, 1)
-        self.tell(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
+        self.notify(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
         step, made = replace(self, given=knows)._with(addition, name, vehicle)
-        return step, SoughtLaw(found.learning, found.addition, picture_of(found), str(file)), [made]
+        return step, LawSearch(found.learning, found.addition, picture_of(found), str(file)), [made]
 
     def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
         """The vehicle with what was added written and compared."""
@@ -282,11 +282,11 @@ class _Step:
 
         model = self.given.model_with(addition)
         vehicle_format.write_model(file, model)
-        self.tell([*addition_lines(addition), "", f"Vehicle: {file}"])
-        self.tell(chapter("Compare again", self.explain("again", name, str(file))))
+        self.notify([*addition_lines(addition), "", f"Vehicle: {file}"])
+        self.notify(chapter("Compare again", self.explain("again", name, str(file))))
         given = replace(self.given, model=model)
         made = Round(addition, _compared(given, self.progress), str(file))
-        self.tell(_comparison_lines(made.comparison))
+        self.notify(_comparison_lines(made.comparison))
         return replace(self, given=given), made
 
 
@@ -295,18 +295,18 @@ def _vehicle_file(out: Path, number: int) -> Path:
 
 
 def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
-    with progress() as tell:
-        return given.searched(given.effects[name], {}, tell)
+    with progress() as notify:
+        return given.search_values(given.effects[name], {}, notify)
 
 
 def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:
-    with progress() as tell:
-        return given.diagnosed(tell, left_out)
+    with progress() as notify:
+        return given.diagnosed(notify, left_out)
 
 
 def _compared(given: Bench, progress: Progress) -> compare.Comparison:
-    with progress() as tell:
-        tell("comparing")
+    with progress() as notify:
+        notify("comparing")
         return given.compared()
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.bench import Bench, Tell, unsaid
+from logger.api.bench import Bench, Notify, silent
 from logger.api.lab import Runs, bench_with
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.shown import CommandResult
@@ -76,7 +76,7 @@ class LearnedLaw(CommandResult):
 
 
 def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Path | str] = (),
-          tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+          tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
           anyway: bool = False) -> LearnedLaw:
     """Learn a law where no known effect explains what a model lacks. It takes minutes, and the compiler of the ``lab``
     extra.
@@ -104,7 +104,7 @@ def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Pat
         tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
 
 
-def learned(bench: Bench, tell: Tell = unsaid) -> LearnedModel:
+def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
     """What is learned on a bench."""
     from logger.lab.laws.learn import learn as learn_law
     from logger.lab.selection.add_effect import add
@@ -116,11 +116,11 @@ def learned(bench: Bench, tell: Tell = unsaid) -> LearnedModel:
     known = {name: sized(one, bench.model.vehicle) for name, one in shipped_effects().items()}
     with bench.blamed():
         found = learn_law(bench.posterior(searches=True), bench.effects, families, {**known, **bench.effects},
-                          bench.model.effects, tell)
+                          bench.model.effects, notify)
         if found.law is None:
             return LearnedModel(found, None)
-        tell("fitting the car without and with the law")
-        added = [bench.filed(one) for one in found.law.beside]
+        notify("fitting the car without and with the law")
+        added = [bench.filed(one) for one in found.law.effects]
         return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
                                        len(found.law.draft.effect.trials())))
 
@@ -142,4 +142,4 @@ def picture_of(found: LearnedModel) -> Curves | None:
         return None
     draft: Draft = law.draft
     one = next(one for one in addition.new if one.effect.name == draft.name)
-    return picture(draft, one, addition.errors, found.learning.look)
+    return picture(draft, one, addition.errors, found.learning.context)

@@ -157,10 +157,10 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
     """Which runs do not follow their road, and where they would fit."""
-    from logger.lab.road_match import pooled
+    from logger.lab.road_match import pool
 
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
-    if not strangers and pooled(followed.around).is_refuted:
+    if not strangers and pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]

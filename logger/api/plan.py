@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from logger.api.bench import Bench, Tell, among, bench_of, deviation_of, planned_bench, unsaid
+from logger.api.bench import Bench, Notify, among, bench_of, deviation_of, planned_bench, silent
 from logger.api.lab import Runs, lab_drives, word_of
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, SPEED, USUAL_TOLERANCE
 from logger.api.roads import Profile, read_profile
@@ -68,7 +68,7 @@ def plan(
     vehicle: Model | Path | str, runs: Runs = (), *, profile: Profile | Path | str | None = None,
     speeds_mps: Sequence[float] = (), noise_mps2: float | None = None, step_mps2: float = 0.0,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False,
 ) -> Plan:
     """Which effects runs, or drives that are planned, could show and distinguish, and which drive would add most. It
@@ -117,24 +117,24 @@ class PlannedDrives:
 
 def planned(
     word: str, model: vehicle_file.Model, bench: Bench | None, asked: PlannedDrives, effect_files: Sequence[str],
-    numbers: float, candidates: Collection[str] | None = None, tell: Tell = unsaid,
+    numbers: float, candidates: Collection[str] | None = None, notify: Notify = silent,
 ) -> plan_results.Plan:
     """What the lab says. Arguments as of ``bench_of``; ``bench``: of the runs that there are. BadInput as ``plan``."""
     from logger.lab.likelihood.priors import Tolerance
     from logger.lab.planning.plan import plan as planned_by_lab
-    from logger.lab.planning.planned_drive import CarThere, SensorNoise
+    from logger.lab.planning.planned_drive import PlannedCar, SensorNoise
 
     _check(asked, bench)
     drives = _empty_drives(model, asked)
     ready = bench or planned_bench(word, model, drives, effect_files, numbers)
     posterior = ready.posterior(searches=True)
-    there = CarThere(posterior.vehicle, posterior.stands, Tolerance(numbers=numbers), model.effects,
-                     posterior.prior.logs(posterior.vehicle, posterior.stands))
+    there = PlannedCar(posterior.vehicle, posterior.start_vehicle, Tolerance(numbers=numbers), model.effects,
+                       posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
     usual = SensorNoise(NOISE_MPS2, asked.step_mps2)
     noise = None if asked.noise_mps2 is None else SensorNoise(asked.noise_mps2, asked.step_mps2)
     with ready.blamed():
         return planned_by_lab(there, None if bench is None else posterior, drives, among(ready.effects, candidates),
-                              noise, usual, asked.road or _longest_road(bench), tell)
+                              noise, usual, asked.road or _longest_road(bench), notify)
 
 
 def plan_of(found: plan_results.Plan) -> Plan:

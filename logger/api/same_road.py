@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import Tell, among, deviation_of, known_effects, unsaid
+from logger.api.bench import Notify, among, deviation_of, known_effects, silent
 from logger.api.lab import Diagnosis, Runs, diagnosis_fields, given_runs, word_of
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import check_distances, check_record, driven_parts, thinned_runs
@@ -49,7 +49,7 @@ class SameRoadDiagnosis(Diagnosis):
 
 def diagnose_same_road(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
+    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Notify = silent,
 ) -> SameRoadDiagnosis:
     """Which physical effect a model lacks, where no profile is known: from two drives or more over one road, at
     different speeds. Only effects that keep the car linear are tried; profiles are not read. It takes from seconds to
@@ -145,7 +145,7 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 
 def diagnosed(
     word: str, model: vehicle_file.Model, records: Sequence[Record], effect_files: Sequence[str], tolerance: float,
-    candidates: Collection[str] | None = None, tell: Tell = unsaid,
+    candidates: Collection[str] | None = None, notify: Notify = silent,
 ) -> UnknownRoadDiagnosis:
     """Which effects the model lacks. BadInput as ``diagnose_same_road``.
 
@@ -163,7 +163,7 @@ def diagnosed(
     effects, _ = known_effects(model, effect_files)
     try:
         problem = SameRoad(records, model.given or model.vehicle, off, model.vehicle)
-        return diagnosis.diagnose_same_road(problem, among(effects, candidates), model.effects, tell)
+        return diagnosis.diagnose_same_road(problem, among(effects, candidates), model.effects, notify)
     except NotOneRoad as error:
         raise BadInput(str(error)) from None
     except ValueError as error:

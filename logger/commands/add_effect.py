@@ -45,9 +45,10 @@ def run(args: argparse.Namespace) -> int:
     effect, file, values = asked_for(args.effect, given)
     check_out(args.out, args.runs, map(Path, [*given.files.values(), *([] if file is None else [file])]))
     given = given.with_effect(effect, file)
-    with progress() as tell:
+    with progress() as notify:
         is_given = set(values) >= {one.name for one in effect.parameters}
-        found = given.added(given.searched(effect, values, tell), 1 if is_given else len(effect.trials()), tell)
+        found = given.added(given.search_values(effect, values, notify), 1 if is_given else len(effect.trials()),
+                            notify)
     write_model(args.out, given.model_with(found))
     if args.json:
         print(json.dumps(as_json(found) | {"vehicle": str(args.out)}, allow_nan=False))

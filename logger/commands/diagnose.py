@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     given = bench(args, searches="ridelog diagnose")
     if args.out is not None:
         check_out(args.out, args.runs, given.files_read)
-    with progress() as tell:
-        found = given.diagnosed(tell)
+    with progress() as notify:
+        found = given.diagnosed(notify)
     if args.out is not None:
         from logger.report.diagnosis_page import page
 
@@ -84,7 +84,7 @@ def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
         name = given.files.get(one.effect.name, one.effect.name)
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
-    if found.conflicts and not found.left_over:
+    if found.conflicts and not found.exceeds_noise:
         names = ", ".join(found.conflicts)
         words = f"Next: see whether {names} of the vehicle's file can be right. From the runs alone they are found by"
         return (f"{paragraphs([words])}\nridelog identify --free {','.join(found.conflicts)} --vehicle {args.vehicle} "

@@ -35,8 +35,8 @@ def run_same_road(args: argparse.Namespace) -> int:
     if args.out is not None:
         raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
     records, model = records_of(_drives(args.runs)), read_model(vehicle_path(args.vehicle))
-    with progress() as tell:
-        found = diagnosed(args.vehicle, model, records, args.effect_file, args.tolerance, tell=tell)
+    with progress() as notify:
+        found = diagnosed(args.vehicle, model, records, args.effect_file, args.tolerance, notify=notify)
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:

@@ -50,13 +50,13 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, explain: Explain | None = None,
+def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain | None = None,
          learns: Learns | None = None) -> Story:
     """Go through the loop, as ``lab_loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
     from logger.api import lab_loop
 
     lab_loop.make_ready(given, out, "--out")
-    return lab_loop.walk(given, out, ask, tell, progress, explain or lab_loop.unexplained,
+    return lab_loop.walk(given, out, ask, notify, progress, explain or lab_loop.unexplained,
                          learns or lab_loop.always)[0]
 
 

@@ -42,8 +42,8 @@ def run(args: argparse.Namespace) -> int:
     check_out(args.out, args.runs, given.files_read)
     if args.page is not None:
         check_out(args.page, args.runs, [*given.files_read, args.out], "--page")
-    with progress() as tell:
-        found = learned(given, tell)
+    with progress() as notify:
+        found = learned(given, notify)
         drawn = picture_of(found)
     source = source_of(found.learning, found.addition)
     if source:

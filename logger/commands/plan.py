@@ -59,8 +59,9 @@ def run(args: argparse.Namespace) -> int:
         read = [vehicle_path(args.vehicle), *([args.profile] if args.profile else []), *map(Path, args.effect_file)]
         check_out(args.out, args.runs, read)
     asked = PlannedDrives(road, str(args.profile), tuple(args.speed), args.noise, args.step)
-    with progress() as tell:
-        found = planned(args.vehicle, model, given, asked, args.effect_file, deviation_of(args.tolerance), tell=tell)
+    with progress() as notify:
+        found = planned(args.vehicle, model, given, asked, args.effect_file, deviation_of(args.tolerance),
+                        notify=notify)
     if args.out is not None:
         from logger.report.plan_page import page
 

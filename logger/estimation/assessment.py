@@ -1,4 +1,4 @@
-"""A drive's road from its acceleration, assessed: windows beside the exact IRI where it is known, and beside the limit.
+"""A drive's road from its acceleration, compared with the exact IRI where it is known, and with the limit.
 
 Problem: a record may be in other units, its distance may jump or go back, and an estimate alone does not say how good
 it is or could be. Solution: ``estimable`` refuses what cannot be meant, ``assess`` estimates and sets beside it what an

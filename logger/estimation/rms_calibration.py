@@ -52,7 +52,7 @@ _SHARE_OF_LOAD = {"quarter_car": 0.25, "half_car": 0.5, "full_car": 1.0}
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """What a calibration depends on beside vehicle and recorder.
+    """What a calibration depends on besides vehicle and recorder.
 
     speeds_mps    steady speeds (10, 20 ... 70 mph as in 6.3) [m/s]
     window_m      length of a window [m], 2 to 200

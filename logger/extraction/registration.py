@@ -15,15 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m
-from logger.lab.likelihood.lag import SLOWEST_MPS, lags, shift_m
+from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
 from logger.profiles.track import Track
-from logger.runs import Run
+from logger.runs import RECEIVER_ERROR_LASTS_S, Run
 
 Array = npt.NDArray[np.float64]
 
 GPS_PLACE_M = 3.0
-"""Of a receiver's positions; they are wrong in the same way for a minute or so."""
-_GPS_LASTS_S = 60.0
+"""Standard error of a receiver's positions."""
 _REACH_M = 30.0  # ten deviations of a receiver's place
 _ROUNDS = 4
 _AGREE_M, _FEWEST = 0.2, 4
@@ -58,7 +57,7 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
     time_s            (n,) of the readings, at ``rate_hz``, within the times of the fixes
     accel_mps2        (n,) what was read; 0 where nothing was
     """
-    lasting = np.sqrt(max(1.0, _GPS_LASTS_S * len(places.time_s) / max(np.ptp(places.time_s), 1.0)))
+    lasting = np.sqrt(max(1.0, RECEIVER_ERROR_LASTS_S * len(places.time_s) / max(np.ptp(places.time_s), 1.0)))
     weak = Observations(places.time_s, places.value, places.deviation * lasting)
     motion = motion_of(speeds, weak)
     by_road = _by_road(motion, speeds, time_s, accel_mps2, rate_hz, track, predict)
@@ -71,7 +70,8 @@ def _by_road(motion: TrackMotion, speeds: Observations, time_s: Array, accel_mps
              predict: Predict) -> tuple[TrackMotion, Observations] | None:
     """The motion on the road as it was felt, and where that was; None where the road was not recognised."""
     distance_m = motion.distance_m(time_s)
-    farther_m = shift_m(distance_m, accel_mps2, predict(distance_m), (track.start_m, track.end_m), _REACH_M)
+    farther_m = offset_by_correlation_m(distance_m, accel_mps2, predict(distance_m), (track.start_m, track.end_m),
+                                        _REACH_M)
     if farther_m is None:
         return None
     state = motion.state.copy()

@@ -70,13 +70,13 @@ class DriveModel:
         raise NotImplementedError
 
     def observed(self, run: int, prediction: Array) -> Array:
-        """A prediction (n,) of a record, counted from 0, as far as its readings tell: as it was measured where nothing
+        """A prediction (n,) of a record, counted from 0, where it has readings: as it was measured where nothing
         was read, and where a clipped reading is reached."""
         record = self.records[run]
         if record.usable is None:
             return prediction
         whole = np.concatenate([np.zeros(record.first), prediction])
-        return record.kept_mps2 - record.left_by(whole)[record.first:]
+        return record.kept_mps2 - record.residual(whole)[record.first:]
 
     def observed_slopes(self, run: int, prediction: Array, slopes: Array) -> Array:
         """Slopes (n, p) of that: none where it does not change with the prediction (n,)."""

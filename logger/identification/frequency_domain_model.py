@@ -5,7 +5,7 @@ car finely through each run for each of them takes seconds. Solution: a linear c
 whatever the speed did, because the speed only shapes what passes under the wheels, and that does not depend on masses,
 springs and dampers. So the road under each wheel is laid out in time once, finely, by its exact mean over each step,
 band-limited as the recorder does it, and transformed; every prediction then is a small linear system per frequency. The
-same solution, with one for the sensor's row beside it (the matrices are symmetric), gives all derivatives exactly.
+same solution, with one more for the sensor's row (the matrices are symmetric), gives all derivatives exactly.
 
 A transform takes a record for one period of an endless one. Behind the record the road therefore comes back to where it
 began and the car comes to rest; and the transform is taken along s = damping + i omega, which makes what comes round

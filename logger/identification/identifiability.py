@@ -41,7 +41,7 @@ _EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that the data cannot tell.
+    """Something that the data cannot identify.
 
     kind         silent, together, weak, unexplained, turned or apart
     direction    relative changes by name that the predictions do not feel, the largest 1; empty where it is no number

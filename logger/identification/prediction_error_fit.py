@@ -1,7 +1,7 @@
 """Numbers of a model from what was measured: the grey-box prediction-error method (3.2.4 of Blum 2015; Ljung 1999).
 
 Problem: find the numbers for which the model's predictions leave the least, say how certain they are, and say so when
-the data cannot tell. Solution, in this order:
+the data cannot identify. Solution, in this order:
 
 1. ask whether the data could determine the numbers at all (``identifiability``), before any fit;
 2. go downhill, in the logarithm of what can only be positive, within bounds, on residuals as they are (output error),
@@ -126,7 +126,7 @@ class Fit:
     sensitivities      derivatives of the predictions behind the same, by relative change, joined (N, p)
     low_pass           the filter they went through
     noise              the noise model that was taken
-    verdict            what the data cannot tell; empty when all is well
+    verdict            what the data cannot identify; empty when all is well
     converged          whether steps and noise model came to rest
     iterations         steps taken in all
     cost               half the sum of squares of ``white``, or Huber's
@@ -157,7 +157,7 @@ class Fit:
 def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None = None) -> Fit:
     """Fit a model's free numbers to records (n,), each as long as its prediction.
 
-    Raises NotIdentifiable when the data cannot tell them, ValueError for measurements of other lengths than the
+    Raises NotIdentifiable when the data cannot identify them, ValueError for measurements of other lengths than the
     predictions or nothing but zeros, no free number, or a start outside its bounds.
     """
     problem = _FitProblem(model, measured, options or FitOptions())
@@ -302,7 +302,7 @@ class _FitProblem:
         return [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
     def beside(self, start: Array) -> Array:
-        """A place a little beside a start, where no symmetry of the start hides anything."""
+        """A point near a start, where no symmetry of the start hides a dependence."""
         nudge = _NUDGE * np.cos(1.0 + 2.0 * np.arange(len(start))) * (len(start) > 1)
         return np.clip(start + nudge, self.low, self.high)
 

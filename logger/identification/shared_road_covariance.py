@@ -1,4 +1,4 @@
-"""What drives over one and the same obstacle have in common beside it, and what that does to the standard errors.
+"""Covariance of drives over one road besides a known obstacle, and its effect on the standard errors.
 
 Problem: three drives over one bump meet the same roughness around it three times. Each residual looks like that of a
 road of its own, and a fit that takes the three for independent believes its average too much: at one speed its standard

@@ -1,9 +1,9 @@
-"""Whether a record is of another car than the one that the model describes.
+"""A test whether a record is of another car than the model's.
 
-Problem: with another car's file every effect that takes away some of the difference looks as if it were missing.
-Solution: where a model says next to nothing of what was measured, cars whose masses, springs, dampers and tires are far
-off in any direction are tried. If one of them explains the record, and several of its numbers are off by far more than
-such numbers are uncertain, the record is of another car: an effect that is missing leaves most numbers where they were.
+Problem: with another car's file every effect that reduces the difference seems to be missing. Solution: where a model
+explains next to nothing of what was measured, cars with very different masses, springs, dampers and tires are tried. If
+one of them explains the record, and several of its numbers differ by far more than they are uncertain, the record is of
+another car: a missing effect changes few numbers.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run, normalised_rms_error
@@ -24,8 +24,8 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-SAYS_LITTLE = 0.8
-"""From this error on a model explains next to nothing: a third of the power (1 - 0.8 squared)."""
+POOR_ERROR = 0.8
+"""From this error on a model explains next to nothing: a third of the power (1 - 0.8 squared). A judgement."""
 
 
 @dataclass(frozen=True)
@@ -44,24 +44,25 @@ class AnotherCar:
 
 def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
                 numbers: float, explains: float = 0.35, far_sigma: float = 6.0, several: int = 4) -> AnotherCar | None:
-    """The other car that a record is of; None: it may well be this one.
+    """The other car that a record is of; None: it may be this one.
 
-    predictions    of the model (n,) per run
-    numbers        deviation of what the car's numbers are usually off by, as a share
-    explains       up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
-    far_sigma, several    so many numbers off by so many deviations are another car's (a judgement: an effect that is
-                   missing moves few numbers far)
+    predictions           of the model (n,) per run
+    numbers               standard deviation of the car's numbers, as a share
+    explains              up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
+    far_sigma, several    so many numbers off by so many standard deviations are another car's (a judgement: a missing
+                          effect changes few numbers so far)
     """
-    if normalised_rms_error(runs, predictions) < SAYS_LITTLE:
+    if normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
-    some = SimulatedRuns([_beginning(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
-    wide = Posterior(some, vehicle, anything, vehicle).without_wall()
-    error = wide.error(aligned(wide, wide.start(effects)).state)
-    if error < SAYS_LITTLE:
+    some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
+    wide = Posterior(some, vehicle, anything, vehicle).without_soft_bounds()
+    error = wide.error(align(wide, wide.start(effects)).state)
+    if error < POOR_ERROR:
         return None
     start = wide.start(effects)
-    found = fit(aligned(wide, wide.at(effects, _drawn(wide, effects), start.record, start.size)), rounds=10).state
+    drawn = wide.state_at(effects, _cross_entropy_search(wide, effects), start.record, start.size)
+    found = fit(align(wide, drawn), rounds=10).state
     found_error = wide.error(found)
     lengths = wide.prior.deviations < anything.numbers
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
@@ -73,7 +74,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
-def _beginning(run: Run, lasts_s: float = 25.0) -> Run:
+def _first_part(run: Run, lasts_s: float = 25.0) -> Run:
     """The first part of a run: some thirty bounces of the body are enough to recognise a car by."""
     count = min(run.count, round((run.skip_s + lasts_s) * run.rate_hz))
     return replace(run, measured_mps2=run.measured_mps2[:count], distance_m=run.distance_m[:count],
@@ -81,10 +82,10 @@ def _beginning(run: Run, lasts_s: float = 25.0) -> Run:
                    more=run.more[:, :count])
 
 
-def _drawn(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60, best_of: int = 8,
-           least_spread: float = 0.03) -> Array:
-    """Logarithms (p,) of the numbers of a car that explains a record roughly: the best of many that are drawn around
-    the best so far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,
+def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60,
+                          best_of: int = 8, least_spread: float = 0.03) -> Array:
+    """Logarithms (p,) of the numbers of a car that roughly explains a record: the best of many drawn around the best so
+    far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,
     1999). Each round draws so many and goes on around the mean of the best; their spread, relative to the prior's, is
     kept from collapsing."""
     rng, deviations = np.random.default_rng(1), wide.prior.deviations

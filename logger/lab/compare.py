@@ -1,9 +1,9 @@
-"""A model compared with measurements: how large the error is, where it sits, and what kind of thing is missing.
+"""A model compared with measurements: its error, the parts of the error, and tests of its residuals.
 
-Problem: the numbers of a car are never exact, and a small mistake in them leaves an error that says nothing about
-physics. Solution: the error is computed and broken down as the model stands; then the car's numbers and the distances
-of the runs are refitted within what they are usually off, and the residuals are tested after that. When a number has to
-move much farther than such numbers are off, that is reported: a missing effect pulls at it.
+Problem: the numbers of a car are never exact, and an error because of them says nothing about physics. Solution: the
+error is computed and broken down for the model as it stands; then the car's numbers and the distances of the runs are
+refitted under their priors, and the residuals of that are tested. A number that moves much farther than its prior
+allows is reported: a missing effect biases it.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.repeats import Repeats, repeats_among
+from logger.lab.likelihood.repeats import Repeats, find_repeats
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
@@ -32,15 +32,11 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-FAR_SIGMA = 3.0
-"""So many standard deviations of what a number is usually off are far: of a dozen numbers that are right, one goes as
-far in thirty comparisons."""
-
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A model with its residuals, its error (rms residual / rms measured, all samples that count), and where it is; and
-    its errors of other signals, by name."""
+    """A model with its residuals, its error (rms residual / rms measured, all samples that count) and the parts of
+    that, and its errors of other signals, by name."""
 
     residuals: ModelResiduals
     error: float
@@ -49,7 +45,7 @@ class Standing:
 
     @staticmethod
     def of(runs: SimulatedRuns, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> Standing:
-        """Of a car, by what it would have recorded and how it moved."""
+        """The standing of a car with these predictions and motions."""
         main = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
         residuals = ModelResiduals(runs.runs, car, main, responses)
         return Standing(residuals, normalised_rms_error(runs.runs, main), breakdown(residuals),
@@ -58,14 +54,14 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What a comparison found.
+    """The result of a comparison.
 
     plain       the model as it stands
-    refitted    with its numbers and the distances refitted within what they are usually off
-    moves       by which share each number of the car, and of its effects, moved for that
-    far         those that moved farther than such numbers are usually off, the farthest first
-    removed     what is taken out of the error before it is judged
-    tests       of the residuals of the refitted model, without what its sensors drift
+    refitted    with its numbers and the distances refitted under their priors
+    moves       relative change of each number of the car, and of its effects, by the refit
+    far         numbers of the car whose change is unusual under their prior, the largest first
+    removed     sensor drift, distance error and filtering, which are removed from the error before it is judged
+    tests       of the residuals of the refitted model, without the drift of its sensors
     """
 
     vehicle: str
@@ -79,28 +75,28 @@ class Comparison:
 
     @property
     def band(self) -> ComparedBand | None:
-        """What of the runs was compared; None: all of it."""
+        """The band in which the runs were compared; None: all."""
         return compared_band(self.plain.residuals.runs)
 
     @cached_property
     def repeats(self) -> Repeats | None:
         """What runs that repeat each other differ by; None where none does."""
-        return repeats_among(self.plain.residuals.runs)
+        return find_repeats(self.plain.residuals.runs)
 
     @property
-    def tells(self) -> bool:
+    def exceeds_discrepancy(self) -> bool:
         """Whether the residual is larger than what two right simulations of a car differ by."""
         return self.removed.error >= DISCREPANCY
 
     @property
     def tests_found(self) -> tuple[ResidualTest, ...]:
-        """Those that find more than noise, and matter."""
-        return self.tests.found if self.tells else ()
+        """Tests that are significant and large enough to matter."""
+        return self.tests.found if self.exceeds_discrepancy else ()
 
     @property
     def missing(self) -> bool:
-        """Whether the residual is tied to the road or the car's motion, or numbers had to move far: an effect may
-        explain it."""
+        """Whether an effect may explain the residual: a test relates it to the road or the car's motion, or numbers
+        changed unusually far."""
         return bool(self.far) or any(test.road for test in self.tests_found)
 
 
@@ -109,39 +105,39 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     """Compare a vehicle and its effects, with the values they have, with runs of one sample rate. Where the refitted
     model is no better than the plain one, that is the refitted one as well.
 
-    given        the vehicle before any fit, if it has been refitted: what its numbers are usually off from
-    tolerance    what is usually off, and by how much; None: the usual
+    given        the vehicle before any fit, if it has been refitted: the mean of the prior
+    tolerance    standard deviations of the priors; None: the usual ones
 
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
     plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
-    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_wall()
+    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_soft_bounds()
     names, deviations = posterior.prior.names, posterior.prior.deviations
-    state = read_beside(fit(aligned(posterior, posterior.start(effects)))).state
+    state = fit_model(posterior, posterior.start(effects)).state
     if posterior.error(state) > plain.error:
-        # The fit weighs every frequency by its noise, and may buy a better top with a worse body bounce.
+        # The fit weights frequencies by their noise: a gain at high ones may outweigh a loss at body bounce.
         state = posterior.start(effects)
         removed = removed_from(posterior, state.predictions, state)
         return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), removed,
                           _tests(plain, removed, plain))
     car = posterior.car(state.effects, state.logs)
-    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.moved_m(state.record)))
+    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
     removed = removed_from(posterior, plain.residuals.predictions, state)
-    away = np.abs(state.logs / deviations)
+    sigmas = np.abs(state.logs / deviations)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
-                      tuple(names[index] for index in np.argsort(-away) if away[index] > FAR_SIGMA),
+                      tuple(names[index] for index in np.argsort(-sigmas) if sigmas[index] > UNUSUAL_SIGMA),
                       removed, _tests(refitted, removed, plain))
 
 
 def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTests:
-    """Tests of the residual without the sensors' drift."""
+    """Tests of the residuals without the sensors' drift."""
     residuals, where = refitted.residuals, refitted.where
-    if removed.drifting:
-        residuals = replace(residuals, predictions=removed.cleared(residuals.predictions))
+    if removed.drifting_sensors:
+        residuals = replace(residuals, predictions=removed.with_drifts(residuals.predictions))
         where = breakdown(residuals)
     return run_residual_tests(residuals, where, plain.residuals)

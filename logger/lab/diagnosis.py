@@ -1,10 +1,10 @@
-"""Which physical effects a model lacks, how certain that is, and what the runs could not show.
+"""Diagnosis: which physical effects a model lacks, how certain that is, and what the runs could not show.
 
-Problem: something differs, and a name alone is no answer. Whoever reads it wants to know how much it explains, how
-certain that is, what else it could be, and what these runs could not have shown anyway. Solution: a search by evidence
-(``selection.stepwise``) names the effects; the model with them is fitted finely, and its residual is compared with the
-noise that the sensor has where no car moves it: what stays above that is unexplained, and so is what takes numbers of
-the car to explain that no prior allows.
+Problem: a name alone is no answer. The reader wants to know how much an effect explains, how certain that is, what else
+it could be, and what these runs could not have shown anyway. Solution: a search by evidence (``selection.stepwise``)
+names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor has
+where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
+with their priors.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import (
     UNEXPLAINED,
     Noise,
     SignalErrors,
-    excess,
+    excess_over_noise,
     floor_error,
-    noise_as_read,
+    sensor_noise_with_rounding,
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -33,27 +34,25 @@ from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
-from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
-from logger.lab.selection.holdout import HoldOut, held_out
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Effort, Search, Selection, out_of_sight
+from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
 Progress = Callable[[str], None]
 
-HAS_IT = "the model has it"
-CONFLICT_SIGMA = 4.0
-"""A number of the car that has to be off by more standard deviations of its prior than this is in conflict with it."""
+ALREADY_PRESENT = "the model has it"
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An effect that was tried.
 
-    error                  of the model with it, on what its fit did not see
-    p_value                how often, at most, noise alone would gain as much with any of the candidates
-    gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on what the fit did not see
+    error                  hold-out error of the model with it
+    p_value                bound on the probability that noise alone gains as much with any of the candidates
+    gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on held-out stretches
     confused_with          effects that explain the same as well
     """
 
@@ -68,7 +67,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A model on the way: what was done, and the error on what its fit did not see."""
+    """A model of the search: what was done, and its hold-out error."""
 
     words: str
     error: float
@@ -76,26 +75,26 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found.
+    """The result of a diagnosis.
 
     runs                 their names
     catalogue            all effects that were asked for, by name
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
     noise                of the sensors, their rounding in it
-    candidates           those that are missing first, with the values that they end with; then the others of the first
-                         round, the least probable by chance first
+    candidates           missing effects first, with their final values; then the others of the first round, the
+                         largest gain first
     obstacles            effects that could not be tried, and why
     verdict              names of the effects that the model lacks, the most certain first
-    excess               the share by which the residual is above the noise in the run where it is most
-    conflicts            numbers of the car that are in conflict with their prior, by which share they are off
+    excess               share by which the residual is above the noise in the run where it is largest
+    conflicts            numbers of the car that are in conflict with their prior, with their relative change
     effects              of the model that it ends with, with standard errors
     undetectable         effects that these runs could not show at their usual strength
-    shape                of what no candidate explains; None where no more than noise is left
-    removed              what is taken out of the error before it is judged
-    signals              errors of signals beside the sensor's acceleration, by name
-    band                 what of the runs was compared; None: all of it
-    car                  its numbers and laws as fitted
+    shape                of the unexplained residual; None where it is noise
+    removed              sensor drift, distance error and filtering, removed from the error before it is judged
+    signals              errors of other signals than the sensor's acceleration, by name
+    band                 in which the runs were compared; None: all
+    car                  numbers and laws as fitted
     """
 
     runs: tuple[str, ...]
@@ -119,14 +118,14 @@ class Diagnosis:
     car: FittedCar | None = None
 
     @property
-    def left_over(self) -> bool:
-        """Whether more is left than the sensor's noise."""
+    def exceeds_noise(self) -> bool:
+        """Whether the residual is above the sensor's noise."""
         return self.excess > UNEXPLAINED
 
     @property
     def unexplained(self) -> bool:
-        """Whether the effects of the verdict, in a car within its tolerance, do not explain all."""
-        return self.left_over or bool(self.conflicts)
+        """Whether the effects of the verdict, in a car within its priors, do not explain all."""
+        return self.exceeds_noise or bool(self.conflicts)
 
     @property
     def missing(self) -> tuple[Chosen, ...]:
@@ -137,10 +136,10 @@ class Diagnosis:
     @property
     def not_tried(self) -> dict[str, str]:
         """Effects that could not be tried, and why."""
-        return {name: why for name, why in self.obstacles.items() if why != HAS_IT}
+        return {name: why for name, why in self.obstacles.items() if why != ALREADY_PRESENT}
 
     def candidate(self, name: str) -> Candidate:
-        """What was found of one that was tried."""
+        """The candidate of that name."""
         return next(one for one in self.candidates if one.effect.name == name)
 
 
@@ -150,55 +149,54 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    search, selection = searched(posterior, effects, present, progress, workers)
-    return judged(posterior, effects, present, search, selection)
+    search, selection = search_effects(posterior, effects, present, progress, workers)
+    return assess(posterior, effects, present, search, selection)
 
 
-def searched(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
+def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+                   progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
              ) -> tuple[Search, Selection]:
-    """The search of a diagnosis, and what it came to; as ``diagnose``."""
+    """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
-    before = refitted(posterior, nominal)
-    search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers,
-                    effort or Effort())
+    before = refit(posterior, nominal)
+    search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers, effort or Effort())
     return search, search.run(before)
 
 
-def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
+def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
            selection: Selection) -> Diagnosis:
-    """What a search came to, fitted finely, with all that is to be said of it."""
+    """The diagnosis by the result of a search, which is fitted again by a fine simulation."""
     progress, tried = search.progress, search.effects
     nominal = posterior.start(present)
     progress("fitting it finely")
-    selection, after = _finely_fitted(search, selection)
+    selection, after = _fit_finely(search, selection)
     fine, state = after.posterior, after.state
-    read = noise_as_read(fine, state)
+    noise = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
-    with_errors, _ = standard_errors(after)
+    effects_found, _ = standard_errors(after)
     progress("what these runs could not show")
-    above = excess(fine, state, FALSE_ALARM)
-    stood = fine.start(present)
-    removed = removed_from(fine, stood.predictions, state)
+    excess = excess_over_noise(fine, state, FALSE_ALARM)
+    baseline = fine.start(present)
+    removed = removed_from(fine, baseline.predictions, state)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
-        baseline_error=fine.error(stood), final_error=fine.error(state),
-        noise=read, noise_floor_error=floor_error(fine, read), candidates=_candidates(selection, state, len(tried)),
-        obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=above,
-        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_errors,
-        undetectable=hidden, shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
-        removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, stood, state),
-        car=fitted_car(fine, stood, state),
+        baseline_error=fine.error(baseline), final_error=fine.error(state),
+        noise=noise, noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
+        obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
+        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
+        undetectable=hidden, shape=shape_of(fine, state, removed) if excess > UNEXPLAINED else None,
+        removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
+        car=fitted_car(fine, baseline, state),
     )
 
 
-def refitted(posterior: Posterior, nominal: State) -> Baseline:
-    """The car's own numbers and the distance errors fitted."""
-    return Baseline.of(read_beside(fit(aligned(posterior, nominal))))
+def refit(posterior: Posterior, nominal: State) -> Baseline:
+    """The baseline of a search: the car's own numbers and the distance errors fitted."""
+    return Baseline.of(fit_model(posterior, nominal))
 
 
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -208,35 +206,35 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
-        why = HAS_IT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
+        why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
         if why is not None:
             found[name] = why
     return found
 
 
-def _finely_fitted(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
-    """The model that was found, finely simulated, in a car that may bend as far as the runs ask: so that it shows when
-    it has to bend too far. What is nothing then, or something else, is left out."""
-    fine = selection.before.posterior.without_wall(fine=True)
+def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
+    """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
+    that are at an end of their range then are dropped."""
+    fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
         state = selection.now.state
-        start = fine.at(state.effects, state.logs, state.record, state.size)
-        after = read_beside(fit(aligned(fine, start), selection.now.linear.numbers))
-        ended = [one.effect.name for one in after.state.effects[search.present:] if out_of_sight(fine, one)]
+        start = fine.state_at(state.effects, state.logs, state.record, state.size)
+        after = fit_model(fine, start, selection.now.linear.numbers)
+        ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
             return selection, after
-        selection = search.left_out(selection, ended[0])
+        selection = search.without_effect(selection, ended[0])
 
 
 def _conflicts(posterior: Posterior, state: State) -> dict[str, float]:
-    """Numbers of the car that are off by more than their prior allows, by which share."""
+    """Relative changes of the numbers of the car that are in conflict with their prior."""
     prior = posterior.prior
     return {name: float(np.expm1(log)) for name, log, deviation in zip(
         prior.names, state.logs, prior.deviations, strict=True) if abs(log) > CONFLICT_SIGMA * deviation}
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
-    """The models on the way."""
+    """The models of the search in order."""
     steps = [Step("the vehicle as its file says", nominal_error),
              Step("its numbers refitted", selection.before.hold_out.error)]
     steps += [Step(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
@@ -247,7 +245,7 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
 
 
 def _candidates(selection: Selection, after: State, count: int) -> tuple[Candidate, ...]:
-    """Those that are missing before the others, of which the least probable by chance come first."""
+    """All candidates: the missing effects, then the others, the largest gain first."""
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
     before = selection.before.hold_out
@@ -259,24 +257,25 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
-    others += [_of_promise(selection.before, one, before, count) for one in selection.first.promises
+    others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
                if one.effect.name not in selection.gains]
     return (*found, *sorted(others, key=lambda one: -one.gain))
 
 
 def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:
+    """A candidate that was fitted, of so many."""
     there = one.hold_out
     p_value = probability_by_chance(one.gain, count)
-    alike = tuple(other.effect.name for other in fits
-                  if other is not one and abs(other.gain - one.gain) < CONFUSED and p_value < FALSE_ALARM)
+    rivals = tuple(other.effect.name for other in fits
+                   if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
     return Candidate(one.effect, one.chosen.values, there.error, p_value, one.gain, before.deviance - there.deviance,
-                     alike)
+                     rivals)
 
 
 def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> Candidate:
-    """An effect that was not fitted: at the strength that its trial promises."""
+    """A candidate that was screened only, at the best strength of its trial."""
     trial = one.trials[0]
-    there = held_out(base.linear, [change[None] for change in trial.change])
+    there = cross_validate(base.linear, [change[None] for change in trial.change])
     gain = trial.gain - len(moves_of([trial.one])) * float(np.log(base.posterior.freedom))
     return Candidate(one.effect, trial.one.values, there.error, probability_by_chance(gain, count), gain,
                      before.deviance - there.deviance, ())

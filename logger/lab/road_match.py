@@ -1,11 +1,11 @@
-"""Whether a run was driven over the road that it comes with, and if not, where and which way it fits.
+"""A test whether a run was driven over its profile, and a search for where and in which direction it fits.
 
-Problem: a profile of another street, one that was read backwards or that begins elsewhere, leaves residuals that some
-effect explains better than none: wrong input is no physics. Solution: around the body's bounce, where a place that is
-a metre off does no harm, what was measured is correlated with what a model of the car predicts. Of the right road the
-correlation is high at about no lag, whatever effect is missing; of any other one it is no higher there than at all the
-lags at which it can only be chance, whose spread says how far chance goes (the correlogram of unrelated series:
-M. S. Bartlett, Journal of the Royal Statistical Society 98, 1935).
+Problem: with a profile of another street, or one that is reversed or begins elsewhere, some effect always explains some
+of the residuals: wrong input is no physics. Solution: around the body's bounce, where a place that is a metre off does
+no harm, the measurement is correlated with a model's prediction. With the right road the correlation is high near lag
+0, whatever effect is missing; with any other it is no higher there than at large lags, where it is chance and its
+variance shows how large chance is (the correlogram of unrelated series: M. S. Bartlett, Journal of the Royal
+Statistical Society 98, 1935).
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
-_REACH_S = 1.0
-"""The right road is found within this lag: a late clock, or a place that is metres off."""
+_MOST_LAG_S = 1.0
+"""The right road correlates within this lag: a late clock, or a place that is metres off. A judgement."""
 
 
 @dataclass(frozen=True)
 class RoadMatch:
-    """How well a run goes with a prediction, around the body's bounce.
+    """Correlation of a run with a prediction, around the body's bounce.
 
-    correlation    the highest one within a second of lag
-    turned         the same of the run turned over
-    gain           measured / model where the higher one of these is, above 0
-    chance         how high one by chance may be there: one in a thousand is higher
-    mean_chance    how high one by chance is on average
-    expected       the least that the right road would give, given the sensor's noise
+    correlation    the largest within a second of lag
+    turned         the same of the run with its sign reversed
+    gain           measured / model at the larger of these, above 0
+    chance         quantile of the largest correlation by chance, exceeded in one case of a thousand
+    mean_chance    mean of the largest correlation by chance
+    expected       the least with the right road, given the sensor's noise
     """
 
     correlation: float
@@ -47,25 +47,25 @@ class RoadMatch:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the road is another one: the run could have shown it, and correlates with it no better than by
-        chance, either way up."""
+        """Whether the road is another one: its correlation would have been significant, and the run's is not, with
+        either sign."""
         return max(self.correlation, self.turned) < self.chance < self.expected
 
     @property
     def is_clear(self) -> bool:
-        """Whether it is this road: no chance, and as high as the right one gives."""
+        """Whether the road is this one: the correlation is significant and as high as with the right road."""
         return max(self.correlation, self.turned) > max(self.chance, self.expected)
 
     @property
     def is_upside_down(self) -> bool:
-        """Whether the run clearly follows this road when it is turned over, and not much less as it is: a bounce half a
-        swing later looks turned over as well."""
+        """Whether the run clearly correlates with reversed sign, by much more than as it is: a bounce half a period
+        later correlates with reversed sign as well."""
         return self.is_clear and self.turned - self.correlation > self.chance - self.mean_chance
 
 
-def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
-    """Several runs together, their means: what none of them could show by itself, all may, as the mean of maxima
-    scatters less around its own mean than one of them."""
+def pool(matches: Sequence[RoadMatch]) -> RoadMatch:
+    """Means over several runs, which may be significant together: the mean of maxima has a smaller variance than
+    one."""
     upright, turned, gain, chance, mean_chance, expected = map(
         float, np.mean([astuple(one) for one in matches], axis=0))
     of_all = mean_chance + (chance - mean_chance) / float(np.sqrt(len(matches)))
@@ -74,7 +74,7 @@ def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a run fits better: so much farther along the profile [m], read backwards or not."""
+    """A better place of a run: so much farther along the profile [m], reversed or not."""
 
     farther_m: float
     backwards: bool
@@ -82,20 +82,20 @@ class Placement:
 
 
 def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
-    """The frequencies around the bounce and pitch of a body, by those of its vibrations (b,) [Hz]: where it moves most,
-    and a wave is longest."""
+    """Frequency band around the bounce and pitch of a body, by its natural frequencies (b,) [Hz]: where it moves most,
+    and waves are longest."""
     return 0.4 * float(body_hz.min()), 3.0 * float(body_hz.max())
 
 
 def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
-    """The frequencies below the bounce of a body, by its vibrations (b,) [Hz]: it moves with the road there, whether
-    its suspension is free or sticks; around the bounce one that sticks may move it the other way, and far more."""
+    """Frequency band below the bounce of a body, by its natural frequencies (b,) [Hz]: it moves with the road there,
+    even if dry friction blocks the suspension, which may reverse and multiply the motion around the bounce."""
     return bounce_band_hz(body_hz)[0], float(body_hz.min())
 
 
 def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0) -> RoadMatch:
-    """How well a run goes with a prediction (n,) between two frequencies [Hz]: all of it, or where its distances are
-    off by more and more along the way, its parts, each at a lag of its own.
+    """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance
+    error grows along the way, of its parts, each at a lag of its own.
 
     part_s    ten bounces of a body, in which a speed that is off by 0.1 m/s moves it by no more than a tenth of the
               wave that bounces it at 6 m/s
@@ -110,12 +110,13 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s
     starts = range(run.first, run.count - size + 1, size)
     if not whole.is_refuted or len(starts) < 2:
         return whole
-    parts = pooled([of(slice(at, at + size)) for at in starts])
+    parts = pool([of(slice(at, at + size)) for at in starts])
     return parts if max(parts.correlation, parts.turned) > parts.chance else whole
 
 
 def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tuple[float, float],
            expected: float, false_alarm: float = FALSE_ALARM) -> RoadMatch:
+    """Correlation of samples (n,) of a measurement with a model's."""
     measured, model = (_spectrum(one, rate_hz, band_hz) for one in (measured_mps2, model_mps2))
     count = len(measured_mps2)
     power = float(np.sqrt((np.abs(measured) ** 2).sum() * (np.abs(model) ** 2).sum()))
@@ -124,29 +125,29 @@ def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tup
     padded = 2 * count
     correlation = np.fft.irfft(measured * model.conj(), padded) * padded / (2 * power)
     lag = np.abs(np.fft.fftfreq(padded, 1 / padded))
-    reach = _REACH_S * rate_hz
+    reach = _MOST_LAG_S * rate_hz
     upright, turned = (float((sign * correlation[lag <= reach]).max()) for sign in (1, -1))
     gain = max(upright, turned) * float(np.sqrt((np.abs(measured) ** 2).sum() / (np.abs(model) ** 2).sum()))
     far = (lag > reach) & (lag < 0.5 * count)
     if not far.any():
         return RoadMatch(upright, turned, gain, 1.0, 1.0, 0.0)
-    spread = float(np.sqrt(np.mean(correlation[far] ** 2 * count / (count - lag[far]))))
-    # Maxima of so many independent values on either side of no lag, as a band so wide has them.
-    values = max(1.0, 4 * _REACH_S * (band_hz[1] - band_hz[0]))
-    chance, mean_chance = (spread * float(np.sqrt(2 * np.log(one))) for one in (values / false_alarm, values))
+    deviation = float(np.sqrt(np.mean(correlation[far] ** 2 * count / (count - lag[far]))))
+    # Maxima of as many independent values as a band of this width has within these lags.
+    values = max(1.0, 4 * _MOST_LAG_S * (band_hz[1] - band_hz[0]))
+    chance, mean_chance = (deviation * float(np.sqrt(2 * np.log(one))) for one in (values / false_alarm, values))
     return RoadMatch(upright, turned, gain, chance, mean_chance, expected)
 
 
 def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz: tuple[float, float],
                      ends_m: tuple[float, float], most_places: int = 200) -> Placement | None:
-    """Where along a profile a run fits clearly; None: nowhere.
+    """The place along a profile at which a run clearly fits; None: nowhere.
 
-    predict    the prediction (n,) for a run that was farther by this (n,) [m], on the profile or on it read backwards
-    ends_m     where the profile begins and ends [m]
-    most_places    that are tried, the nearest first: some kilometres, in seconds
+    predict        prediction (n,) with a distance error (n,) [m], on the profile or on the reversed one
+    ends_m         beginning and end of the profile [m]
+    most_places    places that are tried, the nearest first: some kilometres, in seconds
     """
     usual_mps = float(np.median(run.speed_mps[run.first:]))
-    step_m = max(1.6 * _REACH_S * usual_mps, 1.0)  # lags on either side of each place overlap by a fifth
+    step_m = max(1.6 * _MOST_LAG_S * usual_mps, 1.0)  # lags on either side of each place overlap by a fifth
     low_m, high_m = ends_m[0] - float(run.distance_m.min()), ends_m[1] - float(run.distance_m.max())
     places_m = step_m * np.arange(np.floor(min(low_m, 0.0) / step_m), np.ceil(max(high_m, 0.0) / step_m) + 1)
     found = [Placement(float(at), backwards,
@@ -157,7 +158,7 @@ def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz:
 
 
 def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> npt.NDArray[np.complex128]:
-    """Of samples (n,), padded to twice their number, without what lies outside of a band."""
+    """Spectrum of samples (n,), padded to twice their number, 0 outside of a band."""
     padded = 2 * len(samples)
     spectrum = np.fft.rfft(samples - samples.mean(), padded)
     f_hz = np.fft.rfftfreq(padded, 1 / rate_hz)
@@ -166,13 +167,13 @@ def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> n
 
 
 def _expected(run: Run, band_hz: tuple[float, float], without_noise: float = 0.5) -> float:
-    """The least correlation of the right road, where the sensor's own noise, as loud as at the highest frequencies, is
-    a share of what was measured.
+    """The least correlation with the right road, where noise of the level at the highest frequencies is a share of what
+    was measured.
 
     without_noise    measured: the right road gave 0.63 and more in 200 runs of 56 simulated cars with one, two or
                      unlisted effects missing, each far stronger than the noise; wrong roads at most 0.36
     """
-    noise, _ = Bands(run).quiet(run.measured_mps2)
+    noise, _ = Bands(run).noise_band_power(run.measured_mps2)
     kept = run.kept_mps2 - run.kept_mps2.mean()
     power = np.abs(np.fft.rfft(kept)) ** 2 / len(kept)
     f_hz = np.fft.rfftfreq(len(kept), 1 / run.rate_hz)

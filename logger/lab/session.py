@@ -1,4 +1,4 @@
-"""The whole loop as one record: from the first comparison of a model to the last effect that was added to it."""
+"""The record of a session: from the first comparison of a model to the last effect that was added to it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """Effects that were added, what that brought, the comparison with them, and the vehicle file that was written."""
+    """Effects that were added, the result, the comparison with them, and the vehicle file that was written."""
 
     addition: AddedEffects
     comparison: Comparison
@@ -21,8 +21,8 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class SoughtLaw:
-    """A law that was looked for where no effect explained what is missing.
+class LawSearch:
+    """The search for a law where no effect explained what is missing.
 
     addition    the model with it, and its picture; None: none was learned, or it is no force that a picture shows
     file        that was written; empty: none
@@ -36,9 +36,9 @@ class SoughtLaw:
 
 @dataclass(frozen=True, eq=False)
 class Story:
-    """What was done, in order.
+    """A session, in order.
 
-    first       of the vehicle as it was given
+    first       comparison of the vehicle as it was given
     diagnoses   at least one
     refused     effects that a diagnosis found missing and the user did not want
     law         None: none was looked for
@@ -48,11 +48,11 @@ class Story:
     diagnoses: tuple[Diagnosis, ...]
     rounds: tuple[Round, ...]
     refused: tuple[str, ...]
-    law: SoughtLaw | None = None
+    law: LawSearch | None = None
 
     @property
     def last(self) -> Comparison:
-        """Of the vehicle that it ends with."""
+        """Comparison of the vehicle that the session ends with."""
         return self.rounds[-1].comparison if self.rounds else self.first
 
     @property

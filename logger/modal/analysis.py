@@ -5,7 +5,7 @@ A record is one of three things, and each has its own measure of error:
 - a free decay: every method proposes poles, least squares decides and gives the errors (``logger.modal.decay``);
 - a response to unmeasured random forces (NExT, SSI, AR, ARMA): poles of the best order, errors by leaving out one
   segment of the record after the other, choice by rule (``logger.modal.stabilisation``);
-- the same beside a measured input (N4SID, ARX, ARMAX).
+- the same with a measured input (N4SID, ARX, ARMAX).
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ def stands_out(
 
 def louder_than_beside(samples: Array, rate_hz: float, found: OrderPoles) -> npt.NDArray[np.bool_]:
     """Which poles (n,) the record (samples, channels) itself has: its power within a half-power width is more than
-    beside it (three to six widths away, the geometric mean of both sides), and by more than chance makes it.
+    on both sides of it (three to six widths away, their geometric mean), and by more than chance makes it.
 
     A long autoregression draws peaks into white noise, and keeps them from order to order.
     """

@@ -20,7 +20,7 @@ class FoundMode:
     """A mode that the data support, each figure with its standard deviation.
 
     frequency_hz, frequency_std_hz   natural frequency without regard to damping [Hz]
-    damping_ratio, damping_std       share of critical damping; NaN where the method cannot tell it
+    damping_ratio, damping_std       share of critical damping; NaN where the method does not estimate it
     shape                            (channels,) motion of the channels, the largest 1; complex where not in step
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from logger.lab.selection.add_effect import BIASED, AddedEffects, Number
+from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.report.band_text import band_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
@@ -54,7 +54,7 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
     together = " and ".join(names)
     biased = [one for one in moved if one.biased]
     if not biased:
-        return f"No number of the car moved by more than {BIASED:g} standard errors when {together} was added."
+        return f"No number of the car moved by more than {BIAS_SIGMA:g} standard errors when {together} was added."
     listed = ", ".join(one.name for one in biased[:_NAMED])
     more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
     worst = biased[0]

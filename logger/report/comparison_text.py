@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.lab.compare import FAR_SIGMA, Comparison, Standing
+from logger.lab.compare import Comparison, Standing
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
@@ -46,14 +47,14 @@ def headline(found: Comparison) -> list[str]:
                      f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
-        lines.append(f"The refit moved {named}, more than {FAR_SIGMA:g} standard deviations of their tolerance. An "
+        lines.append(f"The refit moved {named}, more than {UNUSUAL_SIGMA:g} standard deviations of their tolerance. An "
                      "effect that the model lacks biases them: do not trust these values.")
     return lines
 
 
 def evidence(found: Comparison) -> list[str]:
     """What speaks for a missing effect, or against one."""
-    if not found.tells:
+    if not found.exceeds_discrepancy:
         return ["The residual is smaller than the difference between two correct simulations of one car: it is no "
                 "evidence."]
     if not found.tests_found:
@@ -74,7 +75,7 @@ def conclusion(found: Comparison) -> str:
     if found.tests_found and not all(test.name in _PLACED for test in found.tests_found):
         return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
                 "Nothing here asks for another effect of the car.")
-    if found.removed.drifting or found.removed.distance_error_m > 0:
+    if found.removed.drifting_sensors or found.removed.distance_error_m > 0:
         return ("Nothing else is missing: apart from what is removed above, the residual asks for no effect of the "
                 "car. Rougher roads or other speeds would test the model harder.")
     return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."

@@ -30,10 +30,10 @@ def summary(found: Diagnosis) -> list[str]:
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
-        more = " else" * bool(found.removed.drifting or found.removed.distance_error_m > 0)
+        more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
                      "is hardly more than the sensor's noise.")
-    if found.left_over:
+    if found.exceeds_noise:
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
                      f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
@@ -59,7 +59,7 @@ def looks_like(found: Diagnosis) -> list[str]:
 
 
 def untested(found: Diagnosis) -> list[str]:
-    """What these runs cannot tell of, and which drive would."""
+    """Effects that these runs cannot show, and which drive would."""
     lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
     lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
               f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed. To see it: "

@@ -18,7 +18,7 @@ _BAND = "The band is one standard error either way; the curve ends where the run
 def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, vehicle: str, file: str) -> Html:
     """What was learned as one HTML document; ``file``: of the law."""
     title = f"{vehicle}: a law out of the data"
-    runs = ", ".join(run.name for run in found.look.runs)
+    runs = ", ".join(run.name for run in found.context.runs)
     summary = as_json(found, addition, file)
     law = found.law
     if law is None or addition is None:

@@ -67,7 +67,7 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     """The law, what it brings, and what it may be instead: paragraphs."""
     said = words(law, addition)
     lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
-    if law.beside:
+    if law.effects:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
                      + ". The law was fitted with these: they belong in the vehicle as well.")
@@ -117,8 +117,8 @@ def source_of(found: Learning, addition: AddedEffects | None) -> str:
     if law is None or addition is None:
         return ""
     said = words(law, addition)
-    seconds = sum((run.count - run.first) / run.rate_hz for run in found.look.runs)
-    count = len(found.look.runs)
+    seconds = sum((run.count - run.first) / run.rate_hz for run in found.context.runs)
+    count = len(found.context.runs)
     head = [f"{said[0].upper()}{said[1:]}.",
             f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
             "Its numbers begin where that fit ended: ridelog add-effect with this file fits them again, with the car."]
@@ -151,7 +151,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "error_after_unseen": None if unseen is None else unseen.error,
         "error_before_unseen": None if addition.unseen_before is None else addition.unseen_before.error,
         "noise_floor_error": addition.noise_floor_error,
-        "verdict": [other.effect.name for other in law.beside], "unexplained": found.unexplained,
+        "verdict": [other.effect.name for other in law.effects], "unexplained": found.unexplained,
         "log_likelihood_gain": law.gain / 2,
         "listed": {"verdict": list(found.verdict), "error_unseen": found.listed_error,
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
@@ -169,5 +169,5 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
 def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
     """How the error fell."""
     return [("as it was given", addition.error_before), ("numbers refitted", addition.error_refitted),
-            (f"with {' and '.join([*(one.effect.name for one in law.beside), law.draft.title])}",
+            (f"with {' and '.join([*(one.effect.name for one in law.effects), law.draft.title])}",
              addition.error_after)]

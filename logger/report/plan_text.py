@@ -113,7 +113,7 @@ def _most(gains: Mapping[str, float]) -> dict[str, float]:
 
 
 def as_json(found: Plan) -> dict[str, Any]:
-    """One object: see the formats of ridelog. What remains of an effect beside itself is not in it."""
+    """One object: see the formats of ridelog. What remains of an effect after itself is fitted is not in it."""
     now, names = found.now, found.names
     return {
         "drives": [{"drive": name, "seconds": seconds} for name, seconds in found.drives],

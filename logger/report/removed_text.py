@@ -41,7 +41,7 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
         lines.append(f"The distances of these runs are off by more than usual: up to {found.distance_error_m:.2g} m. "
                      f"That makes {percent(found.distance_share)} of the residual's power before any fit; the fits "
                      "take it into account.")
-    if found.drifting:
+    if found.drifting_sensors:
         lines.append(f"The sensor drifts ({drift_words(found)}). That has nothing to do with the car, and makes "
                      f"{percent(found.drift_share)} of the residual's power before any fit. Below {LOWEST_HZ:g} Hz "
                      f"nothing is judged; without the drift the error of the refitted model is {found.error:.3f}.")
@@ -50,7 +50,7 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
 
 def drift_words(found: Removed) -> str:
     """How the sensors drift: at once where all runs are alike, else run by run."""
-    drifts = found.drifting
+    drifts = found.drifting_sensors
     first = drifts[0]
     if len(drifts) == len(found.drifts) and all(_alike(one, first) for one in drifts):
         size = float(np.median([one.size_mps2 for one in drifts]))
@@ -81,7 +81,7 @@ def removed_section(found: Removed, band: ComparedBand | None) -> Html:
     if not removed_words(found, band):
         return EMPTY
     rows = []
-    if found.drifting:
+    if found.drifting_sensors:
         rows.append(("drift of the sensor", percent(found.drift_share), drift_words(found)))
     if found.distance_error_m > 0:
         rows.append(("wrong distances", percent(found.distance_share), f"up to {found.distance_error_m:.2g} m"))
@@ -94,15 +94,15 @@ def removed_section(found: Removed, band: ComparedBand | None) -> Html:
 
 def drift_tile(found: Removed) -> list[tuple[str, str, str]]:
     """The error without the drift, in large figures; nothing where nothing drifts."""
-    return [("Without the sensor's drift", f"{found.error:.3f}", "refitted")] if found.drifting else []
+    return [("Without the sensor's drift", f"{found.error:.3f}", "refitted")] if found.drifting_sensors else []
 
 
 def _picture(found: Removed) -> Html:
-    if not found.drifting:
+    if not found.drifting_sensors:
         return EMPTY
     names = shortened([one.run for one in found.drifts])
     lines = tuple(Line(names[one.run], np.arange(len(one.curve_mps2)) / one.rate_hz, one.curve_mps2)
-                  for one in found.drifting[:2 * _MOST])
+                  for one in found.drifting_sensors[:2 * _MOST])
     return chart(Curves("The drift of the sensor", "time in the run [s]", "acceleration [m/s2]", lines))
 
 

@@ -41,18 +41,18 @@ def _steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
 
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
-    """What these drives cannot tell, in sentences."""
+    """What these drives cannot show or identify, in sentences."""
     lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
              "noise." for one, other in found.doubtful]
-    if found.taken_by_road:
-        lines.append(f"{', '.join(found.taken_by_road)}: a road of another shape, which nobody measured, would look "
+    if found.absorbed_by_road:
+        lines.append(f"{', '.join(found.absorbed_by_road)}: a road of another shape, which nobody measured, would look "
                      "the same.")
     lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
               for why in dict.fromkeys(found.untried.values())]
     lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
               "deviations."
               for name, deviations in found.hidden.items()]
-    return [*lines, *(f"The car's numbers: {one.words}" for one in found.together)]
+    return [*lines, *(f"The car's numbers: {one.words}" for one in found.confounded)]
 
 
 def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
@@ -84,6 +84,6 @@ def as_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
         "steps": [{"step": words, "error": error} for words, error in _steps(found)],
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
-        "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "hidden": dict(found.hidden),
         "sentences": [*summary(found), *cannot_tell(found)],
     }

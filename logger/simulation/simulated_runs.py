@@ -1,8 +1,8 @@
-"""What a car with effects would have recorded on the runs that were driven.
+"""Predictions of runs by a car with effects.
 
-Problem: a fit asks for hundreds of predictions of the same runs, by cars that differ in a number or an effect.
-Solution: ``SimulatedRuns`` keeps each run laid out in time (``Passage``), also for the few other position signals (a
-speed that is off by a factor, a distance that wandered) that were asked for last.
+Problem: a fit needs hundreds of predictions of the same runs, by cars that differ in a number or an effect. Solution:
+``SimulatedRuns`` caches the road under the wheels of each run (``Passage``), also for the few other distance signals
+(with a scale error, with a distance error) that were used last.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _KEPT_PASSAGES = 4
 _STEPPERS = 2
 _HOP_HZ = 13.0  # of a car's wheels
 _MOST_FINER = 16
-# Dry friction changes at once: it needs so many times the steps that other laws need.
-_FINER_IF_IT_RUBS = 2
+# Dry friction jumps: it needs so many times the steps of other laws.
+_FINER_WITH_FRICTION = 2
 
 
 def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
@@ -53,34 +53,33 @@ class SimulatedRuns:
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False,
+    def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
                 tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
-        """What would have been recorded in each run, whole, in its pass band (n,) [m/s2]; of one with more signals all
-        ((1 + s) n,).
+        """Predicted record of each run, whole, in its pass band (n,) [m/s2]; of one with more signals all ((1 + s) n,).
 
-        moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
-        rough      step a car that rubs no finer than others: what a change does shows well enough by that
-        tracks     roads in place of the runs' own; runs are laid out again for each such object
+        distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
+        rough               no finer steps for a car with dry friction: near enough for differences
+        tracks              roads in place of the runs' own; each such object is cached by itself
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            passages = self._laid_out(car, moved_m, rough, tracks)
+            passages = self._passages_of(car, distance_error_m, rough, tracks)
             for step_s in {one.step_s for one in passages if car.bends_laws}:
                 stepper_of(car, step_s)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
             partial(_recorded, car), passages, [run.signals for run in self.runs])
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
-    def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
-        """The same with the motions of suspensions and tires."""
+    def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
+        """The response of the car in each run: its record, and the motions of suspensions and tires."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
+            return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False,
-                  tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
-        fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs and not rough else self.fine_hz
+    def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
+                     tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
+        fine_hz = _FINER_WITH_FRICTION * self.fine_hz if car.rubs and not rough else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
-            distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
+            distance = run.distance_m if distance_error_m is None else run.distance_m + distance_error_m[index]
             distance = car.driven(distance)
             track: WheelTracks = run.track if tracks is None else tracks[index]
             key = fine_hz, distance.tobytes(), track

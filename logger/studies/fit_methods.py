@@ -1,4 +1,4 @@
-"""The dissertation's way of fitting, and ours, so that a study can set one beside the other.
+"""The dissertation's way of fitting, and ours, so that a study can compare them.
 
 Theirs is output error: what the model leaves is taken for white noise. Ours is the innovations form: of white noise,
 autoregressive noise and a road that the profile does not contain, the likeliest.
@@ -28,7 +28,7 @@ def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput 
            low_pass_hz: float | None = None, vehicle: Vehicle | None = None) -> Fit:
     """The numbers in ``start``, of the car (None: that of Table 4.2) or of ``road``, from one record, starting there.
 
-    NotIdentifiable where the record cannot tell them.
+    NotIdentifiable where the record cannot identify them.
     """
     road = road or RoadInput()
     car = vehicle or rav4()

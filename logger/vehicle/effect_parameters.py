@@ -1,8 +1,8 @@
-"""Numbers of effects as a fit moves them: which there are, where they stand, and by how much they are changed.
+"""Free parameters of effects: which there are, their coordinates, and effects with other coordinates.
 
-Problem: a fit moves a list of numbers, on scales on which they are moved well, and an effect is a frozen record with
-values by name. Solution: a ``Move`` says which number of which effect is meant; coordinates are those of
-``Parameter.coordinate``. Nothing here knows of any data.
+Problem: a fit varies a vector of coordinates, on suitable scales, and an effect is a frozen record with values by name.
+Solution: a ``Move`` is the index of a parameter of an effect; coordinates are those of ``Parameter.coordinate``.
+Nothing here knows of any data.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ _LEAST_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Move:
-    """A number of an effect that a fit moves: which effect of the model, and which of its parameters."""
+    """A free parameter: index of the effect in the model, and of the parameter in the effect."""
 
     effect: int
     parameter: int
 
 
 def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
-    """Every number that can be moved, of all effects or of some."""
+    """Every parameter that a fit may vary, of all effects or of some."""
     chosen = range(len(effects)) if which is None else which
     return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.moves]
 
 
 def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
-    """The effects with other values, given on the scales of their parameters (m,)."""
+    """The effects with other coordinates (m,), on the scales of their parameters."""
     found = list(effects)
     for move, coordinate in zip(moves, coordinates, strict=True):
         one = found[move.effect]
@@ -48,7 +48,7 @@ def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) 
 
 
 def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
-    """Where the numbers stand, on the scales of their parameters (m,)."""
+    """Coordinates (m,) of free parameters, on their scales."""
     places = []
     for move in moves:
         one = effects[move.effect]
@@ -59,7 +59,7 @@ def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
 
 def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float = _LOG_STEP,
              share_step: float = _SHARE_STEP) -> Array:
-    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound.
+    """Difference steps (m,) for derivatives, on the scales of the parameters; away from a bound.
 
     log_step      on logarithmic scales
     share_step    on others, as a share; both where a parameter has no step of its own
@@ -77,7 +77,7 @@ def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float =
 
 
 def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
-    """The number of that name; None for one that is of none of these effects.
+    """The free parameter of that name; None for one that is of none of these effects.
 
     ValueError, which lists those there are, for a number that the effect lacks or that no fit may move.
     """
@@ -96,8 +96,8 @@ def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
 
 def free_number(effects: Sequence[Chosen], move: Move, start: float | None = None,
                 bounds: tuple[float, float] | None = None) -> Free:
-    """A number of an effect as a fit may change it: from its present value, within what it may be, unless something
-    else is said. ValueError as ``Free``, and for bounds beyond what it may be."""
+    """A free parameter as ``identification`` fits it: from its present value, within its range, unless others are
+    given. ValueError as ``Free``, and for bounds beyond its range."""
     one = effects[move.effect]
     parameter = one.effect.parameters[move.parameter]
     name = f"{one.effect.name}.{parameter.name}"

@@ -90,7 +90,7 @@ class CornerLaws:
     damper                  the damper's force by its own rate: rate [m/s] -> force [N]; grows with the rate
     mount_n_per_m           stiffness of a mount in series with the damper; infinite: none
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
-    dry_friction_n          Coulomb friction beside the damper: this force against any motion, up to it at rest
+    dry_friction_n          Coulomb friction parallel to the damper: this force against any motion, up to it at rest
     friction_transition_mps this times tanh(rate / transition) instead, unless 0
     wheel_friction_n        Coulomb friction of the wheel against a guide that stands on the ground, as on a test rig
     body_friction_n         the same of the body's end of the suspension

@@ -50,7 +50,7 @@ class LinearLaw:
                                           np.broadcast_to(self.into, (len(s), *self.into.shape))))
 
     def forces(self, s: Complex) -> Complex:
-        """Force per motion (..., MOTIONS) at s (...); what a state comes to at rest is taken just beside it."""
+        """Force per motion (..., MOTIONS) at s (...); at rest it is taken just next to 0."""
         flat = np.where(s == 0, _BESIDE_REST, s).ravel()
         return np.asarray(self.by + self.through @ self.states(flat)).reshape(*s.shape, MOTIONS)
 

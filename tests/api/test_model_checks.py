@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.api.bench import unsaid
+from logger.api.bench import silent
 from logger.api.model_checks import check_model
 from logger.api.run_checks import lab_runs
 from logger.commands.main import main
@@ -30,7 +30,7 @@ def stuck(tmp_path: Path, road: str, friction_n: int) -> SimulatedRuns:
 
 @pytest.mark.parametrize(("road", "friction_n"), [("A", 200), ("A", 300), ("B", 500)])
 def test_a_suspension_that_sticks_is_no_wrong_input(tmp_path: Path, road: str, friction_n: int) -> None:
-    check_model("rav4-2009", read_model(vehicle_file("rav4-2009")), stuck(tmp_path, road, friction_n), unsaid)
+    check_model("rav4-2009", read_model(vehicle_file("rav4-2009")), stuck(tmp_path, road, friction_n), silent)
 
 
 def test_a_free_one_in_feet_or_upside_down_is_refused(tmp_path: Path) -> None:
@@ -38,4 +38,4 @@ def test_a_free_one_in_feet_or_upside_down_is_refused(tmp_path: Path) -> None:
     for factor, words in ((-1.0, "upside down"), (1 / 0.3048, "ft/s2")):
         with pytest.raises(BadInput, match=words):
             check_model("rav4-2009", read_model(vehicle_file("rav4-2009")),
-                        SimulatedRuns([replace(run, measured_mps2=factor * run.measured_mps2)]), unsaid)
+                        SimulatedRuns([replace(run, measured_mps2=factor * run.measured_mps2)]), silent)

@@ -97,7 +97,7 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
     runs ask, as it ends in: a search holds the car's numbers at two deviations, and gains more where an effect would
     bend them farther."""
     bench = bench_with(VEHICLE, runs, (), USUAL_TOLERANCE)
-    posterior = bench.posterior(searches=True).without_wall()
+    posterior = bench.posterior(searches=True).without_soft_bounds()
     one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
     gain = one.gain + len(moves_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
     return float(np.sqrt(max(gain, 0.0)))

@@ -94,8 +94,8 @@ def fitted(run: Run, clean: Array, columns: Array, by_bounds: bool) -> Array:
     off, readings, bands = np.zeros(2), Readings.of(run), Bands(run)
     for _ in range(ROUNDS):
         prediction = clean + off @ columns
-        readings = readings.beside(prediction) if by_bounds else readings
-        left = readings.left_by(prediction)
+        readings = readings.given(prediction) if by_bounds else readings
+        left = readings.residual(prediction)
         whitener = bands.whitener(left)
         white = whitener(columns)
         off = off + np.linalg.solve(white @ white.T, white @ whitener(left))

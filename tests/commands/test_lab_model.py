@@ -53,7 +53,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.fixture(autouse=True)
 def no_fits(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("compare.compare", "diagnosis.diagnose", "selection.screening.screened", "selection.add_effect.add"):
+    for name in ("compare.compare", "diagnosis.diagnose", "selection.screening.screen", "selection.add_effect.add"):
         monkeypatch.setattr(f"logger.lab.{name}", None)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import CONFLICT_SIGMA, HAS_IT, Diagnosis, diagnose, obstacles_of
+from logger.lab.diagnosis import ALREADY_PRESENT, CONFLICT_SIGMA, Diagnosis, diagnose, obstacles_of
 from logger.lab.likelihood.noise_floor import UNEXPLAINED
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.runs import Run
@@ -113,7 +113,7 @@ def test_all_others_are_named_the_least_probable_by_chance_first(offset: Diagnos
 def test_an_effect_that_is_there_is_refitted_and_not_tried() -> None:
     present = [hidden("sensor_offset", offset_m=0.3)]
     found = diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)]), FEW, present)
-    assert nothing_is_missing(found) and found.obstacles == {"sensor_offset": HAS_IT} and found.not_tried == {}
+    assert nothing_is_missing(found) and found.obstacles == {"sensor_offset": ALREADY_PRESENT} and found.not_tried == {}
     (one,) = found.effects
     assert one.values["offset_m"] == pytest.approx(0.4, abs=0.04) and one.standard_errors.keys() == {"offset_m"}
     assert found.baseline_error > 1.1 * found.final_error
@@ -139,12 +139,12 @@ def test_what_only_another_car_would_explain_is_unexplained() -> None:
     assert {*SPRINGS} <= found.conflicts.keys()
     assert all(abs(np.log1p(share)) > CONFLICT_SIGMA * 0.02 for share in found.conflicts.values())
     assert all(0.15 < found.conflicts[name] < 0.40 for name in SPRINGS)
-    assert not found.left_over and found.shape is None
+    assert not found.exceeds_noise and found.shape is None
 
 
 def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named() -> None:
     found = diagnosed(secret_runs([hidden("dry_friction", friction_force_n=200.0)]), ("tire_damping", "sensor_gain"))
-    assert found.verdict == () and found.left_over and found.unexplained
+    assert found.verdict == () and found.exceeds_noise and found.unexplained
     assert found.excess > UNEXPLAINED and found.shape is not None
     assert min(one.p_value for one in found.candidates) < FALSE_ALARM  # more than noise, and yet nothing
 
@@ -153,7 +153,7 @@ def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: Simula
     why = EFFECTS["roll"].obstacle(CAR, False)
     assert why is not None
     found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
-    assert found == {"sensor_gain": HAS_IT, "roll": why}
+    assert found == {"sensor_gain": ALREADY_PRESENT, "roll": why}
     assert offset.not_tried == {"roll": why} and "roll" in offset.catalogue
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
-from logger.lab.road_match import better_placement, bounce_band_hz, pooled, road_match
+from logger.lab.road_match import better_placement, bounce_band_hz, pool, road_match
 from logger.profiles.track import Track
 from logger.runs import Run
 
@@ -46,7 +46,7 @@ def test_by_chance_one_road_in_a_thousand_is_taken_for_another() -> None:
     assert np.mean([one.is_refuted for one in found]) > 0.9
     assert np.mean([max(one.correlation, one.turned) > one.chance for one in found]) < 0.02
     assert not any(one.is_clear for one in found)
-    assert all(pooled(found[k:k + 3]).is_refuted for k in range(0, 300, 3))
+    assert all(pool(found[k:k + 3]).is_refuted for k in range(0, 300, 3))
 
 
 def test_a_short_run_cannot_tell() -> None:

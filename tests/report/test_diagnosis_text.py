@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import HAS_IT, Candidate, Diagnosis, Step
+from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis, Step
 from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
@@ -93,7 +93,7 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
     found = replace(NOTHING, conflicts={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13})
     conflict, _ = summary(found)
-    assert found.unexplained and not found.left_over
+    assert found.unexplained and not found.exceeds_noise
     assert conflict.startswith("The fit needs numbers outside their tolerance: front.suspension_stiffness_n_per_m by "
                                "+24%, sprung_mass_kg by -13%.")
 
@@ -135,7 +135,7 @@ def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
     hidden = tuple(Undetectable(EFFECTS[name], 0.5 * place) for place, name in enumerate(
         ["wheel_lift", "bump_stop", "payload", "occupant", "sensor_gain", "roll", "cg_shift", "tire_damping"]))
     found = replace(NOTHING, undetectable=hidden, obstacles={
-        "roll": "one track is known", "dry_friction": HAS_IT})
+        "roll": "one track is known", "dry_friction": ALREADY_PRESENT})
     obstacle, first, *more = untested(found)
     assert obstacle == "roll: could not be tried, one track is known."
     assert first == ("wheel_lift: these runs could miss it. At its usual strength it stands out by 0.0 standard "
@@ -175,7 +175,7 @@ def test_the_object_has_what_the_contract_promises() -> None:
 
 def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> None:
     found = replace(FOUND, excess=0.5, shape=shape, conflicts={"sprung_mass_kg": -0.13}, obstacles={
-        "roll": "one track is known", "sensor_offset": HAS_IT}, undetectable=(
+        "roll": "one track is known", "sensor_offset": ALREADY_PRESENT}, undetectable=(
             Undetectable(EFFECTS["wheel_lift"], 0.1),))
     reported = json.loads(json.dumps(as_json(found), allow_nan=False))
     assert reported["unexplained"] is True and reported["left_over_noise"] == 1.5

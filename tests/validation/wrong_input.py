@@ -19,11 +19,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from logger.api.bench import unsaid
+from logger.api.bench import silent
 from logger.api.model_checks import check_model
 from logger.api.run_checks import lab_runs
 from logger.errors import BadInput
-from logger.lab.another_car import SAYS_LITTLE
+from logger.lab.another_car import POOR_ERROR
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -93,7 +93,7 @@ def main() -> int:
 
 def says_little(runs: list[Run], model: Model) -> bool:
     """Whether a model explains less than a third of the power of what was measured."""
-    return normalised_rms_error(runs, SimulatedRuns(runs).predict(compose(model.vehicle, model.effects))) > SAYS_LITTLE
+    return normalised_rms_error(runs, SimulatedRuns(runs).predict(compose(model.vehicle, model.effects))) > POOR_ERROR
 
 
 def made(kind: str, seed: int) -> tuple[list[Run], Model]:
@@ -107,7 +107,7 @@ def made(kind: str, seed: int) -> tuple[list[Run], Model]:
 def refusal(runs: list[Run], model: Model) -> str | None:
     """Why a model and runs are refused; None: they are not."""
     try:
-        check_model("vehicle.yaml", model, SimulatedRuns(runs), unsaid)
+        check_model("vehicle.yaml", model, SimulatedRuns(runs), silent)
     except BadInput as error:
         return str(error)
     return None

@@ -53,7 +53,7 @@ class RoadFit:
     grids              of the roads
     error_before       rms(measured - explained) / rms(measured), the road being as probable as can be, at the start
     error_after        the same at the estimates
-    verdict            what the drives cannot tell
+    verdict            what the drives cannot identify
     converged          whether the steps came to rest
     iterations         steps taken
     at_bound           names that ended at a bound

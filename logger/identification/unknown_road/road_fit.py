@@ -14,7 +14,7 @@ from logger.identification.unknown_road.road_state import Options, ResponseCar
 def fit_roads(car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options | None = None) -> RoadFit:
     """Fit a car's free numbers to drives, those over one road together.
 
-    Raises NotIdentifiable when the drives cannot tell them, ValueError for no drive or no free number.
+    Raises NotIdentifiable when the drives cannot identify them, ValueError for no drive or no free number.
     """
     options = options or Options()
     problem = RoadProblem(car, roads, options)

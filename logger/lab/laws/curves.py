@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _STRONGEST = 100.0
@@ -25,11 +25,11 @@ ends of its travel does most where it hardly ever is."""
 
 @dataclass(frozen=True)
 class Motion:
-    """What a force may go with.
+    """A motion that a force may depend on.
 
     at         its short name, as drafts have it
     name       in words
-    measure    what ``Look.reach`` calls it
+    measure    what ``LawContext.reach`` calls it
     unit       in which it is measured
     shown      the same in words: factor and unit
     method     of ``Laws`` that takes such a force, with what is handed on to it
@@ -43,7 +43,7 @@ class Motion:
     method: str
 
     def words(self, size: float) -> str:
-        """A size of it: "12 mm"."""
+        """A size of the motion in words: "12 mm"."""
         factor, unit = self.shown
         return f"{factor * size:g} {unit}"
 
@@ -59,13 +59,14 @@ DEFLECTION = Motion("deflection", "tire's deflection", "deflection_m", "m", (100
 class CurveFamily(Family):
     """A force that is a curve of one motion.
 
-    motion        that it goes with
-    force         what it is in words: "damper force"
+    motion               that it depends on
+    force                what it is in words: "damper force"
     source, signature    of its drafts
-    usual_share   of the time that the motion stays within where the force is what its number says
-    reach_share   of the time; beyond twice what this gives, the force stays as it is there
-    powers        to be tried; ``power_ends``: what they may be
-    ends          points of a free curve that a sentence names, by their place among them, and where they are in words
+    usual_share          of the time that the motion stays within where the force is what its number says
+    reach_share          of the time; beyond twice what this gives, the force stays as it is there
+    powers               to be tried; ``power_ends``: what they may be
+    ends                 points of a free curve that a sentence names, by their place among them, and where they are in
+                         words
     """
 
     motion: Motion
@@ -79,20 +80,20 @@ class CurveFamily(Family):
     ends: tuple[tuple[int, str], ...]
 
     @abstractmethod
-    def usual_force_n(self, look: Look, usual: float) -> float:
-        """What such a force usually is where the motion is ``usual`` [N]."""
+    def usual_force_n(self, context: LawContext, usual: float) -> float:
+        """Usual size of such a force where the motion is ``usual`` [N]."""
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         def reach(share: float) -> float:
-            return look.reach(self.motion.measure, share)
+            return context.reach(self.motion.measure, share)
 
         usual = reach(self.usual_share)
-        size_n = self.usual_force_n(look, usual)
+        size_n = self.usual_force_n(context, usual)
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
                 *(self._free(variant, [reach(share) for share in shares], size_n)
                   for variant, shares in _POINTS.items())]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         motion = self.motion.at
         if draft.variant == "power":
             return (f"a {self.force} that grows with the {motion} to the power {say('power_ratio')}, {say('force_n')} "
@@ -101,7 +102,7 @@ class CurveFamily(Family):
         return f"a {self.force} that follows a free curve of the {motion}, {ends}"
 
     def _power(self, reference: float, reach: float, size_n: float) -> Draft:
-        """A force that grows with a power of what moves, alike both ways, as far as ``reach``."""
+        """A force that grows with a power of the motion, symmetric, constant beyond ``reach``."""
         functions = f"""
 def force_n(p, at):
     size = np.minimum(np.abs(at), {rounded(reach)!r}) / {reference!r}

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Chosen, Effect, Parameter
+from logger.vehicle.effect import Effect, Parameter
 
 Array = npt.NDArray[np.float64]
 
@@ -124,11 +124,6 @@ class Draft:
         some = laws.tires if self.at == "deflection" else laws.springs
         others = sum(one(at, still) for one in laws.others) if self.at == "travel" else 0.0
         return np.asarray(sum((one(at) for one in some), still) + others)
-
-
-def learned(one: Chosen) -> bool:
-    """Whether an effect was learned."""
-    return one.effect.name.startswith(LEARNED)
 
 
 def _at(one: Parameter, value: float) -> Parameter:

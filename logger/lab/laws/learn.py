@@ -1,11 +1,11 @@
-"""A law out of the data, where no known effect explains it.
+"""A law learned from the data, where no known effect explains them.
 
-Problem: something differs, none of the known effects is it, and the user is left with a shape. Solution: first the
-known effects are searched, as a diagnosis does. Where nothing is missing, nothing is learned. Else families of laws are
-screened on top of the model without effects, the promising ones are fitted, and the same evidence that chooses among
-effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no law alone explains
-what is missing, laws are tried together with the known effects that were found. Where these leave nothing, a law takes
-their place only by decisive evidence.
+Problem: something is missing that is none of the known effects, and a diagnosis can only describe the residual.
+Solution: first the known effects are searched, as in a diagnosis. Where nothing is missing, nothing is learned. Else
+families of laws are screened on top of the model without effects, the promising ones are fitted, and the same evidence
+that chooses among effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no
+law alone explains what is missing, laws are tried together with the known effects that were found. Where these explain
+everything, a law replaces them only by decisive evidence.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from logger.lab.diagnosis import Diagnosis, judged, searched
+from logger.lab.diagnosis import Diagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look
-from logger.lab.laws.screening import count_of, screened_law
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess
+from logger.lab.laws.families.family import Family, LawContext
+from logger.lab.laws.screening import free_count, screen_law
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
-from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM
-from logger.lab.selection.screening import Baseline, Screened, screened
+from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
+from logger.lab.selection.screening import Baseline, Screened, screen
 from logger.lab.selection.stepwise import Effort as Usual
 from logger.lab.selection.stepwise import Search, Selection
 from logger.vehicle.effect import Chosen, Effect
 
 Progress = Callable[[str], None]
 
-DECISIVE = 2 * CONFUSED
+DECISIVE = 2 * INDISTINGUISHABLE
 """What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
 
 
@@ -43,9 +43,9 @@ class Effort:
     listed                          how many known effects are sought first; all as usual where no law alone explains
                                     what is left
     worth_narrowing                 families of which one axle alone is tried
-    fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with slopes of their
-                                    own
-    worth_fitting, worth_refining   of what the best one promises, and gains
+    fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
+                                    their own
+    fit_share, refine_share         of what the best one promises, and gains
     """
 
     listed: int = 2
@@ -53,8 +53,8 @@ class Effort:
     fitted: int = 5
     of_a_family: int = 3
     refined: int = 2
-    worth_fitting: float = 0.2
-    worth_refining: float = 0.5
+    fit_share: float = 0.2
+    refine_share: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +77,8 @@ class LawFit:
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """A known effect in the place of a law: what it gains, and what the law gains, in minus twice the log of the
-    evidence; its numbers."""
+    """The known effect that gains most in the place of a law: its numbers, its gain and the law's, in minus twice the
+    log of the evidence."""
 
     one: Chosen
     gain: float
@@ -86,32 +86,31 @@ class Nearest:
 
     @property
     def share(self) -> float:
-        """Of what the law explains."""
+        """Share of the law's gain."""
         return max(self.gain, 0.0) / self.law_gain
 
     @property
     def as_good(self) -> bool:
-        """Whether the data do not distinguish the two."""
-        return self.gain > self.law_gain - CONFUSED
+        """Whether the two cannot be distinguished."""
+        return self.gain > self.law_gain - INDISTINGUISHABLE
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
     """A law that was chosen.
 
-    one        with the numbers of the search
-    beside     known effects that are missing as well, with theirs
-    gain       of minus twice the log of the evidence over the model without it
-    listed     what the known effects alone gain over the car without any, and ``with_law`` what the law and those
-               beside it gain
-    rivals     laws of other families that explain as well
-    nearest    the known effect that comes nearest in its place; None: none does anything
+    one         the law with the numbers of the search
+    effects     known effects that are missing as well, with their numbers
+    gain        of minus twice the log of the evidence over the model without it
+    listed      gain of the known effects alone over the car without any; ``with_law``: of the law and its effects
+    rivals      laws of other families that explain as well
+    nearest     the known effect that gains most in its place; None: none gains anything
     """
 
     family: Family
     draft: Draft
     one: Chosen
-    beside: tuple[Chosen, ...]
+    effects: tuple[Chosen, ...]
     gain: float
     listed: float
     with_law: float
@@ -121,10 +120,10 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Learning:
-    """What came of it.
+    """The result of learning a law.
 
     law             None: none is learned
-    look            at what the car does, which pictures of the law need
+    context         at what the car does, which pictures of the law need
     verdict         names of the known effects that are missing where no law is learned, the most certain first
     listed_error    of the model with these, on what its fit did not see
     unexplained     whether these leave something
@@ -132,7 +131,7 @@ class Learning:
     """
 
     law: Law | None
-    look: Look
+    context: LawContext
     verdict: tuple[str, ...]
     listed_error: float
     unexplained: bool
@@ -151,33 +150,34 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     """
     effort = effort or Effort()
     few = replace(Usual(), effects=effort.listed)
-    search, selection = searched(posterior, effects, present, progress, workers, few)
-    chooser = _Chooser(search, selection, families, known, effort)
-    law = chooser.alone()
-    if law is None and is_left_over(selection.now) and len(selection.gains) == effort.listed:
+    search, selection = search_effects(posterior, effects, present, progress, workers, few)
+    choice = _LawChoice(search, selection, families, known, effort)
+    law = choice.explaining_all()
+    if law is None and exceeds_noise(selection.now) and len(selection.gains) == effort.listed:
         search.effort = Usual()
         selection = search.run(selection.before)
-        chooser = replace(chooser, selection=selection)
-    if law is None and is_left_over(selection.now):
-        law = chooser.beside()
-    look = Look(selection.before.posterior, selection.before.state)
-    diagnosis = judged(posterior, effects, present, search, selection) if law is None else None
+        choice = replace(choice, selection=selection)
+    if law is None and exceeds_noise(selection.now):
+        law = choice.with_effects()
+    context = LawContext(selection.before.posterior, selection.before.state)
+    diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
     verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
-    left = is_left_over(selection.now) if diagnosis is None else diagnosis.unexplained
-    return Learning(law, look, verdict, selection.now.hold_out.error, left, diagnosis)
+    left = exceeds_noise(selection.now) if diagnosis is None else diagnosis.unexplained
+    return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis)
 
 
-def is_left_over(model: Baseline) -> bool:
-    """Whether a model leaves more than the sensor's noise, or bends the car as far as its prior lets it."""
+def exceeds_noise(model: Baseline) -> bool:
+    """Whether the residual of a model is above the sensor's noise, or a number of the car is beyond its soft bounds."""
     posterior, state = model.posterior, model.state
-    return (excess(posterior, state, FALSE_ALARM) > UNEXPLAINED) or posterior.prior.at_the_wall(state.logs)
+    return (excess_over_noise(posterior, state, FALSE_ALARM) > UNEXPLAINED
+            or posterior.prior.at_soft_bounds(state.logs))
 
 
 @dataclass(frozen=True, eq=False)
-class _Chooser:
+class _LawChoice:
     """The choice of a law, after the search among the known effects.
 
-    kept    laws that were fitted, and beside which models
+    kept    models, with the laws that were fitted on top of each
     """
 
     search: Search
@@ -187,121 +187,123 @@ class _Chooser:
     effort: Effort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
 
-    def alone(self) -> Law | None:
-        """A law that explains all that is missing by itself, better than the known effects do; None where none does, or
-        nothing is missing."""
+    def explaining_all(self) -> Law | None:
+        """The law that explains everything by itself, better than the known effects; None where none does, or nothing
+        is missing."""
         now, before = self.selection.now, self.selection.before
-        if now is before and not is_left_over(now):
+        if now is before and not exceeds_noise(now):
             return None
-        least = 0.0 if is_left_over(now) else DECISIVE
-        law, model = self._best(self._fitted_beside(before), now.score - least)
-        return None if model is None or is_left_over(model) else law
+        least = 0.0 if exceeds_noise(now) else DECISIVE
+        law, model = self._best(self._fits_to(before), now.score - least)
+        return None if model is None or exceeds_noise(model) else law
 
-    def beside(self) -> Law | None:
-        """A law together with known effects, or one that explains more than they do, though not all."""
+    def with_effects(self) -> Law | None:
+        """The best law together with known effects, or alone if it explains more than they do."""
         now, before = self.selection.now, self.selection.before
         names = now.state.names[self.search.present:]
         bases = [before, now] if names else [before]
-        if len(names) == 2:  # one of them may only be there in the place of the law
+        if len(names) == 2:  # one of them may only imitate the law
             bases += [self.search.without(now, name) for name in names]
-        return self._best([one for base in bases for one in self._fitted_beside(base)], now.score)[0]
+        return self._best([one for base in bases for one in self._fits_to(base)], now.score)[0]
 
     def _best(self, fits: Sequence[LawFit], least: float) -> tuple[Law | None, Baseline | None]:
-        """The law with the most evidence, with its model; none where none scores less than ``least``."""
-        there = sorted((one for one in fits if one.score < least and self._is_there(one)), key=lambda one: one.score)
-        if not there:
+        """The law with the most evidence, with its model; None where none scores less than ``least``."""
+        accepted = sorted((one for one in fits if one.score < least and self._is_accepted(one)),
+                          key=lambda one: one.score)
+        if not accepted:
             return None, None
-        best = self._simplest(there)
+        best = self._simplest(accepted)
         self.search.progress(f"{best.family.title}: fitting the car with it")
-        model, gains = self.search.needed(self.selection.before, self.search.refit(best.fit))
+        model, gains = self.search.eliminate_backward(self.selection.before, self.search.refit(best.fit))
         if best.draft.name not in gains or model.score > least:
             return None, None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
-        beside = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
-        rivals = tuple(_best_of_each(other for other in there if other.family is not best.family
-                                     and other.score < best.score + CONFUSED))
+        effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
+        rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
+                                     and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        law = Law(best.family, best.draft, one, beside, gains[best.draft.name], before - now, before - model.score,
+        law = Law(best.family, best.draft, one, effects, gains[best.draft.name], before - now, before - model.score,
                   rivals, self._nearest(model, best, gains[best.draft.name]))
         return law, model
 
-    def _fitted_beside(self, base: Baseline) -> list[LawFit]:
-        """Laws fitted on top of a model, once."""
+    def _fits_to(self, base: Baseline) -> list[LawFit]:
+        """Laws fitted on top of a model, kept from earlier calls."""
         for known, fits in self.kept:
             if known is base:
                 return fits
-        fits = self._fitted_anew(base)
+        fits = self._fit_laws(base)
         self.kept.append((base, fits))
         return fits
 
-    def _fitted_anew(self, base: Baseline) -> list[LawFit]:
+    def _fit_laws(self, base: Baseline) -> list[LawFit]:
+        """Screen and fit the laws of all families on top of a model."""
         search, effort = self.search, self.effort
-        look = Look(base.posterior, base.state)
-        drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(look)]
+        context = LawContext(base.posterior, base.state)
+        drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(context)]
         with ThreadPoolExecutor(search.workers) as pool:
-            promised = self._screened(pool, base, drafted)
-            # A family is narrowed by whichever of its laws promises most.
-            best = list(_firsts(promised))[: effort.worth_narrowing]
-            narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, look)]
-            promised = sorted([*promised, *self._screened(pool, base, narrower)],
-                              key=lambda each: -self._promise(base, each[2]))
-            enough = effort.worth_fitting * max(self._promise(base, promised[0][2]), 0.0) if promised else 0.0
+            promised = self._screen_all(pool, base, drafted)
+            # The law with the largest gain of a family is varied.
+            best = list(_best_of_families(promised))[: effort.worth_narrowing]
+            narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
+            promised = sorted([*promised, *self._screen_all(pool, base, narrower)],
+                              key=lambda each: -self._screened_gain(base, each[2]))
+            enough = effort.fit_share * max(self._screened_gain(base, promised[0][2]), 0.0) if promised else 0.0
             worth = [each for each in _most_of_each(promised, effort.of_a_family)[: effort.fitted]
-                     if self._promise(base, each[2]) > enough]
+                     if self._screened_gain(base, each[2]) > enough]
             search.progress(f"fitting {len(worth)} laws")
-            rough = list(pool.map(lambda each: roughly_fitted(base.score, base, each[2])[0], worth))
+            rough = list(pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], worth))
             found = sorted(zip(worth, rough, strict=True), key=lambda pair: -pair[1].gain)
-            near = [fit for _, fit in found[: effort.refined] if fit.gain > effort.worth_refining * found[0][1].gain]
+            near = [fit for _, fit in found[: effort.refined] if fit.gain > effort.refine_share * found[0][1].gain]
             search.progress(f"refining {len(near)} laws")
-            fine = list(pool.map(lambda fit: refined(
-                base.score, fit, search.effort.worth_a_round * base.explanation), near))
+            fine = list(pool.map(lambda fit: refine(
+                base.score, fit, search.effort.round_share * base.explanation), near))
         fits = [*fine, *(fit for _, fit in found[len(near):])]
         return [LawFit(family, draft, base, fit)
                 for ((family, draft, _), _), fit in zip(found, fits, strict=True)]
 
-    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
+    def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
                   ) -> list[tuple[Family, Draft, Screened]]:
-        """Laws with what they promise on top of a model, the most promising first."""
+        """Screenings of laws on top of a model, the largest gain first."""
         found = []
         for done, ((family, draft), one) in enumerate(zip(drafted, pool.map(
-                lambda pair: screened_law(base, pair[1], self.search.seen), drafted), strict=True), 1):
+                lambda pair: screen_law(base, pair[1], self.search.misalignment), drafted), strict=True), 1):
             self.search.progress(f"screened {done} of {len(drafted)} laws")
             found.append((family, draft, one))
-        return sorted(found, key=lambda each: -self._promise(base, each[2]))
+        return sorted(found, key=lambda each: -self._screened_gain(base, each[2]))
 
-    def _promise(self, base: Baseline, one: Screened) -> float:
-        """What a law may gain in evidence, its numbers counted."""
-        return one.gain - count_of(one) * float(np.log(base.posterior.freedom))
+    def _screened_gain(self, base: Baseline, one: Screened) -> float:
+        """Gain in evidence by screening, less the cost of a law's numbers."""
+        return one.gain - free_count(one) * float(np.log(base.posterior.freedom))
 
-    def _is_there(self, one: LawFit) -> bool:
-        """As an effect is there; and the error on what no fit saw does not rise with it."""
-        return (self.search.accepted(one.base, one.fit)
-                and not one.fit.hold_out.raises(one.base.hold_out))
+    def _is_accepted(self, one: LawFit) -> bool:
+        """Whether a law is accepted as an effect is, and does not raise the hold-out error."""
+        return (self.search.is_accepted(one.base, one.fit)
+                and not one.fit.hold_out.is_worse_than(one.base.hold_out))
 
-    def _simplest(self, there: Sequence[LawFit]) -> LawFit:
-        """Of laws that cannot be distinguished from the likeliest, the one with the fewest other effects with it, and
-        then the fewest numbers."""
-        near = [one for one in there if one.score < there[0].score + CONFUSED]
+    def _simplest(self, fits: Sequence[LawFit]) -> LawFit:
+        """Of laws, best first, that cannot be distinguished from the best one, that with the fewest effects besides it,
+        and then the fewest numbers."""
+        near = [one for one in fits if one.score < fits[0].score + INDISTINGUISHABLE]
         return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
 
     def _nearest(self, model: Baseline, best: LawFit, law_gain: float) -> Nearest | None:
-        """The known effect that gains most in the place of the law, of those that its family may nearly be."""
+        """The known effect that gains most in the place of the law, of those related to its family."""
         without = self.search.without(model, best.draft.name)
-        names = [name for name in best.family.akin if name in self.known and name not in without.state.names]
+        names = [name for name in best.family.related_effects if name in self.known and name not in without.state.names]
         self.search.progress(f"what known effect comes near {best.family.title}")
         with ThreadPoolExecutor(self.search.workers) as pool:
-            tries = list(pool.map(lambda name: roughly_fitted(
-                without.score, without, screened(without, self.known[name], [self.search.seen]))[0], names))
+            tries = list(pool.map(lambda name: fit_roughly(
+                without.score, without, screen(without, self.known[name], [self.search.misalignment]))[0], names))
         if not tries:
             return None
-        nearest = refined(without.score, max(tries, key=lambda one: one.gain))
+        nearest = refine(without.score, max(tries, key=lambda one: one.gain))
         if nearest.gain <= 0:
             return None
         return Nearest(nearest.chosen, nearest.gain, law_gain)
 
 
-def _firsts(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
-    """The most promising law of each family."""
+def _best_of_families(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
+    """The first law of each family, of laws in order."""
     found: dict[str, tuple[Family, Draft, Screened]] = {}
     for each in promised:
         found.setdefault(each[0].name, each)
@@ -310,7 +312,7 @@ def _firsts(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Fa
 
 def _most_of_each(promised: Sequence[tuple[Family, Draft, Screened]], most: int
                   ) -> list[tuple[Family, Draft, Screened]]:
-    """At most so many laws of each family."""
+    """The first laws of each family, at most so many."""
     counts: Counter[str] = Counter()
     found = []
     for each in promised:
@@ -321,7 +323,7 @@ def _most_of_each(promised: Sequence[tuple[Family, Draft, Screened]], most: int
 
 
 def _best_of_each(fits: Iterable[LawFit]) -> list[LawFit]:
-    """Of every family the law that is best, best first."""
+    """The best law of each family, best first."""
     found: dict[str, LawFit] = {}
     for one in fits:
         found.setdefault(one.family.name, one)

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.chart_data import Curves, Line
+from logger.chart_data import CURVE_POINTS, CURVE_REACH, Curves, Line
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 from logger.vehicle.effect import Chosen, ForceEffect
 from logger.vehicle.laws import Seen, linear
 from logger.vehicle.uncertain import NumberErrors
@@ -19,20 +19,20 @@ Array = npt.NDArray[np.float64]
 _AXES = {"rate": ("rate_mps", "rate of the suspension in m/s, positive in extension"),
          "travel": ("travel_m", "travel of the suspension in m, positive in extension"),
          "deflection": ("deflection_m", "height of the wheel over the road from rest in m")}
-_POINTS, _STEP = 201, 1e-4
+_STEP = 1e-4  # of a standard error, over which derivatives are taken
 _LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 4000
 
 
-def picture(draft: Draft, found: Chosen, errors: NumberErrors, look: Look) -> Curves | None:
+def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawContext) -> Curves | None:
     """What a law adds, over the motions of the runs; None where it is no force that a picture shows."""
     if draft.at == "loop":
-        return _loops(draft, found, look)
+        return _loops(draft, found, context)
     if draft.at not in _AXES:
         return None
     motion, name = _AXES[draft.at]
-    reach = look.reach(motion, 0.999)
-    at = np.linspace(-reach, reach, _POINTS)
-    damping = look.vehicle.front.suspension_damping_n_s_per_m
+    reach = context.reach(motion, CURVE_REACH)
+    at = np.linspace(-reach, reach, CURVE_POINTS)
+    damping = context.vehicle.front.suspension_damping_n_s_per_m
     line = Line("learned", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
     return Curves(draft.title, name, "force in N", (line,))
 
@@ -53,13 +53,13 @@ def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping:
     return np.asarray(np.sqrt(np.maximum(np.einsum("in,ij,jn->n", columns, matrix, columns), 0.0)))
 
 
-def _loops(draft: Draft, found: Chosen, look: Look) -> Curves | None:
+def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
     """Its force while the suspension goes to and fro, by small and large ways, at the pace of a car's bounce."""
     assert isinstance(draft.effect, ForceEffect)
-    before = linear(look.vehicle.front.suspension_damping_n_s_per_m, draft.axle == "rear")
+    before = linear(context.vehicle.front.suspension_damping_n_s_per_m, draft.axle == "rear")
     laws = draft.effect.laws(SimpleNamespace(**found.values), before)
     lines = []
-    for way_m in sorted({look.reach("travel_m", share) for share in _LOOP_SHARES}):
+    for way_m in sorted({context.reach("travel_m", share) for share in _LOOP_SHARES}):
         phase = 2 * np.pi * np.linspace(0, _LOOP_TURNS, _LOOP_TURNS * _LOOP_STEPS + 1)
         travel, rate = way_m * np.sin(phase), way_m * 2 * np.pi * _LOOP_HZ * np.cos(phase)
         force = sum((one(travel, rate) for one in laws.others), np.zeros_like(travel))

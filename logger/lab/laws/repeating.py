@@ -1,8 +1,7 @@
-"""What repeats in a residual, along the way or in time: where its fit may begin.
+"""Tones in a residual, along the way or in time: initial values for a fit.
 
-A tone whose frequency is not known to a fraction of a cycle over all of a run is no start for a fit by slopes. The
-residual of each run, white in its bands, is laid on the way in even steps and the periodograms of all runs are
-added; the loudest wave number is refined where the sum of squares of all coherent sums is largest.
+A fit by derivatives has to begin within a fraction of a cycle over all of a run. The periodograms of the whitened
+residuals of all runs are added, over the way or over the time; the frequency of the largest sum is refined.
 """
 
 from __future__ import annotations
@@ -12,40 +11,40 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 Array = npt.NDArray[np.float64]
 
 _SLOWEST_MPS = 1.0
 _FINER = 8
-"""Times the resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
+"""Grid points per resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
 _LOUD = 12.0
 """A peak with so many times the mean power of its neighbours: noise alone has one in some thousand in a hundred
 runs."""
 
 
-def white_residuals(look: Look) -> list[Array]:
+def white_residuals(context: LawContext) -> list[Array]:
     """Residuals (n - first,) per run, white in their bands, in units of the noise."""
-    posterior = look.posterior
+    posterior = context.posterior
     found = []
-    for run, bands, residual in zip(look.runs, posterior.bands, posterior.residuals(look.state), strict=True):
+    for run, bands, residual in zip(context.runs, posterior.bands, posterior.residuals(context.state), strict=True):
         white = bands.whitener(residual).in_time(residual)
         found.append(np.asarray(white[: run.count - run.first]))
     return found
 
 
-def along_the_way(look: Look, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
-    """The wave number at which something repeats along the way, whatever the speed [1/m]; None where nothing does.
+def spatial_frequency(context: LawContext, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
+    """The wave number of the strongest line along the way [1/m]; None where none is strong enough.
 
-    per_m          between these
-    speed_power    it grows with the speed to this power
+    per_m          range that is searched
+    speed_power    exponent of the growth of its amplitude with the speed
     """
     signals, ways = [], []
-    for run, residual, moved in zip(look.runs, white_residuals(look), look.posterior.moved_m(look.state.record),
-                                    strict=True):
+    for run, residual, error_m in zip(context.runs, white_residuals(context),
+                                      context.posterior.distance_error_m(context.state.record), strict=True):
         speed = np.maximum(run.speed_mps[run.first:], _SLOWEST_MPS)
         signals.append(residual * (speed / speed.mean()) ** speed_power)
-        ways.append((run.distance_m + moved)[run.first:])
+        ways.append((run.distance_m + error_m)[run.first:])
     longest_m = max(float(np.ptp(one)) for one in ways)
     if not longest_m > 0:
         return None
@@ -55,6 +54,7 @@ def along_the_way(look: Look, per_m: tuple[float, float], speed_power: float = 0
 
 
 def _peak(grid: Array, power: Array) -> float | None:
+    """Abscissa of the largest power, interpolated; None where it is not strong enough."""
     best = int(power.argmax())
     if power[best] < _LOUD * float(np.median(power)):
         return None
@@ -67,7 +67,7 @@ def _peak(grid: Array, power: Array) -> float | None:
 
 
 def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
-    """Of coherent sums over a way (n,) at wave numbers (g,)."""
+    """Periodogram of a signal (n,) over uneven places (n,) at even wave numbers (g,)."""
     found = np.empty(len(grid))
     # Over equal steps of a wave number the phase factor of each sample is multiplied by another one.
     step = np.exp(-2j * np.pi * (grid[1] - grid[0]) * way)
@@ -84,8 +84,8 @@ def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
 
 @dataclass(frozen=True)
 class Tone:
-    """A tone whose phase is 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], by how much
-    it is early and late (c, s) [s], and the period T of that [s]; power, in units of the noise's."""
+    """A tone of phase 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], the amplitudes of
+    its phase modulation (c, s) [s] and their period T [s]; its power, in units of the noise's."""
 
     frequency_hz: float
     wander_cos_s: float
@@ -108,27 +108,28 @@ _STEPS_HZ = 0.25
 _COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
 
 
-def tone_in_time(look: Look, hz: tuple[float, float], wanders: bool) -> Tone | None:
-    """The tone that is loudest, at the same time since each run began; None where none stands out.
+def tone_in_time(context: LawContext, hz: tuple[float, float], wanders: bool) -> Tone | None:
+    """The strongest tone, with the same phase at the beginning of each run; None where none is strong enough.
 
-    hz         its mean frequency is between these
-    wanders    its frequency may wander by a sinusoid
+    hz         range of its mean frequency
+    wanders    its frequency may vary by a sinusoid
     """
-    signals = white_residuals(look)
-    rate = look.runs[0].rate_hz
-    began_s = look.runs[0].first / rate
-    begin = _steady(signals, rate, hz) if not wanders else _ridge(signals, rate, began_s, hz)
+    signals = white_residuals(context)
+    rate = context.runs[0].rate_hz
+    began_s = context.runs[0].first / rate
+    begin = _steady_tone(signals, rate, hz) if not wanders else _strongest_ridge(signals, rate, began_s, hz)
     at = np.array([begin.frequency_hz, begin.frequency_hz * begin.wander_cos_s,
                    begin.frequency_hz * begin.wander_sin_s, 1 / begin.period_s])
     for coherent_s in _COHERENT_S:
-        at = _refined(signals, rate, began_s, at, coherent_s, wanders)
+        at = _refine(signals, rate, began_s, at, coherent_s, wanders)
     power = _coherent(signals, rate, began_s, at, _COHERENT_S[-1])
     if power < _LOUD * len(signals) or not hz[0] < at[0] < hz[1]:
         return None
     return Tone(float(at[0]), float(at[1] / at[0]), float(at[2] / at[0]), float(1 / at[3]), power)
 
 
-def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+def _steady_tone(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+    """The tone of the largest periodogram."""
     size = _FINER * max(map(len, signals))
     power = sum(np.abs(np.fft.rfft(one, size)) ** 2 / len(one) for one in signals)
     f_hz = np.fft.rfftfreq(size, 1 / rate_hz)
@@ -137,8 +138,8 @@ def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> To
     return Tone(float(f_hz[best]), 0.0, 0.0, _PERIODS_S[-1], 0.0)
 
 
-def _ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
-    """Where the powers of short windows add up to most along a frequency that goes up and down."""
+def _strongest_ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
+    """The modulated tone along which the power of short windows is largest."""
     size, hop = round(_WINDOW_S * rate_hz), round(_WINDOW_S * _HOP * rate_hz)
     taper = np.hanning(size + 1)[:-1]
     padded = round(rate_hz / _STEPS_HZ)
@@ -168,7 +169,7 @@ def _ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float
 
 
 def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float) -> float:
-    """Power along a phase, coherent within so long."""
+    """Power of the tone with these numbers, summed coherently over pieces of this length."""
     found = 0.0
     for one in signals:
         time_s = began_s + np.arange(len(one)) / rate_hz
@@ -181,8 +182,9 @@ def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, c
     return found
 
 
-def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
-             wanders: bool) -> Array:
+def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
+            wanders: bool) -> Array:
+    """The numbers of a tone that maximise that power, by the simplex method."""
     from scipy.optimize import minimize
 
     lasts_s = min(coherent_s, max(map(len, signals)) / rate_hz)
@@ -191,13 +193,13 @@ def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, co
     sizes = np.array([0.25 / lasts_s, late, late, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
     free = [0, 1, 2, 3] if wanders else [0]
 
-    def lack(x: Array) -> float:
+    def negative_power(x: Array) -> float:
         there = at.copy()
         there[free] += x * sizes[free]
         return -_coherent(signals, rate_hz, began_s, there, coherent_s)
 
     simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
-    found = minimize(lack, np.zeros(len(free)), method="Nelder-Mead",
+    found = minimize(negative_power, np.zeros(len(free)), method="Nelder-Mead",
                      options={"initial_simplex": simplex, "maxfev": 80 * len(free), "xatol": 0.02, "fatol": 0.1})
     there = at.copy()
     there[free] += found.x * sizes[free]

@@ -1,9 +1,9 @@
-"""By how much the model runs ahead of the measurement, along each run.
+"""The lag of the measurement behind the model, window by window along each run.
 
 Problem: a clock that is late, a position that is off and a speed that is off by a factor all leave residuals like those
-of missing physics. Solution: in short windows the measurement is laid beside the model at every shift within reach of
-the last one, and around the best one the shift is found between samples, to first order (with the gain free). A shift
-that is one time is a clock's, one that is one length is a position's, one that grows along the way is a wrong speed's.
+of missing physics. Solution: in short windows the measurement is correlated with the model at every lag within reach of
+the last one, and around the best one the lag is found between samples, to first order (with the gain free). A lag that
+is a constant time is a clock's, a constant length a position's, and one that grows along the way a wrong speed's.
 """
 
 from __future__ import annotations
@@ -19,24 +19,28 @@ from logger.runs import Run
 Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
-_LEAST_WINDOWS = 5
+"""Length of a window: 256 samples at 100 Hz, a quick transform, two to four bounces of a body."""
+_LEAST_FREEDOM = 5
+"""No slope is estimated with fewer degrees of freedom: Student's t at 5 % is above 2.6 there. A judgement."""
 _LEAST_READ = 0.9
-"""Of a window, lest what stands where nothing was read decides; a tenth moves a lag by less than its error."""
-_GRID_M = 0.1  # a fifth of the shortest wave that is felt
-_LOUD_M = 20.0  # places are compared by their loudness over so much road
+"""Share of a window that has to be read, lest the filling of the rest decides; a tenth moves a lag by less than its
+error."""
+RESOLVED_M = 0.1
+"""A fifth of the shortest wave that is felt: places that are known better need no search."""
+_LOUDNESS_M = 20.0  # a level is taken over so much road: some car lengths, so that one pothole counts once
 SLOWEST_MPS = 0.5
 """A car that is slower stands: a length over its speed says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """Windows (k,) of all runs in which the model and the measurement are alike.
+    """Windows (k,) of all runs in which the measurement correlates with the model.
 
-    run           which run it is in
-    middle        the sample in its middle
-    along_m       how far into the run [m]
+    run               number of the run it is in
+    middle            the sample in its middle
+    along_m           how far into the run [m]
     lag_s, error_s    how much later than the model the measurement is: the model is ahead where it is above 0
-    speed_mps     in the window; NaN on a rig
+    speed_mps         in the window; NaN on a rig
     """
 
     run: npt.NDArray[np.intp]
@@ -48,13 +52,13 @@ class Lags:
 
     @property
     def lag_m(self) -> Array:
-        """The same as lengths of road."""
+        """The lags as lengths of road (k,) [m]."""
         return self.lag_s * self.speed_mps
 
 
 @dataclass(frozen=True)
 class Trend:
-    """A number with its standard error and how probable one so large would be by chance; NaN where nothing is known."""
+    """A slope with its standard error and the p-value of no slope; NaN where nothing is known."""
 
     value: float = float("nan")
     error: float = float("nan")
@@ -62,7 +66,7 @@ class Trend:
 
 
 def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
-    """The windows of runs beside a model's predictions (n,), or ((1 + s) n,) of all signals."""
+    """Lags of runs behind a model's predictions (n,), or ((1 + s) n,) of all signals."""
     rows: list[tuple[float, ...]] = []
     for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
         rows += _windows(number, run, run.main(prediction))
@@ -70,9 +74,9 @@ def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
     return Lags(table[0].astype(np.intp), table[1].astype(np.intp), *table[2:])
 
 
-def followed_m(run: Run, prediction: Array) -> Array:
-    """By how much the car seems to have been farther than a model of it (n,) [m], straight between windows in which
-    both are alike; nothing where there are none, and on a rig."""
+def offset_by_lag_m(run: Run, prediction: Array) -> Array:
+    """Distance error (n,) [m] that the lags behind a prediction (n,) amount to, linear between windows; 0 without
+    windows, and on a rig."""
     windows = lags([run], [prediction])
     if run.timed or not len(windows.run):
         return np.zeros(run.count)
@@ -80,59 +84,63 @@ def followed_m(run: Run, prediction: Array) -> Array:
     return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))
 
 
-def shift_m(distance_m: Array, measured_mps2: Array, prediction: Array, road_m: tuple[float, float],
-            reach_m: float) -> float | None:
-    """By how much the car was farther than these distances (n,) all the way, up to ``reach_m`` either way, if it was on
-    this road, known from ``road_m`` on and up to there; None where it hardly moved [m]."""
+def offset_by_correlation_m(distance_m: Array, measured_mps2: Array, prediction: Array, road_m: tuple[float, float],
+                            reach_m: float) -> float | None:
+    """The constant distance error within ``reach_m`` either way at which the measurement correlates most with a
+    prediction (n,) [m]; None where the car hardly moved.
+
+    distance_m    as recorded (n,)
+    road_m        where the road is known: from, to
+    """
     from scipy.signal import correlate
 
-    grid_m = np.arange(distance_m[0], distance_m[-1], _GRID_M)
+    grid_m = np.arange(distance_m[0], distance_m[-1], RESOLVED_M)
     if len(grid_m) < 2:
         return None
     rising = distance_m + 1e-9 * np.arange(len(distance_m))
     inside = ((grid_m >= road_m[0]) & (grid_m <= road_m[1])).astype(float)
-    measured, predicted = (_evened(np.interp(grid_m, rising, one)) * inside for one in (measured_mps2, prediction))
-    reach = min(round(reach_m / _GRID_M), len(grid_m) - 1)
-    alike = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
-    return (int(alike.argmax()) - reach) * _GRID_M
+    measured, predicted = (_equalised(np.interp(grid_m, rising, one)) * inside for one in (measured_mps2, prediction))
+    reach = min(round(reach_m / RESOLVED_M), len(grid_m) - 1)
+    correlation = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
+    return (int(correlation.argmax()) - reach) * RESOLVED_M
 
 
-def _evened(samples: Array) -> Array:
-    """Of places (n,), each as loud as the others: one pothole shall not decide."""
-    size = round(_LOUD_M / _GRID_M)
+def _equalised(samples: Array) -> Array:
+    """Samples along the road (n,) over their local r.m.s.: one pothole shall not decide."""
+    size = round(_LOUDNESS_M / RESOLVED_M)
     loud = np.sqrt(np.convolve(samples**2, np.full(size, 1 / size), "same"))[: len(samples)]
     return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
 
 
-def drift(windows: Lags) -> Trend:
-    """By how much the model gets ahead per length of road [m/m], each run beginning where it will."""
+def lag_drift(windows: Lags) -> Trend:
+    """Growth of the lag per length of road [m/m], with a free offset of each run."""
     runs = np.unique(windows.run)
     freedom = len(windows.run) - len(runs) - 1
-    if freedom < _LEAST_WINDOWS:
+    if freedom < _LEAST_FREEDOM:
         return Trend()
     lag_m, along_m = (_centred(one, windows.run) for one in (windows.lag_m, windows.along_m))
     return _slope(lag_m, along_m, freedom)
 
 
-def constant(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool | None]:
-    """By how much the model is ahead all the way [s], [m], and whether it is rather the one time (True) or the one
-    length (False); None: the speeds, slow and fast ones, do not differ by the factor ``apart``, and do not tell."""
+def constant_lag(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool | None]:
+    """The lag as one time [s] and as one length [m], and whether the time fits better (True) or the length (False);
+    None: slow and fast speeds differ by less than the factor ``apart``, and cannot distinguish them."""
     freedom = len(windows.run) - 1
-    if freedom < _LEAST_WINDOWS:
+    if freedom < _LEAST_FREEDOM:
         return Trend(), Trend(), None
     ones = np.ones_like(windows.lag_s)
     time = _slope(windows.lag_s, ones, freedom)
     length = _slope(windows.lag_s, 1 / windows.speed_mps, freedom)
     slow, fast = np.quantile(windows.speed_mps, (0.1, 0.9))
-    left_time = float(np.sum((windows.lag_s - time.value) ** 2))
-    left_length = float(np.sum((windows.lag_s - length.value / windows.speed_mps) ** 2))
-    return time, length, left_time < left_length if fast > apart * slow else None
+    squares_time = float(np.sum((windows.lag_s - time.value) ** 2))
+    squares_length = float(np.sum((windows.lag_s - length.value / windows.speed_mps) ** 2))
+    return time, length, squares_time < squares_length if fast > apart * slow else None
 
 
 def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
              least_correlation: float = 0.5) -> list[tuple[float, ...]]:
     size, reach = round(WINDOW_S * run.rate_hz), round(reach_s * run.rate_hz)
-    rate_of_change = np.gradient(prediction, 1 / run.rate_hz)
+    derivative = np.gradient(prediction, 1 / run.rate_hz)
     read = run.read
     found: list[tuple[float, ...]] = []
     about = step = 0
@@ -144,16 +152,16 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
             continue
         shifted = np.lib.stride_tricks.sliding_window_view(prediction[low : high + size], size)
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))
-        alike = np.divide(shifted @ measured, scale, out=np.zeros(len(shifted)), where=scale > 0)
-        best = low + int(alike.argmax())
-        if alike[best - low] < least_correlation:
+        correlation = np.divide(shifted @ measured, scale, out=np.zeros(len(shifted)), where=scale > 0)
+        best = low + int(correlation.argmax())
+        if correlation[best - low] < least_correlation:
             continue
         part = slice(best, best + size)
-        columns = np.stack([prediction[part], -rate_of_change[part]], axis=1)
+        columns = np.stack([prediction[part], -derivative[part]], axis=1)
         (gain, late), *_ = np.linalg.lstsq(columns, measured, rcond=None)
-        left = measured - columns @ (gain, late)
+        residual = measured - columns @ (gain, late)
         precision = np.linalg.pinv(columns.T @ columns)[1, 1]
-        error_s = float(np.sqrt(left @ left / size * precision) / abs(gain)) if gain else np.inf
+        error_s = float(np.sqrt(residual @ residual / size * precision) / abs(gain)) if gain else np.inf
         lag = start - best
         step, about = (lag - about, lag) if found else (0, lag)
         middle = start + size // 2
@@ -169,13 +177,13 @@ def _centred(values: Array, groups: npt.NDArray[np.intp]) -> Array:
 
 
 def _slope(values: Array, against: Array, freedom: int) -> Trend:
-    """Values = slope * against, with Student's test of it."""
+    """Slope of values over another variable through 0, with Student's test."""
     from scipy.stats import t
 
     size = float(against @ against)
     if not size > 0:
         return Trend()
     slope = float(values @ against) / size
-    left = values - slope * against
-    error = float(np.sqrt(left @ left / freedom / size))
+    residual = values - slope * against
+    error = float(np.sqrt(residual @ residual / freedom / size))
     return Trend(slope, error, float(2 * t.sf(abs(slope) / error, freedom)) if error > 0 else float("nan"))

@@ -1,9 +1,9 @@
-"""A posterior beside one of its states: normal equations, with the record's errors integrated out.
+"""The posterior linearised at a state: normal equations, with the record's errors integrated out.
 
-Problem: some hundred numbers of each run's distance error are unknown beside a dozen of the car and a few of the
-effects. Solution: beside a state all of them act to first order, and those of one run's record touch that run alone.
-They are eliminated run by run (Schur complement), so that fits and tests of effects see small matrices only; and the
-sizes of the distance errors are those with the most evidence.
+Problem: some hundred numbers of each run's distance error are nuisance parameters of a dozen numbers of the car and a
+few of the effects. Solution: near a state all of them act to first order, and those of one run's record change that run
+alone. They are eliminated run by run (Schur complement), so that fits and tests of effects see small matrices only; and
+the sizes of the distance errors are those with the most evidence.
 """
 
 from __future__ import annotations
@@ -24,94 +24,96 @@ from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 
-_LOOSE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
-"""Starts and factors that are as good as free; what a run does not tell of them is not singular yet."""
+_UNINFORMATIVE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
+"""Start and scale error as good as free: their precisions are a millionth of a good recorder's, above what would make
+the information of a run without either singular."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """The record error of one run beside a state: its whitened slopes (k, kept), their products (k, k), how they pull
-    at its numbers (k,), and these."""
+    """The record error of one run at a state: its whitened derivatives (k, kept), their products (k, k), the gradient
+    of its numbers (k,), and these."""
 
     error: RecordError
     white: Array
     gram: Array
-    pull: Array
+    gradient: Array
     here: Array
 
     def root(self, size: ErrorSize) -> Array:
-        """Cholesky's factor of the information (k, k), lower."""
+        """Lower Cholesky factor of the information (k, k)."""
         return np.asarray(np.linalg.cholesky(self.gram + self.error.precision(size)), float)
 
-    def lack(self, size: ErrorSize, walks: dict[float, _Walk]) -> float:
+    def minus_twice_log_evidence(self, size: ErrorSize, walks: dict[float, _Walk]) -> float:
         """Minus twice the log of the evidence for a size, without its constant.
 
-        walks    what is known of sizes of the walk already
+        walks    results for sizes of the walk, kept from earlier calls
         """
         if size.walk_m not in walks:
             walks[size.walk_m] = _Walk.of(self, size)
-        walk, weights = walks[size.walk_m], self.error.trend_precisions(size) - self.error.trend_precisions(_LOOSE)
+        walk = walks[size.walk_m]
+        weights = self.error.trend_precisions(size) - self.error.trend_precisions(_UNINFORMATIVE)
         there = self.error.trend.T @ self.here
-        # M. Woodbury's identity: start and factor are two numbers among hundreds.
+        # M. Woodbury's identity: start and scale error are two numbers among hundreds.
         small = np.eye(len(weights)) + weights[:, None] * (walk.trend.T @ walk.trend)
-        grown = walk.grown - walk.trend @ (weights * there)
-        by_trend = walk.trend.T @ grown
+        whitened_gradient = walk.whitened_gradient - walk.trend @ (weights * there)
+        by_trend = walk.trend.T @ whitened_gradient
         return float(walk.log_determinant + np.linalg.slogdet(small)[1] - self.error.log_determinant(size)
                      + walk.cost + weights @ there**2
-                     - grown @ grown + by_trend @ np.linalg.solve(small, weights * by_trend))
+                     - whitened_gradient @ whitened_gradient + by_trend @ np.linalg.solve(small, weights * by_trend))
 
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """The record error of one run whose start and factor may be nearly anything, beside a state: the logarithm of the
-    information's determinant, the cost of the numbers as they are, and their pull (k,) and the trend (k, 2) through
-    its Cholesky factor."""
+    """The record error of one run at a state, with start and scale error nearly free: the log-determinant of the
+    information, the cost of the numbers, and their gradient (k,) and the trend (k, 2) whitened by its Cholesky
+    factor."""
 
     log_determinant: float
     cost: float
-    grown: Array
+    whitened_gradient: Array
     trend: Array
 
     @staticmethod
     def of(record: _Record, size: ErrorSize) -> _Walk:
-        """Of a run, if the walk is of this size."""
+        """For a run with a walk of this size."""
         from scipy.linalg import solve_triangular
 
-        precision, here = record.error.precision(replace(_LOOSE, walk_m=size.walk_m)), record.here
+        precision, here = record.error.precision(replace(_UNINFORMATIVE, walk_m=size.walk_m)), record.here
         root, owed = np.asarray(np.linalg.cholesky(record.gram + precision), float), precision @ here
-        both = solve_triangular(root, np.column_stack([record.pull - owed, record.error.trend]), lower=True)
+        both = solve_triangular(root, np.column_stack([record.gradient - owed, record.error.trend]), lower=True)
         return _Walk(_log_determinant(root), float(here @ owed), both[:, 0], both[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)
-class Eliminated:
-    """Predictions beside a state with the most likely record errors.
+class RecordErrorFit:
+    """Predictions near a state with the most likely record errors, to first order.
 
-    record         numbers of the record errors (k,) per run
-    squares        of the whitened residuals and of these numbers
-    left, steps    whitened residuals (kept,) per run before the record errors took these steps (k,) ...
-    slopes         ... along what they do (k, kept)
+    record           numbers of the record errors (k,) per run
+    squares          sum of squares of the whitened residuals and of these numbers
+    before, steps    whitened residuals (kept,) per run before the record errors took these steps (k,) ...
+    slopes           ... along their derivatives (k, kept)
     """
 
     record: list[Array]
     squares: float
-    left: list[Array]
+    before: list[Array]
     steps: list[Array]
     slopes: list[Array]
 
     @cached_property
     def residuals(self) -> list[Array]:
-        """Whitened (kept,) per run."""
-        return [white - step @ slopes for white, step, slopes in zip(self.left, self.steps, self.slopes, strict=True)]
+        """Whitened residuals (kept,) per run, with these record errors."""
+        return [white - step @ slopes for white, step, slopes in zip(self.before, self.steps, self.slopes, strict=True)]
 
 
 class LinearModel:
-    """A posterior beside a state.
+    """A posterior linearised at a state.
 
-    numbers      slopes by the car's numbers (p, n) per run, taken near the state; None: these stay where they are
+    numbers      derivatives by the car's numbers (p, n) per run, taken near the state; None: these are held fixed
     size         of the distance errors, by evidence
-    whiteners    by the levels under the state's residuals
-    expected     whiteners by levels that are expected; the size is the state's then: nothing was measured yet
+    whiteners    by the noise levels under the state's residuals
+    expected     whiteners by expected noise levels; the size is the state's then, as nothing was measured yet
     """
 
     def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None,
@@ -126,59 +128,60 @@ class LinearModel:
         for error, whitener, readings, prediction, residual, here in zip(
                 posterior.record_errors, self.whiteners, posterior.readings, state.predictions, residuals, state.record,
                 strict=True):
-            white = whitener(readings.without_deaf(error.slopes(prediction), prediction))
+            white = whitener(readings.without_insensitive_samples(error.slopes(prediction), prediction))
             self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
-        self.size = self._likeliest_size(state.size) if expected is None else state.size
+        self.size = self._most_likely_size(state.size) if expected is None else state.size
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
         self._precisions = [one.error.precision(self.size) for one in self._records]
         self._roots = [one.root(self.size) for one in self._records]
-        self._take(numbers)
+        self._set_number_slopes(numbers)
 
-    def _take(self, numbers: Sequence[Array] | None) -> None:
+    def _set_number_slopes(self, numbers: Sequence[Array] | None) -> None:
         self.numbers = numbers
         self.count = 0 if numbers is None else len(self.prior.names)
         self.white = [np.empty((0, one.white.shape[1])) for one in self._records] if numbers is None else (
             self.whitened(numbers))
-        self._taken = self.taken(self.white)
+        self._record_projections = self.record_projections(self.white)
 
-    def by(self, numbers: Sequence[Array] | None) -> LinearModel:
-        """The same with other slopes by the car's numbers (p, n) per run."""
+    def with_number_slopes(self, numbers: Sequence[Array] | None) -> LinearModel:
+        """The model with other derivatives by the car's numbers (p, n) per run."""
         found = copy(self)
-        found._take(numbers)
+        found._set_number_slopes(numbers)
         return found
 
-    def holding(self, names: Sequence[str]) -> LinearModel:
-        """The same with some of the car's numbers held where they are."""
+    def hold_fixed(self, names: Sequence[str]) -> LinearModel:
+        """The model with some of the car's numbers held fixed."""
         away = [self.prior.names.index(name) for name in names if name in self.prior.names]
         if not away or self.numbers is None:
             return self
         found = copy(self)
         found.numbers = [one.copy() for one in self.numbers]
         found.white = [one.copy() for one in self.white]
-        found._taken = [one.copy() for one in self._taken]
-        for number, white, taken in zip(found.numbers, found.white, found._taken, strict=True):
-            number[away], white[away], taken[:, away] = 0.0, 0.0, 0.0
+        found._record_projections = [one.copy() for one in self._record_projections]
+        for number, white, absorbed in zip(found.numbers, found.white, found._record_projections, strict=True):
+            number[away], white[away], absorbed[:, away] = 0.0, 0.0, 0.0
         return found
 
-    def without_wall(self) -> LinearModel:
-        """The same with a normal prior of the car's numbers, as far as they may go."""
+    def without_soft_bounds(self) -> LinearModel:
+        """The model with a normal prior of the car's numbers, however far they move."""
         found = copy(self)
-        found.prior = self.prior.without_wall()
+        found.prior = self.prior.without_soft_bounds()
         return found
 
-    def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
-        """By evidence, from a size or from one whose start and factor are ten times as large as usual: what these
-        explain, a walk explains as well, and there may be an optimum at either."""
+    def _most_likely_size(self, size: ErrorSize) -> ErrorSize:
+        """The size with the most evidence, searched for from a size and from one whose start and scale error are ten
+        times as large as usual: what these explain, a walk explains as well, and there may be an optimum at either."""
         walks: list[dict[float, _Walk]] = [{} for _ in self._records]
 
-        def lack(logs: Array) -> float:
+        def minus_twice_log_evidence(logs: Array) -> float:
             found = ErrorSize.of(logs)
-            return sum(one.lack(found, known) for one, known in zip(self._records, walks, strict=True)) + found.cost
+            return sum(one.minus_twice_log_evidence(found, known)
+                       for one, known in zip(self._records, walks, strict=True)) + found.cost
 
-        here, least = _descended(lack, size.logs)
+        here, least = _coordinate_descent(minus_twice_log_evidence, size.logs)
         trend = USUAL.logs + np.log([10.0, 1.0, 10.0])
-        if lack(trend) < least:
-            here, _ = _descended(lack, trend)
+        if minus_twice_log_evidence(trend) < least:
+            here, _ = _coordinate_descent(minus_twice_log_evidence, trend)
         return ErrorSize.of(here)
 
     @property
@@ -186,108 +189,116 @@ class LinearModel:
         """Minus twice the log of the model's evidence at its state, without its constant: Laplace's approximation for
         the record's errors, G. Schwarz's (Annals of Statistics 6, 1978) for the numbers of effects."""
         posterior, state = self.posterior, self.state
-        return (posterior.deviance(state) + posterior.cost(state) + self.occam
+        return (posterior.deviance(state) + posterior.cost(state) + self.occam_factor
                 + len(moves_of(state.effects)) * float(np.log(posterior.freedom)))
 
     @property
-    def occam(self) -> float:
-        """What the freedom of the record's errors costs in minus twice the log of the evidence."""
+    def occam_factor(self) -> float:
+        """Occam factor of the record's errors, in minus twice the log of the evidence."""
         return sum(_log_determinant(root) - one.error.log_determinant(self.size)
                    for root, one in zip(self._roots, self._records, strict=True))
 
-    def of_size(self, size: ErrorSize) -> LinearModel:
-        """The same with distance errors of another size."""
+    def with_size(self, size: ErrorSize) -> LinearModel:
+        """The model with distance errors of another size."""
         found = copy(self)
         found.size, found.state = size, replace(self.state, size=size)
         found._precisions = [one.error.precision(size) for one in self._records]
         found._roots = [one.root(size) for one in self._records]
-        found._taken = found.taken(found.white)
+        found._record_projections = found.record_projections(found.white)
         return found
 
-    def taken(self, white: Sequence[Array]) -> list[Array]:
-        """What the record's errors take of whitened columns (m, kept) per run: (k, m), to be multiplied with each
-        other."""
+    def record_projections(self, white: Sequence[Array]) -> list[Array]:
+        """Whitened columns (m, kept) per run projected on the record's errors: (k, m), whose products are what these
+        absorb of the products of the columns."""
         from scipy.linalg import solve_triangular
 
         return [solve_triangular(root, one.white @ columns.T, lower=True)
                 for root, one, columns in zip(self._roots, self._records, white, strict=True)]
 
     def whitened(self, columns: Sequence[Array]) -> list[Array]:
-        """Slopes in each run, (n,) or (m, n) to (..., kept)."""
-        return [whitener(one) for whitener, one in zip(self.whiteners, self.without_deaf(columns), strict=True)]
+        """Derivatives in each run, (n,) or (m, n) to (..., kept)."""
+        sensitive = self.without_insensitive_samples(columns)
+        return [whitener(one) for whitener, one in zip(self.whiteners, sensitive, strict=True)]
 
-    def without_deaf(self, columns: Sequence[Array]) -> list[Array]:
-        """Slopes in each run, (n,) or (m, n), zero where its readings would not change."""
-        return [readings.without_deaf(one, prediction) for readings, one, prediction in zip(
+    def without_insensitive_samples(self, columns: Sequence[Array]) -> list[Array]:
+        """Derivatives in each run, (n,) or (m, n), zero where its readings would not change."""
+        return [readings.without_insensitive_samples(one, prediction) for readings, one, prediction in zip(
             self.posterior.readings, columns, self._predictions, strict=True)]
 
-    def eliminated(self, predictions: Sequence[Array], laid: Sequence[Array] | None = None) -> Eliminated:
-        """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
-        return self.absorbed(self.posterior.left_by(predictions), self.state.record if laid is None else laid)
+    def fit_record_errors(self, predictions: Sequence[Array],
+                          record: Sequence[Array] | None = None) -> RecordErrorFit:
+        """The most likely record errors for predictions (n,) per run that were made with the record errors ``record``
+        (k,) per run; None: with the state's."""
+        return self.fit_record_errors_to(self.posterior.residuals_of(predictions),
+                                         self.state.record if record is None else record)
 
-    def absorbed(self, residuals: Sequence[Array], laid: Sequence[Array]) -> Eliminated:
-        """The same of what predictions leave (n,), per run, that were laid out with record errors (k,)."""
+    def fit_record_errors_to(self, residuals: Sequence[Array], record: Sequence[Array]) -> RecordErrorFit:
+        """The most likely record errors for residuals (n,) per run of such predictions."""
         from scipy.linalg import cho_solve
 
-        record, squares, whites, steps = [], 0.0, [], []
-        for left, whitener, root, precision, one, here in zip(
-                residuals, self.whiteners, self._roots, self._precisions, self._records, laid, strict=True):
-            white = whitener(left)
+        found, squares, whites, steps = [], 0.0, [], []
+        for residual, whitener, root, precision, one, here in zip(
+                residuals, self.whiteners, self._roots, self._precisions, self._records, record, strict=True):
+            white = whitener(residual)
             owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)
             whites.append(white)
             steps.append(step)
-            record.append(here + step)
+            found.append(here + step)
             squares += float(white @ white + here @ precision @ here - owed @ step)
-        return Eliminated(record, squares, whites, steps, [one.white for one in self._records])
+        return RecordErrorFit(found, squares, whites, steps, [one.white for one in self._records])
 
-    def objective(self, predictions: Sequence[Array], logs: Array, laid: Sequence[Array] | None = None) -> float:
-        """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""
-        return self.eliminated(predictions, laid).squares + self.prior.cost(logs)
+    def objective(self, predictions: Sequence[Array], logs: Array) -> float:
+        """Sum of squares of the whitened residuals and cost of the priors, with the most likely record errors."""
+        return self.fit_record_errors(predictions).squares + self.prior.cost(logs)
 
     def information(self, logs: Array, own: Sequence[Array] | None = None) -> Array:
-        """On the car's numbers and those of whitened columns (m, kept) per run: (p + m, p + m)."""
+        """Information on the car's numbers and on those of whitened columns (m, kept) per run: (p + m, p + m)."""
         p = self.count
-        found = sum(white @ white.T - taken.T @ taken for white, taken in zip(self.white, self._taken, strict=True))
+        found = sum(white @ white.T - absorbed.T @ absorbed
+                    for white, absorbed in zip(self.white, self._record_projections, strict=True))
         found = np.asarray(found) + (np.diag(self.prior.curvature(logs)) if p else 0.0)
         if own is None:
             return found
-        taken_by_own = self.taken(own)
-        mixed = sum((one @ white.T - mine.T @ taken for one, mine, white, taken in zip(
-            own, taken_by_own, self.white, self._taken, strict=True)), np.zeros((len(own[0]), p)))
-        alone = sum((one @ one.T - mine.T @ mine for one, mine in zip(own, taken_by_own, strict=True)),
+        own_projections = self.record_projections(own)
+        mixed = sum((one @ white.T - mine.T @ absorbed for one, mine, white, absorbed in zip(
+            own, own_projections, self.white, self._record_projections, strict=True)), np.zeros((len(own[0]), p)))
+        alone = sum((one @ one.T - mine.T @ mine for one, mine in zip(own, own_projections, strict=True)),
                     np.zeros((len(own[0]), len(own[0]))))
         return np.block([[found, mixed.T], [mixed, alone]])
 
     def gradient(self, residuals: Sequence[Array], logs: Array, own: Sequence[Array] | None = None) -> Array:
-        """Which way the same numbers fit better (p + m,), by whitened residuals (kept,) per run."""
+        """Half of the negative gradient of the objective by the same numbers (p + m,), by whitened residuals (kept,)
+        per run."""
         found = sum((white @ one for white, one in zip(self.white, residuals, strict=True)), np.zeros(self.count))
         found = found - (self.prior.gradient(logs) if self.count else 0.0)
         if own is None:
             return found
-        pulled = sum((columns @ one for columns, one in zip(own, residuals, strict=True)), np.zeros(len(own[0])))
-        return np.concatenate([found, pulled])
+        by_own = sum((columns @ one for columns, one in zip(own, residuals, strict=True)), np.zeros(len(own[0])))
+        return np.concatenate([found, by_own])
 
-    def mixed(self, own: Sequence[Array]) -> tuple[Array, float]:
-        """Products of one whitened column (kept,) per run with those of the car's numbers (p,), and with itself."""
+    def cross_products(self, own: Sequence[Array]) -> tuple[Array, float]:
+        """Products of one whitened column (kept,) per run with the columns of the car's numbers (p,), and with
+        itself."""
         columns = [one[None] for one in own]
-        taken = self.taken(columns)
+        own_projections = self.record_projections(columns)
         mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
-            self.white, self._taken, columns, taken, strict=True)), np.zeros(self.count))
-        return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, taken, strict=True))
+            self.white, self._record_projections, columns, own_projections, strict=True)), np.zeros(self.count))
+        return mixed, sum(float(one @ one) - float((mine**2).sum())
+                          for one, mine in zip(own, own_projections, strict=True))
 
 
-def _descended(lack: Callable[[Array], float], here: Array, step: float = 0.8,
+def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array, step: float = 0.8,
                least_step: float = 0.1) -> tuple[Array, float]:
-    """The least of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
-    least = lack(here)
+    """Minimum of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
+    least = minus_twice_log_evidence(here)
     while step > least_step:
         before = least
         for index in (1, 0, 2):
             for way in (step, -step):
                 there = here.copy()
                 there[index] += way
-                if (now := lack(there)) < least:
+                if (now := minus_twice_log_evidence(there)) < least:
                     here, least = there, now
                     break
         if least > before - 1.0:
@@ -296,5 +307,5 @@ def _descended(lack: Callable[[Array], float], here: Array, step: float = 0.8,
 
 
 def _log_determinant(root: Array) -> float:
-    """Of a matrix with this factor."""
+    """Log-determinant of a matrix with this Cholesky factor."""
     return 2 * float(np.log(np.diag(root)).sum())

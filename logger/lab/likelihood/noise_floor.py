@@ -1,10 +1,10 @@
-"""The noise of the sensors, which is not given, from the residuals of a model; and the error that it alone makes.
+"""The noise of the sensors, estimated from the residuals of a model; and the error that it alone makes.
 
-Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
-moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
-well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more, the
-quietest first. Where the highest frequencies are outside of the pass band, because somebody filtered the record, the
-quietest of the bands that are left begins. And what runs that repeat each other differ by is noise.
+Problem: an error means little without the noise floor, below which no model comes. Solution: at the highest frequencies
+a car moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter
+as well: then the quietest band that passes is noise. Every other band that is no louder is pooled with it, the quietest
+first. Where the highest frequencies are outside of the pass band, because somebody filtered the record, the quietest
+remaining band is the first. What runs that repeat each other differ by is noise as well.
 """
 
 from __future__ import annotations
@@ -16,29 +16,31 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.repeats import repeats_among
+from logger.lab.likelihood.repeats import find_repeats
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.runs import signal_errors
 
 Array = npt.NDArray[np.float64]
 
-# A band is louder than the noise from so many deviations of the difference on.
-_LOUDER = 2.5
+# A band is louder than the noise from so many standard deviations of the difference on: of 20 bands of noise one is by
+# chance in eight cases (normal distribution, one-sided).
+_LOUDER_SIGMA = 2.5
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
 # over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).
 _FILTERED = 0.75
-# Where no fit was made, bands that hold so large a share and are equally loud are flat noise if next to nothing of it
-# is left behind the filter: what a car leaves falls towards the highest of them, and the sensor's own noise is
-# still there.
-_FLAT, _DEAF = 0.22, 0.01
+# Without a fit, equally loud bands are noise if they hold this share of all degrees of freedom, and the highest
+# frequencies at most that share of their power, which the recorder's filter leaves: what a car leaves falls towards the
+# highest band, and the sensor's own noise does not pass through the filter (judgements).
+_FLAT_SHARE, _FILTERED_SHARE = 0.22, 0.01
 UNEXPLAINED = 0.10
-"""A residual above the noise by this share of it, or more, is unexplained."""
+"""A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's
+power."""
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The noise of the sensors: its deviation, and how certain that is [m/s2]."""
+    """The noise of the sensors: its standard deviation, and the standard error of that [m/s2]."""
 
     deviation_mps2: float
     standard_error_mps2: float
@@ -46,16 +48,16 @@ class Noise:
 
 @dataclass(frozen=True)
 class SignalErrors:
-    """Of one signal: normalised r.m.s. errors before and after, and the error that its noise makes."""
+    """Normalised r.m.s. errors of one signal before and after, and the error that its noise makes."""
 
     before: float
     after: float
     noise_floor: float
 
 
-def noise_of(posterior: Posterior, state: State) -> Noise:
+def sensor_noise_of(posterior: Posterior, state: State) -> Noise:
     """The noise of the sensor under the residuals of a fitted state, or the r.m.s. of several sensors'; without their
-    rounding where the readings' bounds are taken for what they say."""
+    rounding where readings are taken for bounds."""
     sensors = [one for one in _by_signal(posterior, state) if not one.name]
     each = [_noise_of(one) for one in sensors]
     weights = np.array([sum(map(len, one.residuals)) for one in sensors], float)
@@ -65,27 +67,28 @@ def noise_of(posterior: Posterior, state: State) -> Noise:
     return Noise(deviation, float(np.linalg.norm(parts)))
 
 
-def noise_as_read(posterior: Posterior, state: State) -> Noise:
-    """The same of readings as they were read: rounding adds a twelfth of the step's square to what the noise has."""
-    return noise_of(posterior.as_read(), state)
+def sensor_noise_with_rounding(posterior: Posterior, state: State) -> Noise:
+    """The noise with rounding, which adds a twelfth of the step's square to its variance."""
+    return sensor_noise_of(posterior.without_rounding(), state)
 
 
 def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[str, SignalErrors]:
-    """Errors of the signals beside the sensor's acceleration, by name, under one model and under another."""
+    """Errors of the other signals than the sensor's acceleration, by name, under one model and under another."""
     was, now = (signal_errors(posterior.runs.runs, one.predictions) for one in (before, after))
     return {one.name: SignalErrors(was[one.name], now[one.name], _noise_of(one).deviation_mps2 / one.size)
             for one in _by_signal(posterior, after) if one.name}
 
 
 def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
-    """What a state leaves of each signal and sensor."""
+    """Residuals of a state by signal and sensor."""
     return by_signal(posterior.readings, posterior.bands, posterior.residuals(state))
 
 
 def _noise_of(one: SignalResiduals) -> Noise:
+    """The noise of one signal; of a sensor no less than what repeated runs differ by."""
     scaled = [residual * np.sqrt(share) for residual, share in zip(one.residuals, one.shares, strict=True)]
     found = sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
-    repeats = None if one.name else repeats_among(one.runs)
+    repeats = None if one.name else find_repeats(one.runs)
     if repeats is None or repeats.deviation_mps2 <= found.deviation_mps2:
         return found
     return Noise(repeats.deviation_mps2, repeats.deviation_mps2 / float(np.sqrt(2 * repeats.freedom)))
@@ -94,10 +97,10 @@ def _noise_of(one: SignalResiduals) -> Noise:
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
     """The sensor's noise under residuals (n,), per run; no less than ``least_mps2``.
 
-    fitted    a fit left them, so that where little is left it is noise; else bands have to be as loud as each other to
-              be taken for noise that was filtered, and none but the highest frequencies tell of noise that was not
+    fitted    the residuals are a fit's, whose quietest bands are noise; else bands have to be equally loud to be taken
+              for noise that was filtered, and noise that was not filtered is read at the highest frequencies alone
     """
-    quiet = [one.quiet(residual) for one, residual in zip(bands, residuals, strict=True)]
+    quiet = [one.noise_band_power(residual) for one, residual in zip(bands, residuals, strict=True)]
     freedom = sum(n for _, n in quiet)
     power = sum(level * n for level, n in quiet) / freedom if freedom else 0.0
     powers = [one.power(residual) for one, residual in zip(bands, residuals, strict=True)]
@@ -107,25 +110,26 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
               / freedoms[place] for place in places]
     highest = (power, freedom) if freedom else (levels[-1], freedoms[-1])
     by_level = sorted(zip(levels, freedoms, strict=True))
-    louder = _LOUDER
+    louder = _LOUDER_SIGMA
     if power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
-        louder = (_LOUDER + 2.0) / np.sqrt(2)  # the quietest of twenty is two of its own below the others by chance
+        # The quietest of twenty is two of its own standard deviations below the others by chance.
+        louder = (_LOUDER_SIGMA + 2.0) / np.sqrt(2)
     for level, n in by_level:
         if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             break
-        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
+        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER_SIGMA
     # Below 30 Hz all bands are full of what the road does.
-    flat = freedom > _FLAT * sum(freedoms) and all(one.edges_hz[-1] > 30.0 for one in bands)
-    if not fitted and not (flat and highest[0] < _DEAF * power):
+    flat = freedom > _FLAT_SHARE * sum(freedoms) and all(one.edges_hz[-1] > 30.0 for one in bands)
+    if not fitted and not (flat and highest[0] < _FILTERED_SHARE * power):
         power, freedom = highest
     power = max(power, least_mps2**2)
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 
-def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
-    """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
-    least 0. Bands that are quiet make up for those that are not."""
+def gain_of_full_explanation(posterior: Posterior, state: State) -> float:
+    """By how much minus twice the log-likelihood would fall if the residuals were just small enough to count as
+    explained; at least 0. Bands that are quiet make up for those that are not."""
     found = 0.0
     for signal in _by_signal(posterior, state):
         noise = ((1 + UNEXPLAINED) * _noise_of(signal).deviation_mps2) ** 2
@@ -134,10 +138,10 @@ def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
     return max(0.0, found)
 
 
-def excess(posterior: Posterior, state: State, chance: float) -> float:
-    """By what share the residual is above the noise, and above what two right simulations differ by, in the run and of
-    the signal where it is most. A run so short that noise alone may do the same with this probability counts only as
-    far as asks for no explanation."""
+def excess_over_noise(posterior: Posterior, state: State, chance: float) -> float:
+    """Share by which the residual is above the noise and the discrepancy of two right simulations, of the run and the
+    signal where it is largest. A run so short that noise alone may do the same with this probability counts no higher
+    than ``UNEXPLAINED``."""
     from scipy.special import gammainccinv
 
     signals = _by_signal(posterior, state)
@@ -154,7 +158,7 @@ def excess(posterior: Posterior, state: State, chance: float) -> float:
 
 
 def floor_error(posterior: Posterior, noise: Noise) -> float:
-    """rms(noise) / rms(measured) over all samples that count, both in the pass band."""
+    """Noise floor: rms(noise) / rms(measured) over all samples that count, both in the pass band."""
     runs = posterior.runs.runs
     share = np.average([one.share_passed for one in runs], weights=[one.count - one.first for one in runs])
     return float(noise.deviation_mps2 * np.sqrt(share) / posterior.size_mps2)

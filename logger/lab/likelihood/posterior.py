@@ -1,4 +1,4 @@
-"""The posterior of a car with effects, given runs: predictions, and what each state of it costs."""
+"""The posterior of a car with effects, given runs: predictions, residuals, likelihood and priors."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.clocked_record import record_error
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
-from logger.lab.likelihood.signals import bands_of
-from logger.lab.likelihood.whittle import deviance
+from logger.lab.likelihood.signals import bands_of, deviance
 from logger.runs import normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
@@ -27,13 +25,13 @@ Predict = Callable[[Sequence[Chosen], Array, Sequence[Array]], list[Array]]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A model with all its numbers, and what it predicts.
+    """A model with all its numbers, and its predictions.
 
     effects       with their values
-    logs          (p,) logarithms of the car's numbers over the nominal ones
-    record        (k,) per run, numbers of its ``RecordError``
+    logs          logarithms of the car's numbers over the nominal ones (p,)
+    record        numbers of the ``RecordError`` of each run (k,)
     size          of the distance errors
-    predictions   (n,) per run, whole, the record's error included [m/s2]; other signals are joined to it
+    predictions   of each run, whole, the record's error included (n,) [m/s2]; other signals are joined to it
     """
 
     effects: tuple[Chosen, ...]
@@ -44,24 +42,25 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the effects, in order."""
+        """Names of the effects, in order."""
         return tuple(one.effect.name for one in self.effects)
 
 
 class Posterior:
-    """SimulatedRuns, a nominal vehicle, and priors of what may be a little off.
+    """Runs, a nominal vehicle, and priors of its numbers and of the runs' records.
 
-    stands    the vehicle as it stands, where fits begin, if that is another than the nominal one
-    prior     of the vehicle's numbers; None: that of the tolerance
-    readings  what predictions are compared with, per run; None: the readings as they were read
+    start_vehicle    where fits begin, if not at the nominal vehicle
+    prior            of the vehicle's numbers; None: that of the tolerance
+    readings         what predictions are compared with, per run; None: readings with their rounding taken as noise
 
     size_mps2 is the r.m.s. of what was measured, by which errors are divided.
     """
 
-    def __init__(self, runs: SimulatedRuns, vehicle: Vehicle, tolerance: Tolerance, stands: Vehicle | None = None,
-                 prior: VehiclePrior | None = None, readings: Sequence[Readings] | None = None) -> None:
+    def __init__(self, runs: SimulatedRuns, vehicle: Vehicle, tolerance: Tolerance,
+                 start_vehicle: Vehicle | None = None, prior: VehiclePrior | None = None,
+                 readings: Sequence[Readings] | None = None) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
-        self.stands = stands or vehicle
+        self.start_vehicle = start_vehicle or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)
         self.record_errors = [record_error(run, tolerance) for run in runs.runs]
         self.bands = [bands_of(run) for run in runs.runs]
@@ -70,43 +69,45 @@ class Posterior:
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
 
-    def without_wall(self, fine: bool = False) -> Posterior:
-        """The same with a car that may bend as far as the runs ask; simulated as finely as what is reported is, or as
-        now."""
+    def without_soft_bounds(self, fine: bool = False) -> Posterior:
+        """The posterior with a normal prior of the car's numbers, however far the runs move them; ``fine``: simulated
+        as finely as what is reported."""
         runs = SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)) if fine else self.runs
-        return Posterior(runs, self.vehicle, self.tolerance, self.stands, self.prior.without_wall(), self.readings)
+        return Posterior(runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior.without_soft_bounds(),
+                         self.readings)
 
-    def beside(self, state: State) -> Posterior:
-        """The same with rounded readings that say what they do beside this state; itself where none do."""
-        readings = [one.beside(prediction) for one, prediction in zip(self.readings, state.predictions, strict=True)]
-        if all(one.as_read for one in (*readings, *self.readings)):
+    def with_rounding_at(self, state: State) -> Posterior:
+        """The posterior with rounded readings taken for bounds, given the predictions of a state; itself where rounding
+        is noise in all of them."""
+        readings = [one.given(prediction) for one, prediction in zip(self.readings, state.predictions, strict=True)]
+        if all(one.rounding_is_noise for one in (*readings, *self.readings)):
             return self
-        return Posterior(self.runs, self.vehicle, self.tolerance, self.stands, self.prior, readings)
+        return Posterior(self.runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior, readings)
 
-    def as_read(self) -> Posterior:
-        """The same with rounding taken as noise."""
-        if all(one.as_read for one in self.readings):
+    def without_rounding(self) -> Posterior:
+        """The posterior with all rounding taken as noise."""
+        if all(one.rounding_is_noise for one in self.readings):
             return self
-        return Posterior(self.runs, self.vehicle, self.tolerance, self.stands, self.prior)
+        return Posterior(self.runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
-    def moved_m(self, record: Sequence[Array]) -> list[Array]:
-        """By how much the car was farther than its distance signal said (n,), per run."""
-        return [one.moved_m(k) for one, k in zip(self.record_errors, record, strict=True)]
+    def distance_error_m(self, record: Sequence[Array]) -> list[Array]:
+        """Distance driven minus distance recorded (n,) [m], per run."""
+        return [one.distance_error_m(k) for one, k in zip(self.record_errors, record, strict=True)]
 
     def predict(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array],
                 rough: bool = False) -> list[Array]:
-        """What would have been recorded in each run (n,)."""
-        predictions = self.runs.predict(self.car(effects, logs), self.moved_m(record), rough)
-        return [one.recorded(prediction, k) for one, prediction, k in zip(
+        """Predicted record of each run (n,)."""
+        predictions = self.runs.predict(self.car(effects, logs), self.distance_error_m(record), rough)
+        return [one.with_recorder_error(prediction, k) for one, prediction, k in zip(
             self.record_errors, predictions, record, strict=True)]
 
     def predictor(self, state: State) -> Predict:
-        """Predictions of models that are not far from one: as rough ones are, and as much off these as a fine one of
-        that model is, which is made if the state has none."""
+        """A function that predicts models near a state: by rough simulations, corrected by the difference of a fine and
+        a rough one of the state itself."""
         given = state.effects, state.logs, state.record
         if not self.car(state.effects, state.logs).rubs:
             return self.predict
@@ -118,26 +119,26 @@ class Posterior:
 
         return predict
 
-    def at(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array] | None = None,
+    def state_at(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array] | None = None,
            size: ErrorSize = USUAL) -> State:
-        """A state; ``record`` None: on the distances as they were recorded."""
+        """The state with these numbers; ``record`` None: exact records."""
         found = [np.zeros(one.count) for one in self.record_errors] if record is None else list(record)
         return State(tuple(effects), logs, found, size, self.predict(effects, logs, found))
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
-        """The car as it stands."""
-        return self.at(effects, self.prior.logs(self.vehicle, self.stands))
+        """The state of the vehicle that fits begin at, with these effects."""
+        return self.state_at(effects, self.prior.logs(self.vehicle, self.start_vehicle))
 
     def residuals(self, state: State) -> list[Array]:
         """Measured minus predicted (n,), per run."""
-        return self.left_by(state.predictions)
+        return self.residuals_of(state.predictions)
 
-    def left_by(self, predictions: Sequence[Array]) -> list[Array]:
-        """What predictions (n,) per run leave of the readings."""
-        return [one.left_by(prediction) for one, prediction in zip(self.readings, predictions, strict=True)]
+    def residuals_of(self, predictions: Sequence[Array]) -> list[Array]:
+        """Readings minus predictions (n,), per run."""
+        return [one.residual(prediction) for one, prediction in zip(self.readings, predictions, strict=True)]
 
     def deviance(self, state: State) -> float:
-        """Minus twice the log-likelihood, its levels the most likely ones."""
+        """Minus twice the log-likelihood, with the most likely noise levels."""
         return deviance(self.bands, self.residuals(state))
 
     def cost(self, state: State) -> float:
@@ -150,15 +151,23 @@ class Posterior:
         return normalised_rms_error(self.runs.runs, state.predictions)
 
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
-        """What the car's numbers do to the predictions: (p, n) per run, by differences over steps (p,). They are known
-        well enough by a rough simulation."""
-        found = [np.empty((len(steps), run.joined_count)) for run in self.runs.runs]
-        moved = self.moved_m(state.record)
-        here = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
-        for index, step in enumerate(steps):
-            logs = state.logs.copy()
-            logs[index] += step
-            there = self.runs.predict(self.car(state.effects, logs), moved, rough=True)
-            for column, high, low in zip(found, there, here, strict=True):
-                column[index] = (high - low) / step
-        return found
+        """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, by differences over
+        steps (p,) of rough simulations, which are near enough."""
+        error_m = self.distance_error_m(state.record)
+
+        def predict(logs: Array) -> list[Array]:
+            return self.runs.predict(self.car(state.effects, logs), error_m, rough=True)
+
+        return derivatives(predict, state.logs, steps, predict(state.logs))
+
+
+def derivatives(predict: Callable[[Array], Sequence[Array]], here: Array, steps: Array,
+                predictions: Sequence[Array]) -> list[Array]:
+    """Derivatives (m, n) per run of predictions (n,) by numbers (m,), by differences over steps (m,)."""
+    found = [np.empty((len(steps), len(one))) for one in predictions]
+    for index, step in enumerate(steps):
+        there = here.copy()
+        there[index] += step
+        for column, high, low in zip(found, predict(there), predictions, strict=True):
+            column[index] = (high - low) / step
+    return found

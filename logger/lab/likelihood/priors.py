@@ -1,9 +1,9 @@
-"""Priors of what is never quite as the files say, although no physics is missing.
+"""Priors of the nuisance parameters: what is never quite as the files say, although no physics is missing.
 
 Problem: nominal masses and rates are a few per cent off, a distance signal errs, and no recorder passes all frequencies
-quite alike; a lab that does not grant this takes every small mistake for an effect, and one that grants too much lets
-mistakes swallow effects. Solution: all of them are nuisance parameters with priors. A number of the car has a normal
-prior, with a wall beyond two standard deviations: a car that may bend as it likes makes up for effects that it lacks.
+quite alike; a lab that allows for none of this takes every small mistake for an effect, and one that allows for too
+much lets mistakes absorb effects. Solution: all of them are nuisance parameters with priors. A number of the car has a
+normal prior with soft bounds at two standard deviations: a car whose numbers are free imitates effects that it lacks.
 """
 
 from __future__ import annotations
@@ -18,12 +18,20 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_WALL_FROM, _WALL_WEIGHT = 2.0, 100.0
+_SOFT_BOUND_SIGMA, _SOFT_BOUND_WEIGHT = 2.0, 100.0
+"""Beyond so many standard deviations a number costs the fourth power of what it is beyond, so many times, besides: half
+a deviation beyond costs 6, one costs 100 (a judgement: 95 % of right numbers lie within)."""
+UNUSUAL_SIGMA = 3.0
+"""More standard deviations of its prior are unusual of a nuisance parameter: of a dozen right numbers one goes as far
+in thirty comparisons (normal distribution)."""
+CONFLICT_SIGMA = 4.0
+"""A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
+as far in 1300 comparisons (normal distribution)."""
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far off things usually are: standard deviations.
+    """Standard deviations of the priors.
 
     numbers      of masses, inertias, springs and dampers, as a share (a band of 4 % either way has 2.3 %)
     lengths      of places on the car, as a share
@@ -40,61 +48,62 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class VehiclePrior:
-    """Prior of a vehicle's numbers: their names, and (p,) standard deviations of their logarithms and steps to take
-    slopes over.
+    """Prior of a vehicle's numbers: their names, and (p,) standard deviations and difference steps of their logarithms.
 
-    wall    a number that is off by more than two deviations costs more and more
+    soft_bounds    whether a number more than two standard deviations off costs more than by a normal distribution
     """
 
     names: tuple[str, ...]
     deviations: Array
     steps: Array
-    wall: bool = True
+    soft_bounds: bool = True
 
     @staticmethod
     def of(vehicle: Vehicle, tolerance: Tolerance) -> VehiclePrior:
-        """What may be a little off in this vehicle."""
+        """The prior of a vehicle's numbers."""
         names = sized(vehicle)
         lengths = np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
-        # Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
+        # A step of a length, by which waves come late, has to be much smaller.
         return VehiclePrior(names, np.where(lengths, tolerance.lengths, tolerance.numbers),
                             np.where(lengths, 1e-4, 0.002))
 
-    def without_wall(self) -> VehiclePrior:
-        """The same, normal all the way: it shows how far a car has to bend."""
-        return replace(self, wall=False)
+    def without_soft_bounds(self) -> VehiclePrior:
+        """The normal prior alone, which shows how far the runs move a number."""
+        return replace(self, soft_bounds=False)
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""
         squares = float(((logs / self.deviations) ** 2).sum())
-        return squares + (_WALL_WEIGHT * float((self._beyond(logs) ** 4).sum()) if self.wall else 0.0)
+        return squares + (_SOFT_BOUND_WEIGHT * float((self._beyond(logs) ** 4).sum()) if self.soft_bounds else 0.0)
 
     def gradient(self, logs: Array) -> Array:
         """Half of the cost's first derivative (p,)."""
-        wall = 2 * _WALL_WEIGHT * self._beyond(logs) ** 3 * np.sign(logs) / self.deviations if self.wall else 0.0
-        return np.asarray(logs / self.deviations**2 + wall)
+        bounds = 2 * _SOFT_BOUND_WEIGHT * self._beyond(logs) ** 3 * np.sign(logs) / self.deviations
+        return np.asarray(logs / self.deviations**2 + (bounds if self.soft_bounds else 0.0))
 
     def curvature(self, logs: Array) -> Array:
         """Half of the cost's second derivative (p,)."""
-        wall = 6 * _WALL_WEIGHT * self._beyond(logs) ** 2 / self.deviations**2 if self.wall else 0.0
-        return np.asarray(self.deviations**-2.0 + wall)
+        bounds = 6 * _SOFT_BOUND_WEIGHT * self._beyond(logs) ** 2 / self.deviations**2 if self.soft_bounds else 0.0
+        return np.asarray(self.deviations**-2.0 + bounds)
 
-    def at_the_wall(self, logs: Array) -> bool:
-        """Whether the wall holds on to one of these numbers (p,), which would else be farther off."""
-        return self.wall and bool(self._beyond(logs).any())
+    def at_soft_bounds(self, logs: Array) -> bool:
+        """Whether one of these numbers (p,) is beyond its soft bounds, which hold it back."""
+        return self.soft_bounds and bool(self._beyond(logs).any())
 
-    def within_wall(self, logs: Array) -> Array:
-        """The nearest numbers (p,) that the wall does not hold."""
-        return np.clip(logs, -_WALL_FROM * self.deviations, _WALL_FROM * self.deviations) if self.wall else logs
+    def clip_to_soft_bounds(self, logs: Array) -> Array:
+        """The nearest numbers (p,) within the soft bounds."""
+        ends = _SOFT_BOUND_SIGMA * self.deviations
+        return np.clip(logs, -ends, ends) if self.soft_bounds else logs
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
-        """The vehicle with its numbers moved by these logarithms (p,)."""
+        """The vehicle with its numbers times the exponentials of these logarithms (p,)."""
         return changed(vehicle, {name: read(vehicle, name) * float(np.exp(log))
                                  for name, log in zip(self.names, logs, strict=True)})
 
     def logs(self, vehicle: Vehicle, other: Vehicle) -> Array:
-        """The reverse: logarithms (p,) of another vehicle's numbers over those of this one."""
+        """Logarithms (p,) of another vehicle's numbers over those of this one."""
         return np.log([read(other, name) / read(vehicle, name) for name in self.names])
 
     def _beyond(self, logs: Array) -> Array:
-        return np.maximum(np.abs(logs / self.deviations) - _WALL_FROM, 0.0)
+        """Standard deviations beyond the soft bounds (p,)."""
+        return np.maximum(np.abs(logs / self.deviations) - _SOFT_BOUND_SIGMA, 0.0)

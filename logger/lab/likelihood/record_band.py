@@ -1,33 +1,33 @@
-"""Up to which frequency a record is to be believed: whether somebody has low-passed it, and where.
+"""The pass band of a record: whether somebody has low-passed it, and at which frequency.
 
 Problem: the lab takes a record for what the recorder's own filter left, flat to 0.38 of its rate. A phone's app, a
 logger or an engineer may have filtered it once more. Then nothing is left above the cut-off, neither the car nor the
 sensor's noise; a model that has both there seems to be wrong, and some effect imitates the loss.
 
-Solution: the spectrum that was measured is laid beside four things that it is made of,
+Solution: the measured spectrum is fitted by a sum of four parts,
 
     S(f) = B(f) (c M(f) + N) + n,    B(f) = 1 / (1 + x^(2 m)),    x = tan(pi f / rate) / tan(pi cutoff / rate)
 
 M the spectrum that the model predicts, c a gain, N white noise that went through the filter, n white noise that was
 added behind it (no more than the quietest band of the record holds), and B Butterworth's low-pass as it is computed
 on samples (S. Butterworth 1930; A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2). Spectra know
-neither phases nor places: distances that are off by metres do not matter here. Whether B = 1 does as well is then
-asked of the sizes of log S(f): an effect that the model lacks bends a spectrum by some dB, here up, there down, and
-no B makes that good; a filter takes away tens of dB, and with the right B next to nothing is left. Nor may a sensor
-on a bracket (``sensor_mount_resonance``) together with a longer contact patch (``tire_enveloping``) do as well.
+neither phases nor places: distances that are off by metres do not matter here. The misfit is the mean absolute
+difference of log S(f), with a filter and with B = 1: an effect that the model lacks bends a spectrum by some dB, here
+up, there down, and no B compensates that; a filter takes away tens of dB, and with the right B the misfit is next to
+nothing. Nor may a sensor on a bracket (``sensor_mount_resonance``) together with a longer contact patch
+(``tire_enveloping``) fit as well.
 
 What is a filter, and what a slow sensor? No part of a car or of a sensor falls faster than with the fourth power of
 the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); a rubber mount or a tire's contact
 patch fall less, or come back. So a B of order m = 3 or more is somebody's filter: above it nothing is compared. One
-of lower order is left to the effects: its delay tells whether it is a sensor's.
+of lower order is left to the effects: its delay shows whether it is a sensor's.
 
-Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the
-phase of a causal one is off a straight line by half a radian and more. In short windows, each laid on the model as it
-fits best, the mean cross-spectrum tells which of both phases goes better with it, whatever constant delay there is
-besides. Where a filter takes away 5 % of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of
-one that was run forth and back x^m. What a causal filter does below that, a delay that grows towards the cut-off, is
-``sensor_bandwidth`` of the order that was found; one without delay leaves nothing there that the lab does not grant
-any recorder (``Tolerance.droop``).
+Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the phase
+of a causal one is off a straight line by half a radian and more. Over short windows, each aligned with the model, the
+mean cross-spectrum is compared with both phases, whatever constant delay there is besides. Where a filter takes away 5
+% of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of one that was run forth and back x^m.
+What a causal filter does below that, a delay that grows towards the cut-off, is ``sensor_bandwidth`` of the order that
+was found; what one without delay does there is within the tolerance of any recorder (``Tolerance.droop``).
 """
 
 from __future__ import annotations
@@ -51,31 +51,38 @@ Complex = npt.NDArray[np.complex128]
 # Of the loudest power: below that, a spectrum by Hann's windows shows rounding and what leaks from louder frequencies
 # (by Hann's window 110 dB, 60 of its lines away).
 _LEAST_POWER = 1e-9
+# Bands of log S: so wide, from the body's bounce on. Wide enough for four lines of a block each, narrow enough for six
+# of them below 10 Hz, where the gain is estimated.
 _WIDTH_HZ, _LOWEST_HZ = 1.5, 1.0
-# Cut-offs, orders, gains and shares of the spectrum that may be noise: finer ones change a cut-off by less than 2 %.
+# The grid of filters: logarithmic step and lowest of the cut-offs, and the highest as a share of the rate. A finer one
+# changes a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
+# Orders: of usual filters, up to one of order 8 that was run forth and back.
 _ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
+# The grid of effects that imitate a filter: frequencies and damping ratios of a sensor on a spring, from the lowest
+# that cuts off within the band to twice the highest ...
 _RINGS_AT_HZ, _RINGS_WITH = np.geomspace(8.0, 80.0, 45), np.geomspace(0.02, 0.7, 9)
+# ... and first zeros of a contact patch, which averages over its length: 12 Hz is 0.4 m at 5 m/s.
 _NULLS_HZ = np.append(np.inf, np.geomspace(12.0, 120.0, 14))
+# The grid of the spectrum itself: gains around the median ratio, and how many levels of noise up to the median
+# spectrum.
 _GAINS, _NOISES = np.array([0.4, 0.7, 1.0, 1.4, 2.0]), 8
 STEEPEST_EFFECT = 2.5
-"""A filter of a higher order than this is none that a car or a sensor has."""
-# Mean size of what is left of log S, without a filter: so many times as much as with it, and so many dB more. Measured
-# on 221 unfiltered runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the
-# factor is 3 at most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
+"""A filter of a higher order is none that a car or a sensor has (``sensor_bandwidth`` has order 2 at most)."""
+# Misfit of log S without a filter: so many times as much as with it, and so many dB more. Measured on 221 unfiltered
+# runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the factor is 3 at
+# most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
 _BETTER, _BETTER_DB = 3.5, 1.0
-# A sensor that rides on a spring, over tires that are longer than the model's, may fall as steeply for a while. They do
-# as well as a filter or better where they are the truth (their sizes are 0.2 to 0.87 of a filter's), and a filter does
-# as well or better where it is (0.97 to 20, the least of them with noise behind it); of a run alone they do worse, up
-# to 1.4.
+# A sensor on a spring, over tires that are longer than the model's, may fall as steeply for a while. Measured: their
+# misfit is 0.2 to 0.87 of a filter's where they are the truth, and 0.97 to 20 of it where a filter is (the least with
+# noise added behind the filter); of a run alone up to 1.4 where they are the truth.
 _NO_WORSE = 0.9
-# One filter for all runs has cut-offs that are so alike in each (their logarithms), and leaves of none more than
-# without it, but for a rounding.
-_ALIKE, _SAME = 0.1, 0.02
-_LOSS = 0.05
-_HIGHEST_ORDER = 8
-_REACH = 1.2  # times the cut-off, up to where phases are read
-_DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
+# A run is consistent with the filter of another one if a cut-off within so much of its logarithm (orders within twice
+# that) misfits by no more than without a filter, to a rounding of log S.
+_SAME_CUTOFF, _SAME_MISFIT = 0.1, 0.02
+_LOSS = 0.05  # of the amplitude, at which the pass band ends (a judgement)
+_PHASES_UP_TO = 1.2  # times the cut-off: above, a filter of order 4 leaves less than half of the amplitude
+_DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # a filter of order 8 at 6 Hz delays by 0.14 s; a step is 5 degrees at 30 Hz
 LEAST_WIDTH_HZ = 3.0
 """A narrower band holds the body's bounce at most, and no model of a car can be distinguished from another."""
 
@@ -85,44 +92,45 @@ def is_steep(seen: LowPass) -> bool:
     return seen.order > STEEPEST_EFFECT
 
 
-def whole_below_hz(seen: LowPass, rate_hz: float) -> float:
-    """Where a filter begins to take something away, at so many samples a second [Hz]."""
+def pass_band_end_hz(seen: LowPass, rate_hz: float) -> float:
+    """Frequency up to which a filter leaves 95 % of the amplitude or more, at this sample rate [Hz]."""
     power = 1 / (2 * seen.order) if seen.causal else 1 / seen.order
     loss = (1 - _LOSS) ** -2 - 1 if seen.causal else _LOSS
     return float(rate_hz / np.pi * np.arctan(loss**power * np.tan(np.pi * seen.cutoff_hz / rate_hz)))
 
 
-def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[LowPass | None]:
-    """The filter that each run went through; None: none. Runs of one recorder share theirs, so that one for all is
-    asked for first, and then one of each alone; a run that tells nothing has that of another which it goes with.
+def detect_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[LowPass | None]:
+    """The low-pass that each run went through; None: none. Runs of one recorder share theirs, so that one for all is
+    searched for first, and then one of each alone; a run that shows none has that of another with which it is
+    consistent.
 
-    predictions    (n,) per run, of a model that is about right; where the runs lie does not matter
+    predictions    (n,) per run, of a model that is about right; distance errors do not matter
     """
     fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
-    common = _seen(fits, runs[0].rate_hz, common=True)
-    if common is not None and all(_goes_with(one, common, runs[0].rate_hz) for one in fits):
+    common = _detect_low_pass(fits, runs[0].rate_hz, common=True)
+    if common is not None and all(_is_consistent(one, common, runs[0].rate_hz) for one in fits):
         common = replace(common, causal=_is_causal(runs, predictions, common))
         return [common] * len(fits)
-    each = [_seen([one], runs[0].rate_hz, common=len(fits) == 1) for one in fits]
+    each = [_detect_low_pass([one], runs[0].rate_hz, common=len(fits) == 1) for one in fits]
     found = [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
              for one, run, prediction in zip(each, runs, predictions, strict=True)]
     steep = [one for one in found if one is not None and is_steep(one)]
-    return [one or next((other for other in steep if _goes_with(fit, other, runs[0].rate_hz)), None)
+    return [one or next((other for other in steep if _is_consistent(fit, other, runs[0].rate_hz)), None)
             for one, fit in zip(found, fits, strict=True)]
 
 
 def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_hz: float | None = None) -> list[Run]:
-    """The runs as they are compared: of each what lies in its pass band. That ends where its facts say, where a filter
-    was found, and at ``low_pass_hz``.
+    """The runs filtered to their pass bands, which end where their facts say, where a low-pass was detected, and at
+    ``low_pass_hz``.
 
     ValueError where nothing is left.
     """
     found = []
-    for run, seen, prediction in zip(runs, seen_low_passes(runs, predictions), predictions, strict=True):
+    for run, seen, prediction in zip(runs, detect_low_passes(runs, predictions), predictions, strict=True):
         low_hz, high_hz = run.pass_band_hz
         if low_pass_hz is not None:
             high_hz = min(high_hz, low_pass_hz)
-        if seen is not None and is_steep(seen) and (ends_hz := whole_below_hz(seen, run.rate_hz)) < high_hz:
+        if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
             high_hz, seen = ends_hz, replace(seen, ends_band=True)
         if high_hz - low_hz < LEAST_WIDTH_HZ:
             raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
@@ -130,8 +138,8 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
         cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
         there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
                         usable=run.usable if cut is None else _without_its_end(run))
-        left = run.left_by(prediction)
-        outside = float(np.sqrt(np.mean((left - there.in_band(left))[run.first:] ** 2)))
+        residual = run.residual(prediction)
+        outside = float(np.sqrt(np.mean((residual - there.in_band(residual))[run.first:] ** 2)))
         found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2), outside_mps2=outside))
     return found
 
@@ -146,7 +154,7 @@ def _without_its_end(run: Run) -> Array:
 
 @dataclass(frozen=True)
 class ComparedBand:
-    """What of some runs is compared.
+    """The band in which some runs are compared.
 
     low_hz, high_hz    the lowest and the highest frequency, of the run that has least
     cutoff_hz          of the filter that ends the band there; None: it was asked for, or is the record's by its facts
@@ -160,7 +168,7 @@ class ComparedBand:
 
 
 def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
-    """That of runs that know their pass bands; None where all of each is compared."""
+    """The band in which runs are compared; None where all of each is."""
     cut = [run for run in runs if run.facts.pass_band_hz is not None]
     if not cut:
         return None
@@ -171,21 +179,21 @@ def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
                         0 < len(filtered) < len(runs))
 
 
-def _seen(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None:
-    """A filter that some runs went through; ``common``: all that one recorder wrote."""
+def _detect_low_pass(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None:
+    """The low-pass that some runs went through; None: none. ``common``: they are all the runs of one recorder."""
     plain = sum(one.plain * one.size for one in fits)
     table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
     place = np.unravel_index(int(table.argmin()), table.shape)
-    size, left = sum(one.size for one in fits), float(table[place])
-    if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * left:
+    size, misfit = sum(one.size for one in fits), float(table[place])
+    if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * misfit:
         return None
-    if plain < _BETTER * left or 10 / np.log(10) * (plain - left) < _BETTER_DB * size:
+    if plain < _BETTER * misfit or 10 / np.log(10) * (plain - misfit) < _BETTER_DB * size:
         return None
     return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
 
 
 def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass) -> bool:
-    """Whether the phase of the measurement against the model is that of a causal filter rather than a straight line."""
+    """Whether the phase of the measurement relative to the model is a causal filter's rather than a straight line."""
     rate_hz = runs[0].rate_hz
     f_hz = np.fft.rfftfreq(_window(rate_hz), 1 / rate_hz)
     cross, own, other = np.zeros(len(f_hz), complex), np.zeros(len(f_hz)), np.zeros(len(f_hz))
@@ -193,26 +201,27 @@ def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass)
         for model, measured in _windows(run, prediction, seen.cutoff_hz):
             cross += model.conj() * measured
             own, other = own + np.abs(model) ** 2, other + np.abs(measured) ** 2
-    like = np.divide(np.abs(cross) ** 2, own * other, out=np.zeros(len(f_hz)), where=own * other > 0)
-    inside = (f_hz > _LOWEST_HZ) & (f_hz < _REACH * seen.cutoff_hz)
-    turned = (like * np.exp(1j * np.angle(cross)))[inside]
+    coherence = np.divide(np.abs(cross) ** 2, own * other, out=np.zeros(len(f_hz)), where=own * other > 0)
+    inside = (f_hz > _LOWEST_HZ) & (f_hz < _PHASES_UP_TO * seen.cutoff_hz)
+    turned = (coherence * np.exp(1j * np.angle(cross)))[inside]
     delays = np.exp(2j * np.pi * f_hz[inside] * _DELAYS_S[:, None])
 
-    def goes_with(filtered: Complex) -> float:
+    def phase_match(filtered: Complex) -> float:
         return float((delays @ (turned * filtered.conj() / np.abs(filtered))).real.max())
 
     s = np.asarray(2j * np.pi * f_hz[inside], complex)
-    if seen.order > _HIGHEST_ORDER + 1:
+    highest = round(_ORDERS[-1]) // 2  # the steepest that was run forth and back has the order of both ways
+    if seen.order > highest + 1:
         return False
     least = round(STEEPEST_EFFECT) + 1 if is_steep(seen) else 1
-    orders = range(max(least, round(seen.order) - 1), min(round(seen.order) + 1, _HIGHEST_ORDER) + 1)
-    causal = max(goes_with(butterworth(order, s, seen.cutoff_hz, sampled)) for order in orders
+    orders = range(max(least, round(seen.order) - 1), min(round(seen.order) + 1, highest) + 1)
+    causal = max(phase_match(butterworth(order, s, seen.cutoff_hz, sampled)) for order in orders
                  for sampled in (0.0, rate_hz))
-    return causal > goes_with(np.ones_like(s))
+    return causal > phase_match(np.ones_like(s))
 
 
 def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Complex, Complex]]:
-    """Spectra of the model and of the measurement in windows, the model laid where it fits best."""
+    """Spectra of the model and of the measurement in windows, the model shifted by the lag there."""
     found = lags([run], [in_band(prediction, run.rate_hz, 0.0, cutoff_hz)])
     size = _window(run.rate_hz)
     taper = np.hanning(size + 1)[:-1]
@@ -228,21 +237,21 @@ def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Co
 
 
 def _window(rate_hz: float) -> int:
-    """Samples in a window in which phases are read."""
+    """Samples in a window in which phases are estimated."""
     return round(WINDOW_S * rate_hz)
 
 
-def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
-    """Whether a run looks no worse with a filter, of about this cut-off and order, than without."""
-    near = np.abs(np.log(_cutoffs_hz(rate_hz) / seen.cutoff_hz)) < _ALIKE
-    alike = np.abs(np.log(_ORDERS / seen.order)) < 2 * _ALIKE
-    return bool(fits.filtered[np.ix_(near, alike)].min() <= fits.plain + _SAME)
+def _is_consistent(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
+    """Whether a run fits no worse with a filter of about this cut-off and order than without."""
+    near = np.abs(np.log(_cutoffs_hz(rate_hz) / seen.cutoff_hz)) < _SAME_CUTOFF
+    as_steep = np.abs(np.log(_ORDERS / seen.order)) < 2 * _SAME_CUTOFF
+    return bool(fits.filtered[np.ix_(near, as_steep)].min() <= fits.plain + _SAME_MISFIT)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """Mean sizes of what is left of log S of a run, of the bands in which there is something: without a filter, with
-    the best of what sensors and tires do in place of one, and with each (cut-offs, orders); samples."""
+    """Misfits of log S of a run, in the bands that hold anything: without a filter, with the best of the effects that
+    imitate one, and with each filter (cut-offs, orders); and how many samples the run has."""
 
     plain: float
     by_effects: float
@@ -251,27 +260,29 @@ class _Fits:
 
 
 def _fits(run: Run, prediction: Array) -> _Fits:
-    (measured, silent), (model, still) = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
-    telling = ~(silent & still)
+    """Misfits of a run's spectrum."""
+    (measured, nothing_measured), (model, nothing_predicted) = (
+        _spectrum(run, one) for one in (run.measured_mps2, prediction))
+    used = ~(nothing_measured & nothing_predicted)
     middles = np.asarray(_LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5), float)
     behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
     gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
-    through = np.append(0.0, np.geomspace(behind, np.median(measured[telling]), _NOISES))
+    through = np.append(0.0, np.geomspace(behind, np.median(measured[used]), _NOISES))
     made = (gains[:, None, None] * model + through[:, None]).reshape(-1, len(model))
     target = np.log(measured)
 
-    def left(power: Array) -> Array:
-        return np.asarray(np.abs(np.log(power + behind) - target).sum(axis=-1).min(axis=-1) / telling.sum())
+    def misfit(power: Array) -> Array:
+        return np.asarray(np.abs(np.log(power + behind) - target).sum(axis=-1).min(axis=-1) / used.sum())
 
     x = np.tan(np.pi * middles / run.rate_hz) / np.tan(np.pi * _cutoffs_hz(run.rate_hz)[:, None] / run.rate_hz)
-    tables = [left(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
-    by_effects = min(float(left(made * one).min()) for one in _effects_alone(middles))
-    return _Fits(float(left(made)), by_effects, np.stack(tables, axis=1), run.count - run.first)
+    tables = [misfit(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
+    by_effects = min(float(misfit(made * one).min()) for one in _effects_alone(middles))
+    return _Fits(float(misfit(made)), by_effects, np.stack(tables, axis=1), run.count - run.first)
 
 
 def _effects_alone(f_hz: Array) -> Iterator[Array]:
-    """What sensors and cars make of a record, in power, at frequencies (b,): (n, 1, b) at a time. A sensor that rides
-    on a spring or not, on tires of which each contact length takes out one wavelength, or none."""
+    """Power gains (n, 1, b) at frequencies (b,) of the effects that imitate a filter, some at a time: a sensor on a
+    spring or not, on tires whose contact patch averages over its length or not."""
     ratio = f_hz / _RINGS_AT_HZ[:, None, None]
     tires = np.sinc(f_hz / _NULLS_HZ[:, None, None]) ** 2
     for damping in 2 * _RINGS_WITH[:, None, None, None] * ratio:
@@ -281,11 +292,12 @@ def _effects_alone(f_hz: Array) -> Iterator[Array]:
 
 
 def _cutoffs_hz(rate_hz: float) -> Array:
+    """Cut-offs of the grid at this sample rate [Hz]."""
     return np.asarray(np.exp(np.arange(np.log(_LEAST_HZ), np.log(_MOST_OF_RATE * rate_hz), _CUTOFF_STEP)))
 
 
 def _spectrum(run: Run, samples: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Mean powers in bands of one width (b,), by Welch's method [m2/s4], and in which of them there is nothing."""
+    """Mean powers in bands of one width (b,), by Welch's method [m2/s4], and which of them hold nothing."""
     kept = samples[run.first:]
     size = min(round(BLOCK_S * run.rate_hz), len(kept))
     taper = np.hanning(size + 1)[:-1]

@@ -1,9 +1,9 @@
 """Several measured signals of one run, each with its own noise.
 
 Problem: a travel sensor and an accelerometer on a wheel have other units and other noise than the sensor on the body,
-and where the car was is the same for all of them. Solution: signals are joined, one after the other; each has bands of
-its own (``whittle``), so that its level is free, and what is whitened is joined again. All that is done with whitened
-columns, the elimination of the distance error above all, does not ask how many signals there were.
+and one distance error for all of them. Solution: signals are joined, one after the other; each has bands of its own
+(``whittle``), so that its level is free, and whitened signals are joined again. Whatever works on whitened columns, the
+elimination of the distance error above all, need not know how many signals there were.
 """
 
 from __future__ import annotations
@@ -28,8 +28,13 @@ def bands_of(run: Run) -> Bands | JointBands:
     return JointBands([Bands(run), *(Bands(run, index) for index in range(len(run.signals)))])
 
 
+def deviance(bands: Sequence[Bands | JointBands], residuals: Sequence[Array]) -> float:
+    """Minus twice the log-likelihood of residuals (n,) of several runs, without its constant."""
+    return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))
+
+
 class JointBands:
-    """The bands of several signals of one run, as ``Bands`` of the signals joined."""
+    """The bands (b,) of several signals of one run. Methods as of ``Bands``, of the signals joined."""
 
     def __init__(self, each: Sequence[Bands]) -> None:
         self.each = list(each)
@@ -41,46 +46,40 @@ class JointBands:
         return np.split(joined, len(self.each), axis=-1)
 
     def power(self, residual: Array) -> Array:
-        """As ``Bands``, of all bands (b,)."""
         return np.concatenate([one.power(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
     def levels(self, residual: Array) -> Array:
-        """As ``Bands``."""
         return np.maximum(self.power(residual), self.floor)
 
     def deviance(self, residual: Array) -> float:
-        """As ``Bands``."""
         return sum(one.deviance(part) for one, part in zip(self.each, self.parts(residual), strict=True))
 
     def whitener(self, residual: Array) -> JointWhitener:
-        """As ``Bands``."""
         return JointWhitener([one.whitener(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
 class JointWhitener:
-    """Weighs each band of each signal of one run by its level."""
+    """Whitens several signals of one run. Methods as of ``Whitener``, of the signals joined."""
 
     each: list[Whitener]
 
     def __call__(self, samples: Array) -> Array:
-        """As ``Whitener``, of signals that are joined."""
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
 
     def in_time(self, samples: Array) -> Array:
-        """As ``Whitener``, of signals that are joined."""
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one.in_time(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class SignalResiduals:
-    """What a model leaves of one signal in the runs that have it, or of the acceleration of one sensor: runs whose
-    readings have other steps or another range are of another.
+    """Residuals of one signal in the runs that have it, or of the acceleration of one sensor; runs whose readings have
+    other steps or another range are of another sensor.
 
     name         of the signal; empty: the sensor's acceleration
-    runs, bands, residuals (n,), shares    the last as of ``Readings``
+    runs, bands, residuals (n,), shares    of each run; the last as of ``Readings``
     size         r.m.s. of what was measured in all
     """
 

@@ -1,4 +1,4 @@
-"""How certain the numbers of a fitted model are: standard errors from the information matrix.
+"""Standard errors of the numbers of a fitted model, from the information matrix.
 
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
@@ -26,19 +26,19 @@ Array = npt.NDArray[np.float64]
 def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
 
-    Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
+    Both include the priors: a number that the runs say nothing of is as uncertain as before.
     """
-    linear, state = found.without_wall(), found.state
+    linear, state = found.without_soft_bounds(), found.state
     covariance = _covariance(linear)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return (with_errors(state.effects, moves_of(state.effects), deviations[linear.count:]),
+    return (with_standard_errors(state.effects, moves_of(state.effects), deviations[linear.count:]),
             deviations[: linear.count])
 
 
 def number_errors(found: LinearModel) -> NumberErrors:
-    """How far the numbers of the car and of its effects may be off together, in their own units; as
+    """Standard errors and correlations of the numbers of the car and of its effects, in their own units; as
     ``standard_errors``."""
-    linear, state = found.without_wall(), found.state
+    linear, state = found.without_soft_bounds(), found.state
     prior, moves = linear.posterior.prior, moves_of(state.effects)
     vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
     names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
@@ -51,24 +51,24 @@ def number_errors(found: LinearModel) -> NumberErrors:
 
 
 def _covariance(linear: LinearModel) -> Array:
-    """Of the logarithms of the car's numbers, then of those of the effects on their scales; infinite where nothing is
-    known."""
+    """Covariance of the logarithms of the car's numbers, then of the effects' numbers on their scales; infinite where
+    nothing is known."""
     state = linear.state
-    linear, slopes = _without_size(linear, own_slopes(linear))
+    linear, slopes = _without_common_scale(linear, own_slopes(linear))
     information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    seen = size > 0
-    scale = np.where(seen, size, 1.0)
+    known = size > 0
+    scale = np.where(known, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    return np.asarray(np.where(np.outer(seen, seen), inverse / np.outer(scale, scale),
-                               np.diag(np.where(seen, 0.0, np.inf))))
+    return np.asarray(np.where(np.outer(known, known), inverse / np.outer(scale, scale),
+                               np.diag(np.where(known, 0.0, np.inf))))
 
 
-def _without_size(linear: LinearModel, own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
-    """The slopes by the car's numbers and by those of its effects (m, n), per run, without what all masses and forces
-    would do together: a car in which they are larger by one factor moves alike. Differences of what sticks and slips
-    are too jagged to show that, and would tell the size of a car that only its prior tells. A user's own effects may
-    have units that nobody knows."""
+def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
+    """The derivatives by the car's numbers and by those of its effects (m, n), per run, without a common scale of all
+    masses and forces: a car in which they are larger by one factor moves the same. Differences of dry friction, which
+    sticks and slips, are too jagged to show that, and would seem to measure a size that only the prior knows. A user's
+    own effects may have units that nobody knows."""
     state, prior, numbers = linear.state, linear.prior, linear.numbers
     if numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
             state.effects, state.logs).rubs:
@@ -79,17 +79,17 @@ def _without_size(linear: LinearModel, own: list[Array] | None) -> tuple[LinearM
         parameter = one.effect.parameters[move.parameter]
         value = one.values[parameter.name]
         step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
-    larger = np.array(step)
-    share = np.divide(1.0, larger, out=np.zeros_like(larger), where=larger != 0) / np.count_nonzero(larger)
-    freed = [one - share[:, None] * (larger @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
+    scaling = np.array(step)
+    share = np.divide(1.0, scaling, out=np.zeros_like(scaling), where=scaling != 0) / np.count_nonzero(scaling)
+    freed = [one - share[:, None] * (scaling @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
     p = linear.count
-    return linear.by([one[:p] for one in freed]), [one[p:] for one in freed]
+    return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
-def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,
+def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,
                 share: float = 1e-4) -> tuple[Chosen, ...]:
-    """The effects with standard errors, of which those of the numbers that moved are given on their scales (m,);
-    scales are straight over such a share of a number."""
+    """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
+    linear over such a share of a number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]

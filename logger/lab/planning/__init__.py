@@ -1,2 +1,2 @@
-"""What drives would show before anybody drives them: which effects stand out, which can be distinguished, and which
-drive would add most."""
+"""Experiment design: which effects drives would detect and distinguish before anybody drives, and which drive would add
+most."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from logger.lab.planning.planned_drive import CarThere, PlannedDrive, SensorNoise, again, at_speed
+from logger.lab.planning.planned_drive import PlannedCar, PlannedDrive, SensorNoise, at_speed, repeat_run
 from logger.profiles.track import Track
 from logger.runs import Run, Signal
 from logger.simulation.virtual_drive import Obstacle, with_obstacles
@@ -29,7 +29,7 @@ _PLANK = {"height_m": 0.03, "length_m": 0.3}
 
 @dataclass(frozen=True)
 class Option:
-    """A drive that may come next; ``speed_mps`` None: the same excitation again."""
+    """A drive that may come next; ``speed_mps`` None: the same excitation repeated."""
 
     seconds: float
     speed_mps: float | None
@@ -39,23 +39,23 @@ class Option:
 
 @dataclass(frozen=True, eq=False)
 class OptionDrive:
-    """A drive on which some options are looked at, each with which of its signals."""
+    """A drive with several options, each with the indices of its signals."""
 
     drive: PlannedDrive
     options: tuple[tuple[Option, tuple[int, ...]], ...]
 
 
-def option_drives(there: CarThere, noise: SensorNoise, road: Track | None, known: Sequence[Run]
+def option_drives(there: PlannedCar, noise: SensorNoise, road: Track | None, known: Sequence[Run]
                   ) -> Iterator[OptionDrive]:
-    """All of them. Where no ``road`` is known only second sensors are tried, on a rig as it was driven.
+    """All next drives. Where no ``road`` is known only second sensors are tried, on a rig as it was driven.
 
-    known    the drives that there are; sensors are tried on one like that of middle speed
+    known    existing drives; sensors are tried on one like that of median speed
     """
     there_already = {(signal.measures, signal.of) for run in known for signal in run.signals}
     signals = [one for one in second_sensors(there.nominal) if (one.measures, one.of) not in there_already]
     usual = sorted(known, key=lambda run: float(run.speed_mps.mean()))[len(known) // 2]
     if road is None:
-        drive = PlannedDrive(again(usual, signals, MOST_S), there, noise)
+        drive = PlannedDrive(repeat_run(usual, signals, MOST_S), there, noise)
         yield _with_signals(drive, None, signals, drive.run.count / drive.run.rate_hz)
         return
     usual_mps = float(usual.speed_mps.mean())
@@ -73,7 +73,7 @@ def option_drives(there: CarThere, noise: SensorNoise, road: Track | None, known
 
 
 def second_sensors(vehicle: Vehicle) -> list[Signal]:
-    """That a vehicle of this model may have."""
+    """Second sensors that a vehicle of this model may have."""
     sides = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "rear_left")}[len(structure_of(vehicle).wheels)]
     found = [Signal(f"wheel_{side}_mps2", "acceleration", f"{side}_wheel") for side in sides]
     found += [Signal(f"travel_{side}_m", "travel", f"{side}_suspension") for side in sides]
@@ -89,9 +89,9 @@ def _with_signals(drive: PlannedDrive, speed: float | None, signals: Sequence[Si
                                         for index, one in enumerate(signals))))
 
 
-def _possible(there: CarThere, noise: SensorNoise, road: Track, speed_mps: float,
+def _possible(there: PlannedCar, noise: SensorNoise, road: Track, speed_mps: float,
               signals: Sequence[Signal]) -> PlannedDrive | None:
-    """The drive, if the road is long enough and nobody is thrown about."""
+    """The drive, if the road is long enough and the body stays below one g; else None."""
     if (road.end_m - road.start_m) / speed_mps < _LEAST_S:
         return None
     drive = PlannedDrive(at_speed("next", road, there.nominal, speed_mps, signals, MOST_S), there, noise)
@@ -103,6 +103,6 @@ def _seconds(drive: PlannedDrive) -> float:
 
 
 def _cut(road: Track, length_m: float) -> Track:
-    """The beginning of a road, an obstacle's width longer than what is driven."""
+    """The beginning of a road: what is driven, and two samples more."""
     count = min(len(road.elevation_m), int(length_m / road.spacing_m) + 2)
     return Track(road.spacing_m, road.elevation_m[:count], road.start_m)

@@ -1,9 +1,9 @@
-"""Which effects drives could show and distinguish, and which drive would add most: before anybody drives.
+"""A plan: which effects drives could detect and distinguish, and which next drive would add most.
 
-Problem: a search that finds nothing may have had drives that show nothing, and one that names two effects that no drive
-of these distinguishes has named none. Solution: the information that each drive would give of each effect is computed
-as a search uses it (``planned_drive``, ``outlook``); that of one more drive is added, and drives are ranked by how many
-more effects could be named.
+Problem: a search that finds nothing may have had drives that show nothing, and one that names two effects that these
+drives cannot distinguish has named none. Solution: the information of each drive on each effect is computed as a search
+uses it (``planned_drive``, ``outlook``); that of one more drive is added, and drives are ranked by how many more
+effects a search would name.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
-from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.map_fit import fit_model
+from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
 from logger.lab.planning.outlook import (
@@ -28,12 +28,12 @@ from logger.lab.planning.outlook import (
     EffectGrid,
     Indices,
     Outlook,
-    likeliest_sizes,
+    most_likely_sizes,
     outlook,
     representatives,
 )
-from logger.lab.planning.planned_drive import SIZES, CarThere, Information, PlannedDrive, SensorNoise, information
-from logger.lab.planning.refit import DrivesThere, refitted_gain
+from logger.lab.planning.planned_drive import SIZES, Information, PlannedCar, PlannedDrive, SensorNoise, information
+from logger.lab.planning.refit import LinearisedDrives, refitted_gain
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -42,19 +42,18 @@ from logger.vehicle.effect import Chosen, Effect
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
-_AS_SLOPES_SAY = 3.0
-"""An effect that stands out by fewer deviations moves nothing farther than its slopes hold."""
-_WORTH_TELLING = 1.0
-"""Deviations that are gained: fewer are within what noise does to a search."""
+_LINEAR_SIGMA = 3.0
+"""Below this detectability a refit without the effect is linear."""
+_LEAST_GAIN_SIGMA = 1.0
+"""A smaller gain of isolability is within the noise of a search, which has unit variance."""
 
 
 @dataclass(frozen=True, eq=False)
 class NextDrive:
     """What one more drive would add.
 
-    gains         deviations by which effects would be more distinguishable from what is most like them: first those
-                  that it makes likelier to be named, then those that it helps most for their size
-    more_named    how many more effects a search would name, were each of them there alone
+    gains         of isolability, by effect: first those that it makes likelier to be named, then the relatively largest
+    more_named    how many more effects a search would name, were each the only one
     """
 
     option: Option
@@ -69,10 +68,10 @@ class Plan:
     drives       names and seconds of the runs and the planned drives
     noise        of the accelerometers; ``measured``: whether it is that of the runs
     names        of the effects (e,)
-    effects      (e,) the values that each is looked at with
+    effects      with the values that each is tried with (e,)
     now          what the drives could show of them
-    obstacles    effects that cannot be there, and why
-    next         drives that may come next, those that gain most first
+    obstacles    effects that cannot be present, and why
+    next         drives that may come next, the largest gain first
     """
 
     drives: tuple[tuple[str, float], ...]
@@ -86,18 +85,19 @@ class Plan:
 
     @property
     def groups(self) -> list[tuple[str, ...]]:
-        """Effects that would stand out, and cannot be distinguished from each other."""
-        seen = self.now.detectability >= DETECTABLE_SIGMA
-        alike = (np.minimum(self.now.pairwise, self.now.pairwise.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
+        """Effects that are detectable, and cannot be distinguished from each other."""
+        detectable = self.now.detectability >= DETECTABLE_SIGMA
+        confused = np.minimum(self.now.pairwise, self.now.pairwise.T) < ISOLABLE_SIGMA
+        confused &= detectable & detectable[:, None]
         found: list[set[int]] = []
-        for index in np.flatnonzero(seen):
-            near = {int(index), *map(int, np.flatnonzero(alike[index]))}
+        for index in np.flatnonzero(detectable):
+            near = {int(index), *map(int, np.flatnonzero(confused[index]))}
             joined = [one for one in found if one & near]
             found = [one for one in found if not one & near] + [near.union(*joined)]
         return [tuple(self.names[one] for one in sorted(some)) for some in found if len(some) > 1]
 
 
-def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
+def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
          progress: Progress = lambda words: None, workers: int = 2) -> Plan:
     """What runs and planned drives could show of ``effects``.
@@ -112,9 +112,9 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     fitted, measured = None, noise is None and runs is not None
     if runs is not None:
         progress("refitting the car's own numbers")
-        fitted = read_beside(fit(aligned(runs, runs.start(there.effects))))
+        fitted = fit_model(runs, runs.start(there.effects))
         there = replace(there, logs=fitted.state.logs)
-        noise = noise or SensorNoise(noise_of(fitted.posterior, fitted.state).deviation_mps2)
+        noise = noise or SensorNoise(sensor_noise_of(fitted.posterior, fitted.state).deviation_mps2)
     noise = noise or usual_noise
     drives = [PlannedDrive(one, there, noise) for one in planned]
     posteriors = [*([fitted.posterior] if fitted is not None else []), *(one.posterior for one in drives)]
@@ -122,26 +122,26 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     settings = EffectGrid.of([one for name, one in effects.items() if name not in obstacles])
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
-        asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
-        parts: list[_Shown] = []
+        analysis = _Analysis(settings, posteriors[0].prior.without_soft_bounds().curvature(there.logs), pool)
+        parts: list[_DriveSet] = []
         if fitted is not None:
             progress("what the runs show")
-            parts.append(asked.of_runs(fitted))
+            parts.append(analysis.of_runs(fitted))
         for number, drive in enumerate(drives, 1):
             progress(f"what planned drive {number} of {len(drives)} would show")
-            parts.append(asked.of_drive(drive))
+            parts.append(analysis.of_drive(drive))
         total = reduce(add, (one.information for one in parts))
-        columns = representatives(settings, total, asked.precision)
-        now = outlook(settings, total, asked.precision, columns)
+        columns = representatives(settings, total, analysis.precision)
+        now = outlook(settings, total, analysis.precision, columns)
         progress("what a refit would leave of each effect")
-        refitted = asked.refitted(parts, total, columns, now)
+        refitted = analysis.refitted(parts, total, columns, now)
         following: list[NextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
-            changes = asked.changes(one.drive)
+            changes = analysis.changes(one.drive)
             for option, signals in one.options:
                 after = total + one.drive.information(changes, signals)
-                following.append(_next(option, settings, now, outlook(settings, after, asked.precision, columns)))
+                following.append(_next(option, settings, now, outlook(settings, after, analysis.precision, columns)))
     return Plan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
         tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), refitted,
@@ -150,36 +150,36 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
-    """What some drives show: beside which models, and what the effects do there, (m, n) per run."""
+class _DriveSet:
+    """Some drives: their linear models, the changes by the effects (m, n) per run, and the information."""
 
-    there: DrivesThere
+    there: LinearisedDrives
     changes: list[Array]
     information: Information
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
-    """What is asked of each drive: effects at some values; ``precision`` (p,) of the prior of the car's numbers."""
+class _Analysis:
+    """The analysis of drives: effects at some values; ``precision`` (p,) of the prior of the car's numbers."""
 
     settings: EffectGrid
     precision: Array
     pool: ThreadPoolExecutor
 
     def changes(self, drive: PlannedDrive) -> Array:
-        """What the effects do to a planned record (m, (1 + s) n)."""
+        """Changes of a planned record by the effects (m, (1 + s) n)."""
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
-    def of_drive(self, drive: PlannedDrive) -> _Shown:
-        """What a planned drive shows, recorded by its sensor alone."""
+    def of_drive(self, drive: PlannedDrive) -> _DriveSet:
+        """A planned drive, recorded by its sensor alone."""
         linear, changes = drive.model(), self.changes(drive)
         levels = [np.concatenate(drive.levels(run, bands)) for run, bands in zip(
             linear.posterior.runs.runs, linear.posterior.bands, strict=True)]
-        return _Shown(DrivesThere(linear.without_wall(), levels, linear.state.predictions), [changes],
-                      information(linear, [changes]))
+        return _DriveSet(LinearisedDrives(linear.without_soft_bounds(), levels, linear.state.predictions), [changes],
+                         information(linear, [changes]))
 
-    def of_runs(self, fitted: LinearModel) -> _Shown:
-        """What runs show about additions to a fitted model."""
+    def of_runs(self, fitted: LinearModel) -> _DriveSet:
+        """Runs of a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
         here = predict(state.effects)
@@ -188,26 +188,28 @@ class _Asked:
             [new - old for new, old in zip(one, here, strict=True)] for one in there), strict=True)]
         levels = [bands.levels(residual) for bands, residual in zip(
             posterior.bands, posterior.residuals(state), strict=True)]
-        return _Shown(DrivesThere(fitted.without_wall(), levels, here), changes, information(fitted, changes))
+        drives = LinearisedDrives(fitted.without_soft_bounds(), levels, here)
+        return _DriveSet(drives, changes, information(fitted, changes))
 
-    def refitted(self, parts: Sequence[_Shown], total: Information, columns: Indices, now: Outlook) -> Outlook:
-        """What the drives show where the car without each effect is refitted to what it does."""
-        which, costs = likeliest_sizes(total, self.precision, columns)
-        of_size = {size: [one.there.of_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
+    def refitted(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:
+        """The outlook with detectabilities by a refit of the car without each effect."""
+        which, costs = most_likely_sizes(total, self.precision, columns)
+        with_size = {size: [one.there.with_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
 
         def deviations(index: int) -> float:
             first_order = float(now.detectability[index])
-            if first_order < _AS_SLOPES_SAY:
+            if first_order < _LINEAR_SIGMA:
                 return first_order
             changes = [[one[columns[index]] for one in part.changes] for part in parts]
-            gain = refitted_gain(of_size[int(which[index])], changes, self.precision) + costs[index]
+            gain = refitted_gain(with_size[int(which[index])], changes, self.precision) + costs[index]
             return float(np.sqrt(max(gain, 0.0)))
 
-        return now.standing_out(np.array(list(self.pool.map(deviations, range(len(columns))))))
+        return now.scaled_to(np.array(list(self.pool.map(deviations, range(len(columns))))))
 
 
 def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:
+    """What an option adds, by the outlooks without and with it."""
     gained, likelier = then.isolability - now.isolability, then.chances - now.chances
     order = np.lexsort((now.isolability / np.maximum(then.isolability, 1.0), -likelier.round(2)))
-    gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _WORTH_TELLING}
+    gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _LEAST_GAIN_SIGMA}
     return NextDrive(option, gains, float(likelier.sum()))

@@ -1,8 +1,8 @@
-"""A drive that nobody has driven yet, as the lab would read it: what a right model predicts, and the noise to come.
+"""A planned drive: the record that a right model predicts, and the noise that is expected.
 
-Problem: a likelihood takes its levels and the sizes of distance errors from residuals, and a planned drive has none.
-Solution: its record is the prediction itself (an Asimov data set: G. Cowan et al., European Physical Journal C 71,
-2011), its levels are those of the sensors' noise, its distance errs as a good recorder's does.
+Problem: a likelihood estimates its levels and the sizes of distance errors from residuals, and a planned drive has
+none. Solution: its record is the prediction itself (an Asimov data set: G. Cowan et al., European Physical Journal C
+71, 2011), its levels are those of the sensors' noise, and its distance error is a good recorder's.
 """
 
 from __future__ import annotations
@@ -33,45 +33,45 @@ Array = npt.NDArray[np.float64]
 
 RATE_HZ = 100.0
 SEARCH_HZ = 500.0
-"""Steps a second of a search, which are enough for what an effect changes."""
+"""Simulation steps a second, which are enough for the change by an effect."""
 SIGNAL_NOISE = {"travel": 0.0005, "pitch_rate": 0.001, "roll_rate": 0.001}
 """R.m.s. noise of a second sensor that is no accelerometer: a string or rotary potentiometer of 0.25 m with a linearity
 of 0.2 %; a MEMS gyroscope's 0.05 deg/s (InvenSense, MPU-6000 product specification, 6.1) [m, rad/s]."""
 
 SIZES = ((1.0, 1.0, 1.0), (4.0, 1.0, 1.0), (16.0, 1.0, 1.0), (64.0, 1.0, 1.0), (1.0, 4.0, 1.0), (1.0, 16.0, 1.0),
          (1.0, 1.0, 6.0), (1.0, 1.0, 36.0))
-"""Distance errors as many times as large as expected (start, walk, factor) that a fit may find likeliest instead, up to
-those that a delay of some hundredths of a second or a wheel radius that is wrong by a per cent looks like."""
+"""Factors of the expected distance errors (start, walk, scale) that a fit may find most likely instead, up to those
+that a delay of some hundredths of a second or a wheel radius that is wrong by a per cent is taken for."""
 
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Of the accelerometers to be: r.m.s. noise, and the step that they round to [m/s2]; 0: none."""
+    """Noise of the accelerometers: r.m.s., and the step that they round to [m/s2]; 0: none."""
 
     noise_mps2: float
     step_mps2: float = 0.0
 
     @property
     def variance(self) -> float:
-        """Of a reading, rounding taken as noise [m2/s4]."""
+        """Variance of a reading, rounding taken as noise [m2/s4]."""
         return self.noise_mps2**2 + self.step_mps2**2 / 12
 
     def variance_of(self, signal: Signal | None) -> float:
-        """Of a reading of a signal, or of the sensor (None), in the square of its unit."""
+        """Variance of a reading of a signal, or of the sensor (None), in the square of its unit."""
         known = SIGNAL_NOISE.get(signal.measures) if signal is not None else None
         return self.variance if known is None else known**2
 
 
 @dataclass(frozen=True)
-class CarThere:
-    """The car that is to be driven.
+class PlannedCar:
+    """The car of planned drives.
 
-    nominal, stands    as of ``Posterior``
-    effects, logs      those it has, and (p,) logarithms of its numbers over the nominal ones
+    nominal, start_vehicle    as of ``Posterior``
+    effects, logs             those it has, and (p,) logarithms of its numbers over the nominal ones
     """
 
     nominal: Vehicle
-    stands: Vehicle
+    start_vehicle: Vehicle
     tolerance: Tolerance
     effects: tuple[Chosen, ...]
     logs: Array
@@ -79,16 +79,16 @@ class CarThere:
 
 def at_speed(name: str, track: Track, vehicle: Vehicle, speed_mps: float, signals: Sequence[Signal] = (),
              most_s: float = np.inf) -> Run:
-    """A drive along a track from its start, at one speed; its record is empty still. ValueError where it is too short
-    to be a run, or too long to be simulated."""
+    """A drive along a track from its start, at one speed, with an empty record. ValueError where it is too short to be
+    a run, or too long to be simulated."""
     behind_m = float(structure_of(vehicle).behind_m.max())
     times, speeds = at_one_speed(track, behind_m, speed_mps)
     motion = motion_along(np.minimum(times, most_s), speeds, track.start_m, RATE_HZ)
     return _empty(name, track, motion.distance_m, motion.speed_mps, signals)
 
 
-def again(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
-    """The beginning of a run once more, with other signals."""
+def repeat_run(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
+    """The beginning of a run repeated, with other signals and an empty record."""
     count = min(run.count, int(most_s * run.rate_hz))
     return replace(_empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals),
                    rate_hz=run.rate_hz)
@@ -100,13 +100,12 @@ def _empty(name: str, track: Track | Excitation, distance_m: Array, speed_mps: A
 
 
 class PlannedDrive:
-    """A car on a drive to be.
+    """A car on a planned drive.
 
-    run        with the prediction for its record, all its signals in it
-    numbers    what the car's numbers do to it (p, (1 + s) n)
+    run    with the prediction as its record, with all its signals
     """
 
-    def __init__(self, run: Run, there: CarThere, noise: SensorNoise) -> None:
+    def __init__(self, run: Run, there: PlannedCar, noise: SensorNoise) -> None:
         self._there, self._noise = there, noise
         empty = self._posterior_of(run)
         self._here = empty.predict(there.effects, there.logs, self._no_errors(empty), rough=True)[0]
@@ -116,7 +115,7 @@ class PlannedDrive:
 
     def _posterior_of(self, run: Run) -> Posterior:
         there = self._there
-        return Posterior(SimulatedRuns([run], fine_hz=SEARCH_HZ), there.nominal, there.tolerance, there.stands)
+        return Posterior(SimulatedRuns([run], fine_hz=SEARCH_HZ), there.nominal, there.tolerance, there.start_vehicle)
 
     @staticmethod
     def _no_errors(posterior: Posterior) -> list[Array]:
@@ -128,27 +127,27 @@ class PlannedDrive:
 
     @cached_property
     def numbers(self) -> Array:
-        """By differences, as of ``Posterior.number_slopes``."""
+        """Derivatives of the record by the car's numbers (p, (1 + s) n), as ``Posterior.number_slopes``."""
         state = self._state_of(self.posterior, self._here)
         return self.posterior.number_slopes(state, self.posterior.prior.steps)[0]
 
     def change(self, one: Chosen) -> Array:
-        """What an effect at its values does to the record ((1 + s) n,)."""
+        """Change of the record by an effect at its values ((1 + s) n,)."""
         there = self._there
         after = self.posterior.predict((*there.effects, one), there.logs, self._no_errors(self.posterior), rough=True)
         return after[0] - self._here
 
     @property
     def most_mps2(self) -> float:
-        """The greatest acceleration that the sensor feels."""
+        """The largest acceleration of the sensor."""
         return float(np.abs(self.run.measured_mps2).max())
 
     def information(self, changes: Array, signals: Sequence[int]) -> Information:
-        """Of effects' changes (m, (1 + s) n), recorded by the sensor and some of the signals alone."""
+        """Information on effects' changes (m, (1 + s) n) by the sensor and some of the signals alone."""
         return information(self.model(signals), [self._of_kept(changes, signals)])
 
     def model(self, signals: Sequence[int] = ()) -> LinearModel:
-        """Beside its prediction, as recorded by the sensor and some of the signals."""
+        """The posterior linearised at the prediction, with the sensor and some of the signals."""
         run = self.run
         chosen_signals = tuple(run.signals[one] for one in signals)
         fewer = replace(run, facts=replace(run.facts, signals=chosen_signals), more=run.more[list(signals)])
@@ -158,7 +157,7 @@ class PlannedDrive:
         return LinearModel(posterior, state, [self._of_kept(self.numbers, signals)], expected)
 
     def levels(self, run: Run, bands: Bands | JointBands) -> list[Array]:
-        """Of the noise to come, in each band (b,), of the sensor and of each signal of a run."""
+        """Expected noise levels in each band (b,), of the sensor and of each signal of a run."""
         each = bands.each if isinstance(bands, JointBands) else [bands]
         return [np.maximum(self._noise.variance_of(signal), one.floor)
                 for one, signal in zip(each, (None, *run.signals), strict=True)]
@@ -169,7 +168,7 @@ class PlannedDrive:
         return np.asarray(parts.reshape(*columns.shape[:-1], -1))
 
     def _whitener(self, run: Run, bands: Bands | JointBands) -> Whitener | JointWhitener:
-        """By the noise to come."""
+        """The whitening filter for the expected noise."""
         each = bands.each if isinstance(bands, JointBands) else [bands]
         found = [Whitener(one, levels) for one, levels in zip(each, self.levels(run, bands), strict=True)]
         return JointWhitener(found) if isinstance(bands, JointBands) else found[0]
@@ -177,12 +176,12 @@ class PlannedDrive:
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """Information of drives; that of several adds up. Whitened slopes by the car's numbers and effects' changes, what
-    the records' errors can do taken out of both, no prior of the numbers in it, for each of ``SIZES`` of these errors:
-    an effect that moves runs is taken for larger errors, if these are likely enough.
+    """Information of drives, which is additive: products of whitened derivatives by the car's numbers and of effects'
+    changes, the records' errors projected out, without the prior of the numbers, for each of ``SIZES`` of these errors:
+    an effect that shifts runs is taken for larger errors, if these are likely enough.
 
     products    (s, p + m, p + m)
-    costs       (s,) of so large errors, in minus twice the log of the evidence, without the prior of the size
+    costs       of errors of each size, in minus twice the log of the evidence, without the prior of the size (s,)
     """
 
     products: Array
@@ -193,19 +192,19 @@ class Information:
 
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
-    """Of a model at its state, by effects' changes (m, n) per run."""
-    free = linear.without_wall()
+    """Information of the runs of a linear model on effects' changes (m, n) per run."""
+    free = linear.without_soft_bounds()
     logs, white = free.state.logs, free.whitened(changes)
     each, costs = [], []
     for size in SIZES:
-        there = free.of_size(with_larger_errors(free.size, size))
+        there = free.with_size(with_larger_errors(free.size, size))
         found = there.information(logs, white)
         found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
         each.append(found)
-        costs.append(there.occam)
+        costs.append(there.occam_factor)
     return Information(np.array(each), np.array(costs))
 
 
 def with_larger_errors(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
-    """Start, walk and factor so many times as far off."""
+    """A size with start, walk and scale error times these factors."""
     return ErrorSize(size.start_m * factors[0], size.walk_m * factors[1], size.scale * factors[2])

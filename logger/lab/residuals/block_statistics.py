@@ -7,21 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.residuals.breakdown import BLOCK_S, ModelResiduals
+from logger.lab.residuals.breakdown import INDEPENDENT_S, ModelResiduals
 
 Array = npt.NDArray[np.float64]
 
 
 def block_means(residuals: ModelResiduals, signals: Sequence[Array], blocks: int = 1) -> Array:
-    """Means of signals [(n,), ...] over so many blocks at a time, all runs one after the other (b,); what is over at an
-    end is left out."""
-    size = max(2, round(blocks * BLOCK_S * residuals.rate_hz))
+    """Means of signals [(n,), ...] over so many blocks at a time, all runs one after the other (b,); an incomplete
+    block at an end is left out."""
+    size = max(2, round(blocks * INDEPENDENT_S * residuals.rate_hz))
     return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
 
 
 def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals) -> tuple[float, float, float]:
-    """Mean of signals [(n,), ...], its standard error from the spread of pairs of blocks, and Student's p-value against
-    0; NaN where nothing is known."""
+    """Mean of signals [(n,), ...], its standard error from the standard deviation of pairs of blocks, and Student's
+    p-value of a mean of 0; NaN for too few blocks."""
     from scipy.stats import ttest_1samp
 
     means = block_means(residuals, signals, 2)
@@ -49,7 +49,7 @@ def autocorrelations(signals: Sequence[Array], lags: int) -> Array:
 
 
 def band_pass(signal: Array, low_hz: float, high_hz: float, rate_hz: float) -> Array:
-    """A signal (n,) without what is outside of a band."""
+    """A signal (n,) without the frequencies outside of a band."""
     f_hz = np.fft.rfftfreq(len(signal), 1 / rate_hz)
     return np.fft.irfft(np.where((f_hz >= low_hz) & (f_hz < high_hz), np.fft.rfft(signal), 0.0), len(signal))
 

@@ -1,8 +1,8 @@
-"""The residuals of a model, and where their power sits.
+"""The residuals of a model, and their power by frequency, speed, excitation and place.
 
-Problem: one number says that a model fails, not where. Solution: ``ModelResiduals`` holds runs, what a car would have
-recorded in them, and how it moved; ``breakdown`` shares the power of the residuals out over the bands of the car's own
-vibrations, over speed, over how strongly the road moves the car, and over the places of each road. Shares are of the
+Problem: one number says that a model fails, not where. Solution: ``ModelResiduals`` holds runs, a car's predictions and
+its motions; ``breakdown`` divides the power of the residuals among the bands of the car's own vibrations, speeds, how
+strongly the road excites the car, and the places of each road. Shares are of the
 power of measured - model over all samples that count, so that each list of shares adds up to 1.
 """
 
@@ -25,14 +25,14 @@ from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
 
-BLOCK_S = 1.0
-"""Blocks so long count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps an
-eighth of its motion after that time."""
+INDEPENDENT_S = 1.0
+"""Residuals so far apart count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps
+an eighth of its motion after that time."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Frequencies from ``from_hz`` up to ``to_hz``, as people call them."""
+    """Frequencies from ``from_hz`` up to ``to_hz``, with a name."""
 
     name: str
     from_hz: float
@@ -44,10 +44,10 @@ class Part:
     """A part of the data: its share of the residual power, and its error (rms residual / rms measured, in it; NaN where
     nothing was measured).
 
-    low, high    its ends, in the unit of the list it stands in
+    low, high        its ends, in the unit of the list it stands in
     residual_mps2    rms of the residual in it
-    samples      in it; of a band all
-    name         of a band, or of the run that a place is in; else empty
+    samples          in it; of a band all
+    name             of a band, or of the run that a place is in; else empty
     """
 
     low: float
@@ -61,8 +61,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Breakdown:
-    """Where the residual power sits: by frequency [Hz], speed [m/s], r.m.s. of the model's acceleration [m/s2], place
-    [m]."""
+    """Residual power by frequency [Hz], speed [m/s], r.m.s. of the model's acceleration [m/s2] and place [m]."""
 
     frequency: tuple[Part, ...]
     speed: tuple[Part, ...]
@@ -72,10 +71,10 @@ class Breakdown:
 
 @dataclass(frozen=True, eq=False)
 class ModelResiduals:
-    """Runs and what a car would have recorded in them.
+    """Runs, a car's predictions of them, and its motions.
 
     predictions    (n,) per run, whole
-    responses      how the car moved, per run
+    responses      motions of the car, per run
     """
 
     runs: Sequence[Run]
@@ -90,7 +89,7 @@ class ModelResiduals:
 
     @property
     def top_hz(self) -> float:
-        """Up to where any of the runs is compared."""
+        """Highest frequency at which any of the runs is compared [Hz]."""
         return max(run.pass_band_hz[1] for run in self.runs)
 
     @property
@@ -100,21 +99,21 @@ class ModelResiduals:
 
     @cached_property
     def residual(self) -> list[Array]:
-        """measured - model, the samples that count, per run [m/s2]."""
-        return [run.left_by(one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
+        """Measured minus predicted, the samples that count, per run [m/s2]."""
+        return [run.residual(one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
     @cached_property
     def measured(self) -> list[Array]:
-        """What was measured, the samples that count, per run; zeros where nothing was read [m/s2]."""
+        """Measured acceleration, the samples that count, per run; 0 where nothing was read [m/s2]."""
         return [run.kept_readings_mps2 for run in self.runs]
 
     @cached_property
     def model(self) -> list[Array]:
-        """What the model predicts, the samples that count, per run [m/s2]."""
+        """Predicted acceleration, the samples that count, per run [m/s2]."""
         return [one[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
     def kept(self, of: Callable[[Run], Array]) -> list[Array]:
-        """Something of each run, the samples that count."""
+        """A signal of each run, the samples that count."""
         return [of(run)[run.first:] for run in self.runs]
 
     @cached_property
@@ -137,7 +136,7 @@ class ModelResiduals:
 
 
 def breakdown(residuals: ModelResiduals) -> Breakdown:
-    """Where the power of the residuals sits."""
+    """The power of residuals by frequency, speed, excitation and place."""
     return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
 
 
@@ -199,7 +198,7 @@ def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
 
 def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
     """In quarters, by the r.m.s. of the model in a block around each sample."""
-    size = round(BLOCK_S * residuals.rate_hz)
+    size = round(INDEPENDENT_S * residuals.rate_hz)
     level = np.concatenate([_running_rms(one, size) for one in residuals.model])
     edges = np.unique(np.quantile(level, np.linspace(0, 1, 5)))
     if len(edges) == 1:  # a model that does not move

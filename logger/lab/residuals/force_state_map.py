@@ -1,12 +1,12 @@
-"""The missing force: which force in the suspensions, by their rate and travel, would leave this residual.
+"""Force-state map: the force missing in the suspensions, by their rate and travel, from the residual of a model.
 
 Problem: one accelerometer on the body, and a force that is missing somewhere below it changes the motion that makes it.
 Solution: a small force that the model lacks passes through the model's own transfer from a suspension to the sensor. So
 the forces of hat functions, of rate and of travel as the model has them, are sent through that transfer, and the
-residual is the sum of what arrives: a regression, whose coefficients are the missing force at the knots (the
-force-state map of S. F. Masri and T. K. Caughey 1979, by output error). What another linear spring or damper, another
-gain or a small shift in time would do is left out of it, as a few per cent of those are never physics. Both sides pass
-the residual's own autoregressive whitening first, so that coloured noise does not feign evidence.
+residual is regressed on the responses; the coefficients are the missing force at the knots (the force-state map of
+S. F. Masri and T. K. Caughey 1979, by output error). What another linear spring or damper, another gain or a small
+delay would do is projected out, as a few per cent of those are never physics. Both sides pass the residual's own
+autoregressive whitening first, so that coloured noise is not taken for evidence.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ Array = npt.NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
 
 _KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])
-"""Of a curve, in units of the r.m.s. of its coordinate: nearer to each other where more samples are, the last ones
-where half of a per cent of a normal distribution are beyond."""
+"""Knots of a curve, in units of the r.m.s. of its coordinate: closer together where more samples are, the outermost
+ones where half a per cent of a normal distribution is beyond (its quantile there is 2.81)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A missing force by one coordinate: knots (k,), force and its standard error [N] in each suspension.
 
-    What a linear law would do is taken out of it. p_value: of a force so large by chance; share: of the residual power
+    A linear law is projected out. p_value: of no missing force; share: of the residual power that it explains
     """
 
     at: Array
@@ -46,8 +46,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Term:
-    """One term: its coefficient with its standard error, how probable one so large would be by chance, and the share of
-    the residual power that it explains."""
+    """The coefficient of one term with its standard error, its p-value, and the share of the residual power that it
+    explains."""
 
     value: float
     error: float
@@ -77,7 +77,7 @@ def force_map(residuals: ModelResiduals) -> ForceMap:
     regression = _Regression.of(residuals)
 
     def term(shape: Shape) -> Term:
-        coefficients, covariance, p_value, share = regression.fitted(_through(residuals, [shape]))
+        coefficients, covariance, p_value, share = regression.fitted(_responses_at_sensor(residuals, [shape]))
         return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
 
     return ForceMap(_curve(regression, residuals, of_rate=True), _curve(regression, residuals, of_rate=False),
@@ -100,7 +100,7 @@ def _whitening(residual: Sequence[Array], order: int = 12) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Regression:
-    """Residuals (n,) and what is never physics (n, m), per run, and the filter that whitens them."""
+    """Residuals (n,) and nuisance columns (n, m), per run, and the filter that whitens them."""
 
     residual: Sequence[Array]
     nuisance: Sequence[Array]
@@ -108,17 +108,17 @@ class _Regression:
 
     @staticmethod
     def of(residuals: ModelResiduals) -> _Regression:
-        """With each linear damper and spring, the gain and a small shift in time as what is never physics."""
+        """The regression with each linear damper and spring, the gain and a small delay as nuisance columns."""
         wheels = range(residuals.responses[0].rate_mps.shape[1])
-        dampers, springs = (_through(residuals, [_straight(wheel, of_rate) for wheel in wheels])
+        dampers, springs = (_responses_at_sensor(residuals, [_linear_law(wheel, of_rate) for wheel in wheels])
                             for of_rate in (True, False))
         rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
         nuisance = [np.column_stack(one) for one in zip(dampers, springs, residuals.model, rates, strict=True)]
         return _Regression(residuals.residual, nuisance, _whitening(residuals.residual))
 
     def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
-        """Of columns (n, k) per run: their coefficients (k,), the covariance (k, k) of these, the p-value of all
-        together, by what is whitened, and the share of the residual that they explain, as it is."""
+        """Regression on columns (n, k) per run: coefficients (k,), their covariance (k, k), the p-value of all together
+        (these by whitened residuals), and the share of the residual that they explain."""
         from scipy.stats import f
 
         coefficients, covariance, rank, freedom, power, rest = _fit(
@@ -139,7 +139,7 @@ class _Regression:
 
 def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Array],
          ) -> tuple[Array, Array, int, int, float, float]:
-    """Least squares of a target y (n,) by columns X (n, k), both without what others Z (n, m) explain, given per run:
+    """Least squares of a target y (n,) by columns X (n, k), nuisance columns Z (n, m) projected out, given per run:
     coefficients (k,), inv(X'X), the rank, the degrees of freedom, and the squares of y before and after."""
     y, z, x = (np.concatenate(one) for one in (target, others, columns))
     vectors, sizes, _ = np.linalg.svd(z / np.maximum(np.sqrt((z**2).sum(axis=0)), 1e-300), full_matrices=False)
@@ -159,14 +159,14 @@ def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Arr
 
 
 def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) -> Curve:
-    """Of rate or of travel."""
+    """The curve of the missing force by rate or by travel."""
     driven = np.concatenate([(one.rate_mps if of_rate else one.travel_m).ravel() for one in residuals.responses])
     knots = _KNOTS * (float(np.sqrt(np.mean(driven**2))) or 1.0)
     used = np.flatnonzero(_KNOTS)
     coefficients, covariance, p_value, share = regression.fitted(
-        _through(residuals, [_hat(knots, int(index), of_rate) for index in used]))
-    # What a straight line through 0 would do is not distinguished from a spring or damper a little off: it is taken
-    # out, the middle counting as it is driven.
+        _responses_at_sensor(residuals, [_hat(knots, int(index), of_rate) for index in used]))
+    # A straight line through 0 cannot be distinguished from a spring or damper a little off: it is projected out, each
+    # knot weighted by how often it is reached.
     weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
     line = knots[used]
     straight = np.eye(len(used)) - np.outer(line, weight * line) / float(weight @ line**2)
@@ -176,8 +176,9 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     return Curve(knots, force, errors, p_value, share)
 
 
-def _through(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate: float = 0.4) -> list[Array]:
-    """What forces of these shapes in the suspensions leave at the sensor, where the recorder's filter hardly begins:
+def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
+                         highest_of_rate: float = 0.4) -> list[Array]:
+    """Responses of the sensor to forces of these shapes in the suspensions, up to where the recorder's filter begins:
     (n, k) per run, the samples that count."""
     structure = residuals.car.structure
     n, w = len(structure.mass), len(structure.wheels)
@@ -202,8 +203,8 @@ def _through(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate
     return found
 
 
-def _straight(wheel: int, of_rate: bool) -> Shape:
-    """A linear damper or spring of one wheel alone."""
+def _linear_law(wheel: int, of_rate: bool) -> Shape:
+    """The force of a linear damper or spring of one wheel alone."""
     def shape(travel: Array, rate: Array) -> Array:
         return (rate if of_rate else travel) * np.eye(rate.shape[1])[wheel]
 
@@ -211,7 +212,7 @@ def _straight(wheel: int, of_rate: bool) -> Shape:
 
 
 def _hat(knots: Array, index: int, of_rate: bool) -> Shape:
-    """1 at one knot, 0 at its neighbours, straight between; beyond the outermost knots it stays."""
+    """A hat function: 1 at one knot, 0 at its neighbours, linear between; constant beyond the outermost knots."""
     def shape(travel: Array, rate: Array) -> Array:
         return np.interp(rate if of_rate else travel, knots, np.eye(len(knots))[index])
 

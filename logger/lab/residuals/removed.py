@@ -1,9 +1,9 @@
-"""What is taken out of an error before anything is judged, and how much of the error it made.
+"""Sensor drift, distance error and filtering: what is removed from an error before it is judged, and its share of it.
 
-Problem: three things leave an error and are no physics of the car: a sensor that drifts, a distance that is wrong, a
-record that somebody filtered. The lab removes all three before it asks what is missing; an error that counts them, and
-a verdict that does not name them, seem to contradict each other. Solution: each is reported with its share of the power
-of the residual of the model as it stands, and the error that is left without all of them.
+Problem: three causes of error are no physics of the car: a sensor that drifts, a distance that is wrong, a record that
+somebody filtered. The lab removes all three before it asks what is missing; an error that counts them, and a verdict
+that does not name them, seem to contradict each other. Solution: each is reported with its share of the residual power
+of the model as it stands, and the error without all of them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import unusual_m
-from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.distance_error import unusual_distance_error_m
+from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.residual_tests import LEAST_SHARE
 from logger.lab.residuals.sensor_drift import Drift, drifts_of
@@ -27,13 +27,12 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Removed:
-    """What was taken out.
+    """What was removed.
 
-    drifts                of the runs' sensors, one each
-    drift_share, distance_share, filter_share    of the power of the residual of the model as it stands, at all
-                          frequencies
-    distance_error_m      by how much a distance is off at most, if that is more than usual; else 0
-    error                 normalised r.m.s. error of the fitted model without the drifts
+    drifts                                       of the runs' sensors, one each
+    drift_share, distance_share, filter_share    of the residual power of the model as it stands, at all frequencies
+    distance_error_m                             the largest distance error, if it is unusual; else 0
+    error                                        normalised r.m.s. error of the fitted model without the drifts
     """
 
     drifts: tuple[Drift, ...]
@@ -44,46 +43,49 @@ class Removed:
     error: float
 
     @cached_property
-    def drifting(self) -> tuple[Drift, ...]:
+    def drifting_sensors(self) -> tuple[Drift, ...]:
         """The drifts that were found."""
         return tuple(one for one in self.drifts if one.found)
 
-    def cleared(self, predictions: Sequence[Array]) -> list[Array]:
-        """Predictions (n,) per run with the sensors' drifts in them; other signals that are joined stay."""
-        return [_drifted(one, drift) for one, drift in zip(predictions, self.drifts, strict=True)]
+    def with_drifts(self, predictions: Sequence[Array]) -> list[Array]:
+        """Predictions (n,) per run plus the sensors' drifts; other signals that are joined are unchanged."""
+        return [_with_drift(one, drift) for one, drift in zip(predictions, self.drifts, strict=True)]
 
 
 def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> Removed:
-    """What was taken out of the residuals of a fitted state.
+    """What is removed from the residuals of a fitted state.
 
     plain    predictions (n,) per run of the model as it stands
     """
     runs = posterior.runs.runs
     outside = sum(run.outside_mps2**2 * (run.count - run.first) for run in runs)
-    left, whole = _power(runs, state.predictions), _power(runs, plain) + outside
-    in_place = [error.in_place(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
-    unmoved = _power(runs, posterior.predict(state.effects, state.logs, in_place))
-    drifts = drifts_of(runs, posterior.as_read().residuals(state), noise_of(posterior, state).deviation_mps2)
-    cleared = _power(runs, [_drifted(one, drift) for one, drift in zip(state.predictions, drifts, strict=True)])
-    if not left - cleared > LEAST_SHARE * left:
-        drifts, cleared = tuple(one.unseen() for one in drifts), left
+    fitted, whole = _power(runs, state.predictions), _power(runs, plain) + outside
+    record = [error.without_distance_error(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
+    at_recorded_distances = _power(runs, posterior.predict(state.effects, state.logs, record))
+    drifts = drifts_of(runs, posterior.without_rounding().residuals(state),
+                       sensor_noise_of(posterior, state).deviation_mps2)
+    without_drift = _power(runs, [_with_drift(one, drift)
+                                  for one, drift in zip(state.predictions, drifts, strict=True)])
+    if not fitted - without_drift > LEAST_SHARE * fitted:
+        drifts, without_drift = tuple(one.nothing_found() for one in drifts), fitted
 
     def share(power: float) -> float:
         return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0
 
     measured = sum(float(run.kept_readings_mps2 @ run.kept_readings_mps2) for run in runs)
-    return Removed(drifts, share(left - cleared), share(unmoved - left), share(outside),
-                   unusual_m(posterior.record_errors, state.record),
-                   float(np.sqrt(cleared / measured)) if measured > 0 else float("nan"))
+    return Removed(drifts, share(fitted - without_drift), share(at_recorded_distances - fitted), share(outside),
+                   unusual_distance_error_m(posterior.record_errors, state.record),
+                   float(np.sqrt(without_drift / measured)) if measured > 0 else float("nan"))
 
 
-def _drifted(prediction: Array, drift: Drift) -> Array:
+def _with_drift(prediction: Array, drift: Drift) -> Array:
+    """A prediction (n,), or more signals joined to it, plus the drift of its sensor."""
     found = prediction.copy()
     found[: len(drift.curve_mps2)] += drift.curve_mps2
     return found
 
 
 def _power(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
-    """The sum of squares of what predictions (n,) per run leave [m2/s4]."""
-    return sum(float((run.left_by(run.main(one))[run.first:] ** 2).sum())
+    """Sum of squares of the residuals of predictions (n,) per run [m2/s4]."""
+    return sum(float((run.residual(run.main(one))[run.first:] ** 2).sum())
                for run, one in zip(runs, predictions, strict=True))

@@ -1,10 +1,10 @@
 """Tests of a model's residual: a fixed list, which knows no effect.
 
 Problem: a residual has to be read by people who want to know whether physics is missing, and of which kind. Solution:
-each test asks one question (does it follow the road, is the car's answer proportional, does it owe to the direction of
-motion ...), and comes with a value, its standard error where it has one, and how probable such a value would be in a
-residual that is noise. A test finds something when it is improbable by chance and large enough to matter. What each
-says in words stands in ``report.residual_text``.
+each test asks one question (is it coherent with the road, is the car's response proportional, does it depend on the
+direction of motion ...), and gives a value, its standard error where it has one, and a p-value against a residual that
+is noise. A test finds something when it is significant and large enough to matter. ``report.residual_text`` says it in
+words.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.identification.residual_whiteness import LAGS, autocorrelation
-from logger.lab.likelihood.lag import Lags, constant, drift, lags
+from logger.lab.likelihood.lag import Lags, constant_lag, lag_drift, lags
 from logger.lab.residuals.block_statistics import (
     autocorrelations,
     band_pass,
@@ -28,30 +28,29 @@ from logger.lab.residuals.block_statistics import (
 )
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part
 from logger.lab.residuals.force_state_map import Curve, ForceMap, force_map
-from logger.lab.residuals.road_coherence import with_road
-from logger.lab.residuals.spectral_lines import loudest, periodogram
+from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.residuals.spectral_lines import periodogram, strongest_line
 from logger.runs import short_names
 from logger.vehicle.simulate import PASS_OF_RATE
 
-DOUBT = 0.002
-"""A test whose result is less probable than this finds something: of some fifteen tests, one is false in thirty
-comparisons."""
+SIGNIFICANCE = 0.002
+"""A test with a smaller p-value is significant: of fifteen tests of noise one is in some thirty comparisons."""
 LEAST_SHARE = 0.02
 """A smaller share of the residual's power, or of a gain, does not matter. A judgement: an error of 0.1 would fall by
 0.001."""
-GROWN = 1.3
+LEAST_GROWTH = 1.3
 """A residual that changes by a smaller factor is as large everywhere. A judgement."""
 
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """What one test found.
+    """The result of one test.
 
-    value, unit, standard_error    what it is, and its error where there is one; NaN where the runs cannot tell
-    p_value                        how probable it would be in noise; NaN where the runs cannot tell
-    large                          whether it is large enough to matter
-    road                           whether it ties the residual to the road or to the car's motion
-    figures                        what else is to be said of it, by name: the arguments of its sentence
+    value, unit, standard_error    of what is tested; the last where there is one; NaN where the runs are not enough
+    p_value                        against noise; NaN where the runs are not enough
+    large                          whether the value is large enough to matter
+    road                           whether it relates the residual to the road or to the car's motion
+    figures                        what else its sentence says, by name
     """
 
     name: str
@@ -65,13 +64,13 @@ class ResidualTest:
 
     @property
     def found(self) -> bool:
-        """Whether the test finds something: it is hardly chance, and it matters."""
-        return bool(self.p_value < DOUBT and self.large)
+        """Whether the test is significant and its value large enough to matter."""
+        return bool(self.p_value < SIGNIFICANCE and self.large)
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
-    """All tests of a residual, and what they were read from, for pictures."""
+    """All tests of a residual, with the force map and the lags that pictures show."""
 
     tests: tuple[ResidualTest, ...]
     forces: ForceMap
@@ -86,16 +85,16 @@ class ResidualTests:
 def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: ModelResiduals) -> ResidualTests:
     """Test the residuals of a model.
 
-    where      where their power sits
-    unmoved    the same car on the distances as they were recorded, which alignment is asked of
+    where      their power by frequency, speed, excitation and place
+    unmoved    of the same car at the recorded distances, whose lags are tested
     """
     forces, alignment = force_map(residuals), lags(unmoved.runs, unmoved.predictions)
     drifting = _drift(alignment)
     tests = (
         drifting, _shift(alignment, drifting), _whiteness(residuals), _frequency(residuals, where),
-        _follows_road(residuals), _gain(residuals), _proportion(residuals),
-        _by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
-        _by("travel", forces.by_travel, forces.hardening.value), _lean(residuals),
+        _coherence(residuals), _gain(residuals), _proportion(residuals),
+        _force_by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
+        _force_by("travel", forces.by_travel, forces.hardening.value), _skewness(residuals),
         _excitation(residuals, where), _speed(residuals), _place(residuals, where), _tone(residuals),
     )
     return ResidualTests(tests, forces, alignment)
@@ -105,8 +104,8 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    """The largest correlation of samples; one of 0.1 explains a hundredth of the power from a sample before. What was
-    filtered is not white, whatever it was."""
+    """The largest autocorrelation; one of 0.1 explains a hundredth of the power from a sample before. Filtered
+    residuals are not tested: they are not white, whatever they were."""
     if not residuals.whole:
         return ResidualTest("whiteness")
     rho = autocorrelations(residuals.residual, LAGS)
@@ -117,7 +116,7 @@ def _whiteness(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
-    """The band that holds most beyond what white noise would leave in it: F tests, the best of some bands."""
+    """The band that holds most, compared with white noise: F tests, Bonferroni over the bands."""
     from scipy.stats import f
 
     parts = where.frequency
@@ -128,7 +127,7 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
         width = part.high - part.low
         ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
         chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
-    best = max((i for i in range(len(parts)) if chances[i] < DOUBT), key=lambda i: parts[i].share,
+    best = max((i for i in range(len(parts)) if chances[i] < SIGNIFICANCE), key=lambda i: parts[i].share,
                default=int(np.argmin(chances)))
     part = parts[best]
     white = (part.high - part.low) / whole
@@ -136,7 +135,7 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
                         figures={"part": part, "white_share": white})
 
 
-def _lean(residuals: ModelResiduals) -> ResidualTest:
+def _skewness(residuals: ModelResiduals) -> ResidualTest:
     """Skewness, with Student's test of the cubes of blocks; up to 1/2 either way a distribution counts as fairly
     symmetric (M. G. Bulmer, Principles of Statistics, 1979, chapter 4)."""
     scale = rms(residuals.residual)
@@ -147,14 +146,14 @@ def _lean(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
-    """The frequency that stands out most, of all runs, from those within a width on either side, about what a spectrum
-    of segments resolves."""
+    """The strongest spectral line of all runs, compared with the frequencies within a width on either side, about what
+    a spectrum of segments resolves."""
     names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
         low_hz, high_hz = run.pass_band_hz
         inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
-        found = loudest(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
+        found = strongest_line(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
         if found is not None:
             tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), names[run.name]))
     if not tones:
@@ -166,9 +165,9 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
 # --- the residual and the road ---
 
 
-def _follows_road(residuals: ModelResiduals) -> ResidualTest:
+def _coherence(residuals: ModelResiduals) -> ResidualTest:
     """Coherence with the road, at the frequencies that the recorder passes."""
-    coherence, top = with_road(residuals), min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
+    coherence, top = coherence_with_road(residuals), min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
     share, p_value = coherence.explained(0.0, top)
     bands = [band for band in residuals.bands if band.from_hz < top]
     most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
@@ -177,7 +176,7 @@ def _follows_road(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _gain(residuals: ModelResiduals) -> ResidualTest:
-    """measured / model; one that is off by half and more is of another shape rather."""
+    """Gain, measured / model; not large where it is off by half and more, as the shape is another one then."""
     size = sum(float(one @ one) for one in residuals.model) / sum(map(len, residuals.model))
     if not size > 0:
         return ResidualTest("gain")
@@ -188,9 +187,9 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
-    """The same shift all the way; none where it grows on the way. ``least_s`` is a third of a sample at 100 samples a
-    second, which no clock is asked to be better than. A shift by a length is a wrong place, no part of the car."""
-    time, length, is_time = constant(alignment)
+    """A constant lag; not tested where it drifts. ``least_s`` is a third of a sample at 100 samples a second: clocks
+    are no better. A lag by a constant length is a wrong place, no part of the car."""
+    time, length, is_time = constant_lag(alignment)
     trend, unit = (length, "m") if is_time is False else (time, "s")
     return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
                         abs(time.value) > least_s and not drifting.found, is_time is not False,
@@ -198,16 +197,16 @@ def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> R
 
 
 def _drift(alignment: Lags, least_m: float = 0.05) -> ResidualTest:
-    """A shift that grows on the way, to so much at least in the longest run (a judgement: about a
-    twentieth of the wave that makes wheels hop at 10 m/s)."""
-    trend = drift(alignment)
+    """A lag that grows along the way, to ``least_m`` at least in the longest run (a judgement: a twentieth of the wave
+    that makes wheels hop at 10 m/s)."""
+    trend = lag_drift(alignment)
     in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
     return ResidualTest("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > least_m, True,
                         {"in_all_m": in_all_m})
 
 
 def _proportion(residuals: ModelResiduals) -> ResidualTest:
-    """measured / model where a band is weak and where it is strong, with Welch's test of the difference."""
+    """Proportionality: gains where a band is weak and where it is strong, with Welch's test of the difference."""
     found = []
     for band in residuals.bands[1:]:
         top_hz = min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
@@ -222,7 +221,7 @@ def _proportion(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tuple[float, float, float, float] | None:
-    """Gain on weak and on strong blocks, the p-value of their difference and its standard error."""
+    """Gains on weak and on strong blocks, the p-value of their difference and its standard error; None for too few."""
     from scipy.stats import t
 
     if high_hz <= low_hz:
@@ -252,14 +251,16 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 # --- the residual and the suspensions ---
 
 
-def _by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
-    """The largest force of a curve where it is known to a third of itself, else 0; ``bend``: how the law bends."""
+def _force_by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
+    """The largest missing force of a curve that is known to a third of itself, else 0; ``bend``: curvature of the
+    law."""
     known = np.abs(curve.force_n) > 3 * curve.error_n
     return ResidualTest(f"force by {coordinate}", float(np.abs(curve.force_n[known]).max(initial=0.0)), "N", None,
                         curve.p_value, curve.share > LEAST_SHARE, True, {"curve": curve, "bend": bend})
 
 
 def _direction(forces: ForceMap, residuals: ModelResiduals) -> ResidualTest:
+    """Asymmetry of the missing damper force."""
     term = forces.asymmetry
     return ResidualTest("direction", term.value, "N s/m", term.error, term.p_value, term.share > LEAST_SHARE, True,
                         {"share": term.share, "damping": float(np.mean(residuals.car.structure.dampers))})
@@ -269,17 +270,18 @@ def _direction(forces: ForceMap, residuals: ModelResiduals) -> ResidualTest:
 
 
 def _excitation(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
+    """Rank correlation of the power of the residual with that of the model, in blocks."""
     rho, p_value = rank_correlation(*(block_means(residuals, [one**2 for one in signals])
                                       for signals in (residuals.residual, residuals.model)))
     low, high = where.amplitude[0], where.amplitude[-1]
     grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
-    large = len(where.amplitude) > 1 and (grown > GROWN if rho > 0 else grown < 1 / GROWN)
+    large = len(where.amplitude) > 1 and (grown > LEAST_GROWTH if rho > 0 else grown < 1 / LEAST_GROWTH)
     return ResidualTest("excitation", rho, "1", None, p_value, large, True, {"low": low, "high": high})
 
 
 def _speed(residuals: ModelResiduals, least_spread: float = 1.15) -> ResidualTest:
-    """By which factor the residual changes from the slowest to the fastest driving at equal excitation: a regression of
-    the logarithms of blocks on speed and excitation, the second bent as it will. Nothing where speeds hardly spread."""
+    """Factor by which the residual changes from the slowest to the fastest driving at equal excitation: a regression of
+    the logarithms of blocks on speed and a cubic of excitation. Not tested where speeds hardly differ."""
     from scipy.stats import t
 
     speed = block_means(residuals, residuals.kept(lambda run: run.speed_mps))
@@ -296,12 +298,12 @@ def _speed(residuals: ModelResiduals, least_spread: float = 1.15) -> ResidualTes
     error = float(np.sqrt(rest @ rest / freedom * np.linalg.pinv(columns.T @ columns)[1, 1]))
     factor = float(np.exp(coefficients[1] / 2))
     p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else np.nan
-    return ResidualTest("speed", factor, "1", factor * error / 2, p_value, max(factor, 1 / factor) > GROWN,
+    return ResidualTest("speed", factor, "1", factor * error / 2, p_value, max(factor, 1 / factor) > LEAST_GROWTH,
                         figures={"slow_mps": slow, "fast_mps": fast})
 
 
 def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
-    """The place with most power for its length, as so many independent samples as its autocorrelation leaves."""
+    """The place with most power for its length; its autocorrelation gives the number of independent samples."""
     from scipy.stats import chi2
 
     usual = float(np.median([part.residual_mps2 for part in where.place])) if where.place else 0.0

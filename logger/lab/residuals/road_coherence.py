@@ -1,6 +1,6 @@
-"""How much of the residual the road has caused: the multiple coherence of residual and road.
+"""Multiple coherence of residual and road: the share of the residual that the road caused.
 
-Problem: noise leaves a residual as well as missing physics does; only the second follows the road. Solution: in
+Problem: noise is part of a residual as well as missing physics; only the latter is coherent with the road. Solution: in
 segments of each run the spectrum of the residual is fitted by those of the road's slope under the front and the rear
 wheels, frequency by frequency (J. S. Bendat and A. G. Piersol, Random Data, 2010, chapter 7). Without any connection
 the share that q inputs explain of n segments is Beta(q, n - q) at every frequency, so that -ln(1 - share) has a mean
@@ -24,11 +24,12 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Coherence:
-    """By frequency (f,): the share of the residual's power that follows the road, without what chance would explain.
+    """Coherence with the road at each frequency (f,), corrected for chance.
 
+    share      of the residual's power, 0 on average without any connection
     raw        before that correction
-    inputs     q
-    segments   n, as many as independent ones
+    inputs     number of inputs q
+    segments   effective number of independent segments n
     power      of the residual [m2/s4 in each frequency]
     """
 
@@ -44,7 +45,7 @@ class Coherence:
         return float(self.power[(self.f_hz >= low_hz) & (self.f_hz < high_hz)].sum())
 
     def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
-        """Between two frequencies: the share of the residual power, and how probable it would be by chance."""
+        """Share of the residual power between two frequencies that is coherent with the road, and its p-value."""
         from scipy.special import digamma, polygamma
         from scipy.stats import gamma
 
@@ -61,7 +62,7 @@ class Coherence:
         return max(share, 0.0), float(gamma.sf(statistic, mean**2 / variance, scale=variance / mean))
 
 
-def with_road(residuals: ModelResiduals) -> Coherence:
+def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     """The coherence of residuals with the road under the wheels that the car has."""
     axles_m = np.unique(residuals.car.structure.behind_m)
     residual = segments(residuals, residuals.residual)
@@ -81,7 +82,7 @@ def with_road(residuals: ModelResiduals) -> Coherence:
 
 
 def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
-    """How fast the road rises under a wheel, tracks averaged, the samples that count, per run [m/s]."""
+    """Rate of the road's elevation under an axle, tracks averaged, the samples that count, per run [m/s]."""
     def of(run: Run) -> Array:
         way = Way(run.distance_m, run.time_s)
         height = run.track.under_axle(way, behind_m, residuals.car.structure.contact_patch_m)

@@ -1,12 +1,12 @@
-"""The slow part of a residual: the drift of the sensor, which is no part of the car.
+"""Sensor drift: the slow part of a residual, below the band in which models are compared.
 
-Problem: below 0.4 Hz nothing is judged (``likelihood.whittle``), because a body on springs hardly accelerates there: an
-acceleration is its travel times (2 pi f)2, so that even 5 cm at 0.1 Hz are 0.02 m/s2. A sensor that warms up, or whose
-zero jumps, is strongest there, and an error counts that. Solution: the residual of a run is laid on the cosines of less
-than that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on Computers C-23,
-1974). Of the forms that a drift has, each with its numbers, the likeliest by the criterion of G. Schwarz (Annals of
-Statistics 6, 1978) is taken; noise is white there, no less than between 0.4 and 0.6 Hz. A random walk has coefficients
-that fall with the square of their number, in power; it is estimated by N. Wiener's filter.
+Problem: records are not compared below 0.4 Hz (``likelihood.whittle``), because a body on springs hardly accelerates
+there: an acceleration is its travel times (2 pi f)2, so that even 5 cm at 0.1 Hz are 0.02 m/s2. A sensor that warms up,
+or whose zero jumps, is strongest there, and an error counts that. Solution: the residual of a run is transformed to the
+cosines below that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on
+Computers C-23, 1974). Of several forms of drift the one with the least BIC (G. Schwarz, Annals of Statistics 6, 1978)
+is chosen; the noise is white there, no less than between 0.4 and 0.6 Hz. The power of a random walk falls with the
+square of a coefficient's number; it is estimated by N. Wiener's filter.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.whittle import LOWEST_HZ
-from logger.lab.residuals.residual_tests import DOUBT
+from logger.lab.residuals.residual_tests import SIGNIFICANCE
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ NONE, OFFSET, RAMP, STEP, EXPONENTIAL, WANDER = "none", "offset", "ramp", "step"
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """How the sensor of one run drifted.
+    """The drift of the sensor of one run.
 
     run          its name
     form         offset, ramp, step, exponential or wander; none where no more than noise is seen
@@ -48,18 +48,18 @@ class Drift:
 
     @property
     def found(self) -> bool:
-        """Whether it is more than noise."""
+        """Whether there is one."""
         return self.form != NONE
 
-    def unseen(self) -> Drift:
-        """The run as if nothing were seen."""
+    def nothing_found(self) -> Drift:
+        """The same run without a drift."""
         return replace(self, form=NONE, size_mps2=0.0, time_s=None, curve_mps2=np.zeros(len(self.curve_mps2)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
     form: str
-    lack: float
+    bic: float
     size_mps2: float
     time_s: float | None
     curve: Callable[[Array], Array]
@@ -69,8 +69,8 @@ def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5
              fewest_coefficients: int = 8) -> Drift:
     """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2].
 
-    noise_hz               its noise is no less than the residual between ``LOWEST_HZ`` and this [Hz]
-    fewest_coefficients    fewer do not distinguish a form of three numbers from noise: nothing is found
+    noise_hz               the noise is no less than the residual between ``LOWEST_HZ`` and this [Hz]
+    fewest_coefficients    fewer cannot distinguish a form of three numbers from noise: no drift is found
     """
     kept, rate = run.count - run.first, run.rate_hz
     time_s = run.time_s
@@ -83,18 +83,18 @@ def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5
     basis = _Cosines(kept, count, int(2 * noise_hz * kept / rate))
     seen = basis.of(np.where(read, residual[run.first:], 0.0))
     level = max(noise_mps2**2, float(np.mean(seen[count:] ** 2)))
-    fits = [_white(form, basis, seen[:count], level, time_s[run.first:], shapes)
+    fits = [_fit_white(form, basis, seen[:count], level, time_s[run.first:], shapes)
             for form, shapes in _shapes(time_s[run.first:], rate).items()]
-    fits.append(_wander(basis, seen[:count], level, run.first))
+    fits.append(_fit_random_walk(basis, seen[:count], level, run.first))
     nought = float(seen[:count] @ seen[:count]) / level
-    best = min(fits, key=lambda one: one.lack)
-    if best.lack > nought + 2 * np.log(DOUBT):  # noise lowers the criterion by so much no more often than that
+    best = min(fits, key=lambda one: one.bic)
+    if best.bic > nought + 2 * np.log(SIGNIFICANCE):  # noise lowers the criterion by so much no more often than that
         return nothing
     return Drift(run.name, best.form, best.size_mps2, best.time_s, best.curve(time_s), rate)
 
 
 def drifts_of(runs: Sequence[Run], residuals: Sequence[Array], noise_mps2: float) -> tuple[Drift, ...]:
-    """Those of several runs."""
+    """The drifts of several runs."""
     return tuple(drift_of(run, run.main(one), noise_mps2) for run, one in zip(runs, residuals, strict=True))
 
 
@@ -124,56 +124,56 @@ def _step(begins_s: float) -> Curve:
     return lambda at: np.where(at >= begins_s, 1.0, 0.0)
 
 
-def _settling(takes_s: float) -> Curve:
+def _exponential(takes_s: float) -> Curve:
     return lambda at: np.asarray(np.exp(-at / takes_s))
 
 
 def _shapes(time_s: Array, rate_hz: float, time_constants: int = 60) -> dict[str, list[Shape]]:
-    """What each form adds to a constant: curves by time, each with the time that it is known by. So many time constants
-    are tried, from the shortest wave's to twice the run's length."""
+    """Curves by time that each form adds to a constant, each with its time (None: it has none). So many time constants
+    are tried, from the shortest period to twice the run's length."""
     lasts_s = time_s[-1] + 1 / rate_hz
     steps = np.arange(time_s[0], time_s[-1], 0.1 / LOWEST_HZ)[1:]
-    settling = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, time_constants)
+    exponentials = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, time_constants)
     return {
         OFFSET: [],
         RAMP: [(None, lambda at: at / lasts_s)],
         STEP: [(float(one), _step(float(one))) for one in steps],
-        EXPONENTIAL: [(float(one), _settling(float(one))) for one in settling],
+        EXPONENTIAL: [(float(one), _exponential(float(one))) for one in exponentials],
     }
 
 
-def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[Shape]) -> _Fit:
-    """A form plus white noise: the likeliest of its shapes, with a constant."""
+def _fit_white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[Shape]) -> _Fit:
+    """The most likely curve of a form, with a constant, in white noise."""
     if not shapes:
         offset = float(seen[0]) / float(np.sqrt(basis.samples))
-        lack = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
-        return _Fit(form, lack, offset, None, lambda at: np.full(len(at), offset))
+        bic = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
+        return _Fit(form, bic, offset, None, lambda at: np.full(len(at), offset))
     columns = basis.of(np.stack([shape(time_s) for _, shape in shapes]))[:, : basis.count]
     # The constant is the first coefficient alone.
     free = columns[:, 1:]
     sizes = free @ seen[1:] / np.maximum((free**2).sum(axis=1), 1e-300)
-    lacks = ((seen[1:] - sizes[:, None] * free) ** 2).sum(axis=1) / level
-    best = int(lacks.argmin())
+    bics = ((seen[1:] - sizes[:, None] * free) ** 2).sum(axis=1) / level
+    best = int(bics.argmin())
     known_s, shape = shapes[best]
     size = float(sizes[best])
     offset = float(seen[0] - size * columns[best, 0]) / float(np.sqrt(basis.samples))
     numbers = 2 if known_s is None else 3
-    return _Fit(form, float(lacks[best]) + numbers * float(np.log(basis.count)), size, known_s,
+    return _Fit(form, float(bics[best]) + numbers * float(np.log(basis.count)), size, known_s,
                 lambda at: offset + size * shape(at))
 
 
-def _wander(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
-    """A random walk plus white noise."""
+def _fit_random_walk(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
+    """The most likely random walk in white noise."""
     numbers = np.arange(1, basis.count)
     powers = seen[1:] ** 2
     walks = np.geomspace(1e-2, 1e8, 81) * level
     spectra = level + walks[:, None] / numbers**2
-    lacks = (np.log(spectra / level) + powers / spectra).sum(axis=1)
-    best = int(lacks.argmin())
+    bics = (np.log(spectra / level) + powers / spectra).sum(axis=1)
+    best = int(bics.argmin())
     kept = np.zeros(basis.count)
     kept[0] = seen[0]
     kept[1:] = seen[1:] * (1 - level / spectra[best])
     curve = basis.back(kept)
     whole = np.concatenate([np.full(first, curve[0]), curve])
-    return _Fit(WANDER, float(lacks[best]) + 2 * float(np.log(basis.count)), float(np.sqrt(np.mean(curve**2))), None,
+    return _Fit(WANDER, float(bics[best]) + 2 * float(np.log(basis.count)), float(np.sqrt(np.mean(curve**2))), None,
                 lambda at: whole)

@@ -1,4 +1,4 @@
-"""Whether a single frequency stands out of a spectrum."""
+"""Spectral lines: the F test of the strongest ordinate of a periodogram."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 NEIGHBOURS = 15
-"""An ordinate is held against so many on either side, or more: their mean is then known to a quarter."""
+"""An ordinate is compared with so many on either side, or more: the mean of thirty, of which a Hann taper leaves 15
+independent, is known to a quarter."""
 
 
 def periodogram(samples: Array) -> Array:
@@ -17,16 +18,15 @@ def periodogram(samples: Array) -> Array:
     return np.asarray(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2)
 
 
-def loudest(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
-    """The frequency that stands out most of a periodogram, by its number in it, and how probable one so loud would be
-    by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of its neighbours is F(2, 2 m)
-    in noise, the best of so many.
+def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
+    """The strongest line of a periodogram: its number, and a bound on the probability of one so strong by chance (above
+    1 for weak ones): the ratio of its power to the mean of its neighbours is F(2, 2 m) in noise, Bonferroni over all.
 
     power         (f,) of any unit
-    among         (f,) which frequencies are asked, of those with so many neighbours; None: all
-    reach, gap    neighbours are so many on either side (``NEIGHBOURS`` at least), the nearest of which are left out
+    among         which frequencies are tested, of those with enough neighbours (f,); None: all
+    reach, gap    neighbours on either side (``NEIGHBOURS`` at least), without so many of the nearest
 
-    None where no frequency that is asked has power around it.
+    None where no frequency that is tested has power around it.
     """
     reach = max(NEIGHBOURS, reach)
     around = np.ones(2 * reach + 1)
@@ -34,10 +34,10 @@ def loudest(power: Array, among: Bools | None = None, reach: int = 0, gap: int =
     level = np.convolve(power, around / around.sum(), mode="same")
     number = np.arange(len(power))
     whole = (number >= reach) & (number < len(power) - reach) & (level > 0)
-    asked = np.flatnonzero(whole if among is None else whole & among)
-    if not len(asked):
+    tested = np.flatnonzero(whole if among is None else whole & among)
+    if not len(tested):
         return None
-    ratio = power[asked] / level[asked]
-    # A Hann taper makes neighbours alike: they count for 1 + 2 (2/3)^2 + 2 (1/6)^2 fewer.
-    worth = around.sum() / 1.94
-    return int(asked[ratio.argmax()]), len(asked) * float((1 + ratio.max() / worth) ** -worth)
+    ratio = power[tested] / level[tested]
+    # A Hann taper correlates neighbours: independent ones are fewer by 1 + 2 (2/3)^2 + 2 (1/6)^2.
+    independent = around.sum() / 1.94
+    return int(tested[ratio.argmax()]), len(tested) * float((1 + ratio.max() / independent) ** -independent)

@@ -1,8 +1,9 @@
-"""The residual that no candidate explains: not named, but described.
+"""The unexplained residual: what no candidate explains, described by tests and by lines along the way.
 
-Problem: something is missing, and nothing on the list is it. Solution: what the best model leaves is read as a
-comparison reads it (which force in the suspensions, at which frequencies, following what), and once more along the way
-instead of along the time: what a wheel does once in a turn repeats every so many metres, whatever the speed.
+Problem: something is missing that is not on the list of effects. Solution: the residual of the best model is tested as
+a comparison tests it (which force in the suspensions, at which frequencies, correlated with what), and its spectrum is
+taken along the way instead of along the time: what a wheel does once in a turn repeats every so many metres, whatever
+the speed.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ import numpy.typing as npt
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
-from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
+from logger.lab.residuals.residual_tests import SIGNIFICANCE, ResidualTests, run_residual_tests
+from logger.lab.residuals.spectral_lines import NEIGHBOURS, periodogram, strongest_line
 from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
@@ -24,11 +25,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SpatialLine:
-    """What repeats along the way in the run where that is clearest: how often [1/m], and the speed that it mostly had;
-    how probable by chance, which is certain where runs at other speeds do not have it; and the powers (n,) at all wave
-    numbers (n,) [1/m] over their mean.
+    """A line at a wave number, in the run where it is most significant: the wave number [1/m], the run's usual speed,
+    the p-value (1 where runs at other speeds do not have it), and the powers (n,) at all wave numbers (n,) [1/m] over
+    their mean.
 
-    steady    the speed hardly changed, so that it may as well repeat in time
+    steady    the speed hardly changed, so that it may as well be a line in time
     """
 
     run: str
@@ -41,13 +42,14 @@ class SpatialLine:
 
     @property
     def found(self) -> bool:
-        """Whether the line is hardly chance."""
-        return self.p_value < DOUBT
+        """Whether the line is significant."""
+        return self.p_value < SIGNIFICANCE
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run shows it)."""
+    """Residuals of a model: their power by frequency, speed, excitation and place, their tests, and the strongest line
+    along the way (None: there is none)."""
 
     residuals: ModelResiduals
     where: Breakdown
@@ -56,23 +58,23 @@ class Shape:
 
 
 def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
-    """The shape of the residuals of a fitted model, without what its sensors drift."""
+    """The shape of the residuals of a fitted model, without the drift of its sensors."""
     runs, car = posterior.runs, posterior.car(state.effects, state.logs)
-    responses = runs.respond(car, posterior.moved_m(state.record))
+    responses = runs.respond(car, posterior.distance_error_m(state.record))
     residuals, as_recorded = (
         ModelResiduals(runs.runs, car, [run.main(one) for run, one in zip(runs.runs, some, strict=True)], responses)
-        for some in map(removed.cleared, (state.predictions, runs.predict(car))))
+        for some in map(removed.with_drifts, (state.predictions, runs.predict(car))))
     where = breakdown(residuals)
     return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 
 
 def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
                     per_m: tuple[float, float] = (0.3, 2.2)) -> SpatialLine | None:
-    """What repeats along the way: as for a tone in time, which it is distinguished from where the speed changes or
-    where another run, at another speed, has it too.
+    """The strongest line along the way. A tone in time is distinguished from it where the speed changes, or where
+    another run has another speed.
 
-    slowest_mps    runs that are slower somewhere are not asked
-    per_m          asked of these wave numbers [1/m]: one to three times in a turn of a wheel of 0.22 to 0.5 m radius
+    slowest_mps    runs that are slower somewhere are not tested
+    per_m          wave numbers that are tested [1/m]: one to three in a turn of a wheel of 0.22 to 0.5 m radius
     """
     found, names = [], short_names(residuals.runs)
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
@@ -85,13 +87,13 @@ def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
         waves_per_m = np.fft.rfftfreq(len(along), step_m)
         asked = (waves_per_m > per_m[0]) & (waves_per_m < per_m[1])
         power = periodogram(along)
-        stands_out = loudest(power, asked)
-        if stands_out is None or asked.sum() < NEIGHBOURS:
+        line = strongest_line(power, asked)
+        if line is None or asked.sum() < NEIGHBOURS:
             continue
-        at_per_m = float(waves_per_m[stands_out[0]])
-        # A tone in time that slips by a cycle along the way is no line there any more.
-        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < 1
-        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1],
+        at_per_m = float(waves_per_m[line[0]])
+        # A tone in time whose phase along the way varies by a cycle or more is no line there.
+        steady = _schedule_range_s(way, run.rate_hz) * at_per_m * usual_mps < 1
+        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, line[1],
                                  np.asarray(waves_per_m[asked], float), power[asked] / float(power[asked].mean()),
                                  steady))
     best = min(found, key=lambda one: one.p_value, default=None)
@@ -102,12 +104,12 @@ def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
     if not best.steady or not others:
         return best
     # A tapered line is two ordinates wide.
-    again = any(one.found and abs(one.at_per_m - best.at_per_m) < 2 * max(np.diff(line.per_m[:2])[0]
-                for line in (one, best)) for one in others)
-    return replace(best, steady=False) if again else replace(best, p_value=1.0)
+    recurs = any(one.found and abs(one.at_per_m - best.at_per_m) < 2 * max(
+        np.diff(line.per_m[:2])[0] for line in (one, best)) for one in others)
+    return replace(best, steady=False) if recurs else replace(best, p_value=1.0)
 
 
-def _slips(way_m: Array, rate_hz: float) -> float:
-    """How much earlier or later than at a steady speed a car was along its way, from most to most [s]."""
+def _schedule_range_s(way_m: Array, rate_hz: float) -> float:
+    """Range of the deviation from a steady speed's schedule along the way [s]."""
     time_s = np.arange(len(way_m)) / rate_hz
     return float(np.ptp(time_s - np.polyval(np.polyfit(way_m, time_s, 1), way_m)))

@@ -1,12 +1,12 @@
-"""A model with effects added: fitted on all that there is, with what is known of every number.
+"""Effects added to a model: both fitted to all data, with the standard error of every number.
 
 Problem: whoever adds an effect wants its numbers with their errors, and wants to see what else changed: a missing
 effect biases the car's own numbers, and adding it removes the bias; and a fit always gains a little when it gets one
 more number. Solution: the car is fitted with and without the effect on all of the runs, each number comes with its
-standard error from the information matrix, and the gain in evidence says how often noise would do as much. Evidence
-weighs frequencies by their noise: where it gains and the error on what no fit saw rises, the effect does not help. What
-is written holds on to the numbers that were given; what is compared side by side does not, on either side, so that
-nothing but the effect makes the difference.
+standard error from the information matrix, and the gain in evidence bounds how probably noise would do as much.
+Evidence weighs frequencies by their noise: where it gains and the hold-out error rises, the effect does not help. The
+numbers that are written are held near those that were given; the numbers that are compared are free in both fits, so
+that the effect alone makes the difference.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, own_slopes, read_beside
-from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, noise_as_read, signal_errors_of
+from logger.lab.likelihood.map_fit import align, fit, fit_model, own_slopes
+from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
-from logger.lab.selection.holdout import HoldOut, held_out
+from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -33,17 +33,16 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-BIASED = 2.0
+BIAS_SIGMA = 2.0
 """A number that an effect moves by more standard errors than this had been biased by its absence."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the car: as it was given, refitted without the added effects, and with them, as far off as the runs
-    ask for; with standard errors, which include how far off it may have been.
+    """A number of the car: nominal, refitted without the added effects, and with them, both with a normal prior; with
+    standard errors, which include the prior.
 
-    shift      from the one to the other, in standard errors of the last
-    written    with the effects, held near what was given: what the vehicle has then
+    written    with the effects and soft bounds, as it is written to the vehicle's file
     """
 
     name: str
@@ -56,34 +55,34 @@ class Number:
 
     @property
     def shift(self) -> float:
-        """From without to with, in standard errors of the last."""
+        """Change from the fit without the effects to that with them, in standard errors of the latter."""
         return (self.found - self.without) / self.standard_error if self.standard_error > 0 else 0.0
 
     @property
     def biased(self) -> bool:
-        """Whether the missing effects had biased it."""
-        return abs(self.shift) > BIASED
+        """Whether the absence of the effects had biased it."""
+        return abs(self.shift) > BIAS_SIGMA
 
 
 @dataclass(frozen=True, eq=False)
 class AddedEffects:
     """A vehicle with effects added.
 
-    vehicle             with its numbers refitted
-    effects             all, with values and standard errors
-    names               of those that were added
-    numbers             of the car
-    error_before        of the vehicle and effects as they were
-    error_refitted      of those with their numbers refitted and the distance errors taken out
-    error_after         of the model with the effects, fitted in the same way
-    error_as_written    of that model on the distances as recorded: what a comparison with it begins at
-    noise_floor_error   the error that the sensor's noise makes
-    p_value             how often, at most, noise alone would gain as much
-    unseen_before, unseen_after    the model without and with the effects on what its fit did not see; None: not known
-    band                what of the runs was compared; None: all of it
-    removed             what is taken out of the errors before they are judged: drift, wrong distances
-    errors              of the numbers of vehicle and effects together
-    signals             errors of signals beside the sensor's acceleration, by name: refitted without and with
+    vehicle                        with its numbers refitted
+    effects                        all, with values and standard errors
+    names                          of those that were added
+    numbers                        of the car
+    error_before                   of the vehicle and effects as they were
+    error_refitted                 of those with their numbers refitted and the distance errors taken out
+    error_after                    of the model with the effects, fitted in the same way
+    error_as_written               of that model at the recorded distances: the error of a comparison with it
+    noise_floor_error              the error that the sensor's noise makes
+    p_value                        bound on the probability that noise alone gains as much
+    unseen_before, unseen_after    cross-validation without and with the effects; None: not known
+    band                           in which the runs were compared; None: all
+    removed                        sensor drift, distance error and filtering, removed from the errors
+    errors                         of the numbers of vehicle and effects together
+    signals                        errors of other signals than the sensor's acceleration, without and with the effects
     """
 
     vehicle: Vehicle
@@ -109,18 +108,18 @@ class AddedEffects:
         return self.p_value < FALSE_ALARM
 
     @property
-    def raises(self) -> bool:
-        """Whether the error on what no fit saw is larger with them. Of effects that do no more than move runs nothing
-        is asked: without them the distance errors do the same, and these are known on all of a run."""
+    def worsens_hold_out(self) -> bool:
+        """Whether the hold-out error is larger with them. Not asked of effects that only shift runs: without them the
+        distance errors do the same, and these are fitted to all of a run."""
         before, after = self.unseen_before, self.unseen_after
         if before is None or after is None or not any(one.effect.reshapes for one in self.new):
             return False
-        return after.raises(before)
+        return after.is_worse_than(before)
 
     @property
     def helps(self) -> bool:
-        """Whether the effects gain more than noise would, and not only where the fit looked."""
-        return self.gains and not self.raises
+        """Whether the effects gain more than noise would, and do not raise the hold-out error."""
+        return self.gains and not self.worsens_hold_out
 
     @property
     def new(self) -> tuple[Chosen, ...]:
@@ -148,44 +147,46 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    before = read_beside(fit(aligned(posterior, posterior.start(present))))
+    before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
-    after = _with(posterior, before, (*before.state.effects, *added), (*present, *added))
-    loose = posterior.without_wall()
-    (bent, spread_before), (freed, spread_after) = (_freed(loose, one) for one in (before, after))
+    after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added))
+    unbounded = posterior.without_soft_bounds()
+    (base_fit, errors_before), (effect_fit, errors_after) = (
+        _fit_without_soft_bounds(unbounded, one) for one in (before, after))
     prior, nominal = posterior.prior, posterior.vehicle
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
-        after.state.logs, bent.state.logs, freed.state.logs))
+        after.state.logs, base_fit.state.logs, effect_fit.state.logs))
     numbers = tuple(
         Number(name, read(nominal, name), read(without, name), read(without, name) * float(was), read(found, name),
                read(found, name) * float(now), read(vehicle, name))
-        for name, was, now in zip(prior.names, spread_before, spread_after, strict=True)
+        for name, was, now in zip(prior.names, errors_before, errors_after, strict=True)
     )
     effects, _ = standard_errors(after)
     start, state = posterior.start(present), after.state
     return AddedEffects(
         vehicle, effects, tuple(one.effect.name for one in added), numbers,
         error_before=posterior.error(start), error_refitted=posterior.error(before.state),
-        error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
-        noise_floor_error=floor_error(posterior, noise_as_read(posterior, state)),
+        error_after=posterior.error(state),
+        error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
+        noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
         removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
-        unseen_before=held_out(before, own_slopes(before)), unseen_after=held_out(after, own_slopes(after)),
+        unseen_before=cross_validate(before, own_slopes(before)), unseen_after=cross_validate(after, own_slopes(after)),
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state))
 
 
-def _with(posterior: Posterior, before: LinearModel, beside: tuple[Chosen, ...],
-          anew: tuple[Chosen, ...]) -> LinearModel:
-    """The model with more effects. A car that was refitted without what is missing may be bent too far, or lie too
-    wrong, to begin with."""
+def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],
+                      nominal: tuple[Chosen, ...]) -> LinearModel:
+    """Fit the model with more effects, from the refitted car or from the nominal one, whichever aligns better: numbers
+    and distances that were refitted without what is missing may be too far off to begin with."""
     state = before.state
-    starts = [aligned(posterior, one) for one in (
-        posterior.at(beside, state.logs, state.record, state.size), posterior.start(anew))]
+    starts = [align(posterior, one) for one in (
+        posterior.state_at(refitted, state.logs, state.record, state.size), posterior.start(nominal))]
     return fit(min(starts, key=lambda one: one.score))
 
 
-def _freed(loose: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
-    """The model fitted without holding on to the car's numbers, and standard errors of their logarithms (p,)."""
-    if found.posterior.prior.at_the_wall(found.state.logs):
-        found = fit(LinearModel(loose, found.state), found.numbers)
+def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
+    """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
+    if found.posterior.prior.at_soft_bounds(found.state.logs):
+        found = fit(LinearModel(unbounded, found.state), found.numbers)
     return found, standard_errors(found)[1]

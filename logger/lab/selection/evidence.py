@@ -1,11 +1,11 @@
 """The score by which models are chosen, and when a gain in it says that an effect is there.
 
-Problem: among twenty candidates at some hundred values, one always gains by chance, and beside something that nobody
-knows several gain a little by imitating it. Solution: models are scored by their evidence, in which each number counts
-(``LinearModel.score``). A ratio of evidences of B or more comes by chance in less than one of B cases (A. Markov's
-inequality; V. Vovk and R. Wang, Annals of Statistics 49, 2021, call it an e-value), so that 1 / B times the number of
-candidates bounds how often noise alone looks like any of them (Bonferroni). What is unmodelled competes as well: an
-effect has to gain more than imitations do.
+Problem: among twenty candidates at some hundred values, one always gains by chance, and where something unknown is
+missing several gain a little by imitating it. Solution: models are scored by their evidence, in which each number
+counts (``LinearModel.score``). A ratio of evidences of B or more comes by chance in less than one of B cases (A.
+Markov's inequality; V. Vovk and R. Wang, Annals of Statistics 49, 2021, call it an e-value), so that 1 / B times the
+number of candidates bounds how often noise alone looks like any of them (Bonferroni). What is unmodelled competes as
+well: an effect has to gain more than imitations do.
 """
 
 from __future__ import annotations
@@ -13,20 +13,22 @@ from __future__ import annotations
 import numpy as np
 
 FALSE_ALARM = 0.001
-"""How often, at most, noise alone may look like an effect, all candidates together."""
+"""Probability, at most, that noise alone looks like an effect, all candidates together. A judgement: one false name in
+a thousand diagnoses."""
 IMITATION = 0.1
-"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing."""
-CONFUSED = 10.0
+"""An effect that gains a smaller share of what a full explanation would may only imitate what is missing. A
+judgement."""
+INDISTINGUISHABLE = 10.0
 """Models whose scores differ by less cannot be distinguished (R. E. Kass and A. E. Raftery 1995: 2 ln B > 10 is very
 strong evidence)."""
 
 
 def probability_by_chance(gain: float, candidates: int) -> float:
-    """How often, at most, noise alone would gain so much in minus twice the log of the evidence with any of so many
-    candidates."""
+    """Bound on the probability that noise alone gains so much, in minus twice the log of the evidence, with any of so
+    many candidates."""
     return float(min(1.0, candidates * np.exp(-0.5 * max(gain, 0.0))))
 
 
-def least_gain(candidates: int) -> float:
-    """The gain from which on that is less than a false alarm."""
+def min_gain(candidates: int) -> float:
+    """Gain above which that probability is below ``FALSE_ALARM``."""
     return float(2 * np.log(candidates / FALSE_ALARM))

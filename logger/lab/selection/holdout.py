@@ -1,9 +1,9 @@
-"""Errors on stretches that no fit saw, without a fit for each.
+"""Approximate cross-validation: errors on held-out stretches, without a fit for each.
 
 Problem: an error is honest on data that the fit did not see, and twenty models cannot be fitted three times over.
-Solution: three sets of stretches are held out in turn, and one step of Gauss and Newton from the fit of all data gives
-the fit without them (A. Beirami et al., Advances in Neural Information Processing Systems 30, 2017). Where the car was
-is no part of what is judged: distance errors stay as all data tell them.
+Solution: three sets of stretches are held out in turn, and one Gauss-Newton step from the fit of all data gives the fit
+without them (A. Beirami et al., Advances in Neural Information Processing Systems 30, 2017). Where the car was is not
+judged: distance errors stay as fitted to all data.
 """
 
 from __future__ import annotations
@@ -15,68 +15,69 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.readings import as_read_error
-from logger.lab.likelihood.whittle import deviance
+from logger.lab.likelihood.readings import error_with_rounding_noise
+from logger.lab.likelihood.signals import deviance
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
-# Half of the last digit of three: an error of 0.060 that is said to fall to 0.060.
+# A relative difference below it is a rounding: errors are printed to two digits or three.
 _ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
-"""Stretches are longer than a car remembers its road, some seconds, and each run has some of every set."""
+"""Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
+set."""
 
 
 @dataclass(frozen=True)
 class HoldOut:
-    """A model on stretches that its fit did not see, all of them in turn: its normalised r.m.s. error, and minus twice
-    the log-likelihood of its residuals."""
+    """A model on held-out stretches, all of them in turn: its normalised r.m.s. error, and minus twice the
+    log-likelihood of its residuals."""
 
     error: float
     deviance: float
 
-    def raises(self, without: HoldOut) -> bool:
-        """Whether the error is larger than that of the model without something, by more than a rounding."""
+    def is_worse_than(self, without: HoldOut) -> bool:
+        """Whether the error is larger than that of a smaller model by more than a rounding."""
         return self.error > (1 + _ROUNDING) * without.error
 
 
 def folds(run: Run) -> npt.NDArray[np.intp]:
-    """Which of the sets each sample that counts is held out with (n,), of each signal after the other."""
+    """Number of the set that each sample that counts is held out with (n,), of each signal after the other."""
     time_s = np.arange(run.count - run.first) / run.rate_hz
     stretch_s = min(_STRETCH_S, (run.count - run.first) / run.rate_hz / _FOLDS)
     return np.tile((time_s / stretch_s).astype(np.intp) % _FOLDS, 1 + len(run.signals))
 
 
-def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut:
-    """Of a model at the state that it is linear beside, with more columns (m, n) per run whose sizes are fitted too."""
+def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut:
+    """Cross-validate a linearised model, with more columns (m, n) per run whose coefficients are fitted too."""
     posterior, state = linear.posterior, linear.state
     residuals = posterior.residuals(state)
     columns = linear.numbers or [np.empty((0, len(one))) for one in residuals]
     if own is not None:
         columns = [np.vstack([first, more]) for first, more in zip(columns, own, strict=True)]
-    columns = linear.without_deaf(columns)
+    columns = linear.without_insensitive_samples(columns)
     white, ones = ([whitener.in_time(one) for whitener, one in zip(linear.whiteners, some, strict=True)]
                    for some in (columns, residuals))
     sets = [folds(run) for run in posterior.runs.runs]
     own_count = len(columns[0]) - linear.count
     prior = np.concatenate([posterior.prior.curvature(state.logs)[: linear.count], np.zeros(own_count)])
-    pull = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
+    prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
     unseen = [one.copy() for one in residuals]
     for fold in range(_FOLDS):
-        information, gradient = np.diag(prior), -pull
+        information, gradient = np.diag(prior), -prior_gradient
         for part, residual, which in zip(white, ones, sets, strict=True):
             seen = which != fold
             information = information + part[:, seen] @ part[:, seen].T
             gradient = gradient + part[:, seen] @ residual[seen]
-        step = _solved(information, gradient)
+        step = _solve_scaled(information, gradient)
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
             held = np.flatnonzero(run.counted)[which == fold]
             kept[held] = (residual - step @ part)[held]
-    return HoldOut(as_read_error(posterior.readings, unseen), deviance(posterior.bands, unseen))
+    return HoldOut(error_with_rounding_noise(posterior.readings, unseen), deviance(posterior.bands, unseen))
 
 
-def _solved(information: Array, gradient: Array) -> Array:
-    """Columns that do nothing stay where they are."""
+def _solve_scaled(information: Array, gradient: Array) -> Array:
+    """Newton step of a scaled system; numbers that nothing depends on stay."""
     size = np.sqrt(np.diag(information))
     scale = np.where(size > 0, size, 1.0)
     scaled = information / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))

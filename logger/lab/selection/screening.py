@@ -1,9 +1,9 @@
-"""Effects tried on a model without a fit: would this one explain the residuals, and with which numbers?
+"""Score tests of effects: how much each would gain on top of a model, before it is fitted.
 
-Problem: most effects do nothing at their null and something quite different at each of their values, so that a slope at
-zero strength says little about them (a shape such as a knee or a frequency has no meaning there). Solution: each is
-simulated at a few trial values; what the car's own numbers and the distance errors could do as well is projected out
-(a score test), and the trial that explains most, at the strength at which it does, is where a fit begins.
+Problem: most effects do nothing at their null and something quite different at each of their values, so that a
+derivative at zero strength says little about them (a shape such as a knee or a frequency has no meaning there).
+Solution: each is simulated at a few trial values; what the car's own numbers and the distance errors could do as well
+is projected out (a score test), and the trial that explains most, at its best strength, is where a fit begins.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, own_slopes
-from logger.lab.likelihood.noise_floor import gain_of_an_explanation
+from logger.lab.likelihood.map_fit import align, own_slopes
+from logger.lab.likelihood.noise_floor import gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.selection.holdout import HoldOut, held_out
+from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved
@@ -28,19 +28,19 @@ from logger.vehicle.named_parameters import read
 
 Array = npt.NDArray[np.float64]
 
-# How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
-# next to nothing.
-_STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
+# Bounds of the best strength over that of a trial, as far as a quadratic is to be believed (judgements). An effect that
+# shifts all of a run is linear much farther, and is tried with next to nothing.
+_STRONGEST, _STRONGEST_SHIFT, _WEAKEST = 10.0, 1000.0, 0.03
 
 
 @dataclass(frozen=True, eq=False)
 class _Quadratic:
-    """A fitted model to second order, under a prior of the car's numbers.
+    """The objective of a fitted model to second order in the car's numbers.
 
     residuals      whitened (kept,) per run
-    covariance     (p, p) of the car's numbers
-    newton_step    (p,) the way to where these fit best
-    objective      squares of the residuals there, and the cost of what is off
+    covariance     of the car's numbers (p, p)
+    newton_step    of these to the minimum (p,)
+    objective      there: sum of squares of the residuals and cost of the priors
     """
 
     linear: LinearModel
@@ -51,9 +51,9 @@ class _Quadratic:
 
     @staticmethod
     def of(linear: LinearModel) -> _Quadratic:
-        """Of a model beside its state."""
+        """The quadratic of a linearised model."""
         state = linear.state
-        here = linear.eliminated(state.predictions)
+        here = linear.fit_record_errors(state.predictions)
         covariance = np.asarray(np.linalg.inv(linear.information(state.logs)), float)
         gradient = linear.gradient(here.residuals, state.logs)
         step = covariance @ gradient
@@ -65,87 +65,87 @@ class _Quadratic:
 class Baseline:
     """A fitted model that effects are tried on.
 
-    score          minus twice the log of its evidence
-    explanation    what a full explanation of the residuals would gain
-    rough          predictions of a rough simulation, for comparing with others
-    quadratics     under the prior, and, where its wall holds a number, without the wall: a car that is bent to the wall
-                   hides what effects do
-    as_recorded    starts and factors of the distances are those of the record
+    score            minus twice the log of its evidence
+    explanation      gain of a full explanation of the residuals
+    rough            predictions of a rough simulation, for comparison with others
+    quadratics       with the soft bounds of the prior and, where a number is beyond them, also without: a car that is
+                     held there hides what effects do
+    trend_removed    whether start and scale errors of the distances are taken to be 0
     """
 
     score: float
     explanation: float
     rough: list[Array]
     quadratics: tuple[_Quadratic, ...]
-    as_recorded: bool = False
+    trend_removed: bool = False
 
     @staticmethod
-    def of(linear: LinearModel, as_recorded: bool = False) -> Baseline:
-        """Of a model beside its state."""
+    def of(linear: LinearModel, trend_removed: bool = False) -> Baseline:
+        """The baseline of a linearised model."""
         state = linear.state
         quadratics = [_Quadratic.of(linear)]
-        if linear.prior.at_the_wall(state.logs):
-            quadratics.append(_Quadratic.of(linear.without_wall()))
-        return Baseline(linear.score, gain_of_an_explanation(linear.posterior, state),
-                        _roughly(linear, state.effects, state.logs), tuple(quadratics), as_recorded)
+        if linear.prior.at_soft_bounds(state.logs):
+            quadratics.append(_Quadratic.of(linear.without_soft_bounds()))
+        return Baseline(linear.score, gain_of_full_explanation(linear.posterior, state),
+                        _rough_predictions(linear, state.effects, state.logs), tuple(quadratics), trend_removed)
 
     @property
     def posterior(self) -> Posterior:
-        """That which was fitted."""
+        """The posterior that was fitted."""
         return self.linear.posterior
 
     @property
     def linear(self) -> LinearModel:
-        """The model beside its state."""
+        """The model linearised at its state."""
         return self.quadratics[0].linear
 
     @property
     def state(self) -> State:
-        """The model."""
+        """The fitted state."""
         return self.linear.state
 
     @cached_property
     def hold_out(self) -> HoldOut:
-        """The model on what its fit did not see."""
-        return held_out(self.linear, own_slopes(self.linear))
+        """Cross-validation of the model."""
+        return cross_validate(self.linear, own_slopes(self.linear))
 
     def gain(self, objective: float, logs: Array, linear: LinearModel) -> float:
-        """By how much an objective is below this model's own; it was found under the prior of ``linear``, at these
-        numbers of the car (p,)."""
-        wall = self.posterior.prior.cost(logs) - linear.prior.cost(logs)
-        return self.quadratics[0].objective - objective - wall
+        """This model's objective minus another, which was found under the prior of ``linear`` at these numbers of the
+        car (p,), in terms of this model's prior."""
+        bounds_cost = self.posterior.prior.cost(logs) - linear.prior.cost(logs)
+        return self.quadratics[0].objective - objective - bounds_cost
 
 
-def as_recorded(base: Baseline) -> Baseline:
-    """The model in the nominal car, with starts and factors of the distances as they were recorded."""
+def without_distance_trend(base: Baseline) -> Baseline:
+    """The model of the nominal car, without start and scale errors of the distances."""
     posterior, state = base.posterior, base.state
     record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
-    there = posterior.at(state.effects, np.zeros_like(state.logs), record)
+    there = posterior.state_at(state.effects, np.zeros_like(state.logs), record)
     numbers = posterior.number_slopes(there, posterior.prior.steps)
-    return Baseline.of(LinearModel(posterior, there, numbers), as_recorded=True)
+    return Baseline.of(LinearModel(posterior, there, numbers), trend_removed=True)
 
 
-def others(state: State, name: str) -> tuple[Chosen, ...]:
-    """The effects of a model but one."""
+def effects_without(state: State, name: str) -> tuple[Chosen, ...]:
+    """The effects of a model without one."""
     return tuple(one for one in state.effects if one.effect.name != name)
 
 
-def taken_out(now: Baseline, name: str) -> Baseline:
-    """A model without one of its effects, all else as it was with it: whatever belongs in the place of that effect is
-    found beside others that have not yet moved to make up for it."""
+def without_effect(now: Baseline, name: str) -> Baseline:
+    """A model without one of its effects, all other numbers unchanged: a substitute is searched for before the others
+    have moved to compensate for it."""
     posterior, state = now.posterior, now.state
-    there = posterior.at(others(state, name), state.logs, state.record, state.size)
+    there = posterior.state_at(effects_without(state, name), state.logs, state.record, state.size)
     return Baseline.of(LinearModel(posterior, there, posterior.number_slopes(there, posterior.prior.steps)))
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect at one set of values, and what it would do.
+    """An effect at one set of values, and its expected gain.
 
     gain      by how much minus twice the log of the evidence would fall, its numbers not counted
-    logs      (p,) where the car's numbers are then
-    change    what it does to the predictions at its values (n,), per run [m/s2]
-    start     where a fit begins, if the runs lie elsewhere with it; None: beside the baseline
+    logs      the car's numbers then (p,)
+    change    of the predictions by the effect at its values (n,), per run [m/s2]
+    start     where a fit begins, if with other distance errors; None: at the baseline
     """
 
     one: Chosen
@@ -157,42 +157,42 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves,
-    and of a shape (a frequency, a knee) that has two optima both."""
+    """Trials of an effect where fits may begin, of the largest gain first: the best for each combination of parameters
+    that no fit moves, and both optima of a shape (a frequency, a knee) that has two."""
 
     effect: Effect
     trials: tuple[Trial, ...]
 
     @property
     def gain(self) -> float:
-        """Of the most promising one."""
+        """The largest gain of the trials."""
         return self.trials[0].gain
 
 
-def shared_numbers(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """Numbers of an effect that another one has as well, as that one has them, inside their ranges: a resonance that is
-    taken for one thing lies where it lies when it is another one."""
+def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of those parameters of an effect that another one has as well, clipped to their ranges: a resonance keeps
+    its frequency when it is attributed to something else."""
     return {one.name: min(max(values[one.name], one.low), one.high)
             for one in effect.parameters if one.moves and one.name in values}
 
 
-def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment],
+def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
              near: Mapping[str, float] = MappingProxyType({})) -> Screened:
     """Trials of an effect on a model.
 
-    seen    ways in which the runs may be misaligned
-    near    numbers of an effect in whose place this one is tried
+    misaligned    ways in which the runs may be misaligned
+    near          values of an effect in whose place this one is tried
     """
-    # Where the distance errors are of a usual size, or none but those of the record, positions are not far wrong.
-    anew = base.state.size.is_unusual and not base.as_recorded and not effect.reshapes
+    # Where the distance errors are of a usual size, or their trend was removed, positions are not far wrong.
+    realigns = base.state.size.is_unusually_large and not base.trend_removed and not effect.reshapes
     trials: list[dict[str, float]] = []
-    for way in seen:
-        trials += [values for values in effect.trials(way) if values not in trials]
+    for one_way in misaligned:
+        trials += [values for values in effect.trials(one_way) if values not in trials]
     prior = base.posterior.prior
     known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
-    if shared := shared_numbers(effect, near):
+    if shared := shared_parameters(effect, near):
         trials.append(trials[0] | shared)
-    if known:  # where a fit has brought the car's own numbers is worth a trial
+    if known:  # the fitted values of the car's own numbers are a trial as well
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     nominal = np.zeros_like(base.state.logs)
@@ -201,43 +201,47 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment],
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.moves)
         one = chosen(effect, values)
-        ways = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
-        if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does
-            ways.append(_as_it_is(base, one, nominal))
-        if anew and values is not trials[0]:
-            ways.append(_aligned_anew(base, one, ways[0]))
+        ways = ([_trial_at_values(base, one, base.state.logs)] if effect.replaces else
+                _trials_at_best_strength(base, one))
+        if len(base.quadratics) > 1:  # numbers that already imitate an effect say little of it
+            ways.append(_trial_at_values(base, one, nominal))
+        if realigns and values is not trials[0]:
+            ways.append(_realigned_trial(base, one, ways[0]))
         trial = max(ways, key=lambda trial: trial.gain)
-        alike = found.setdefault(choice, {})
-        if (there := values.get(shape, 0.0)) not in alike or trial.gain > alike[there].gain:
-            alike[there] = trial
-    best = [one for alike in found.values() for one in _optima([alike[value] for value in sorted(alike)])[:2]]
+        by_shape = found.setdefault(choice, {})
+        if (there := values.get(shape, 0.0)) not in by_shape or trial.gain > by_shape[there].gain:
+            by_shape[there] = trial
+    best = [one for by_shape in found.values()
+            for one in _optima([by_shape[value] for value in sorted(by_shape)])[:2]]
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
 
 
 def _optima(trials: Sequence[Trial]) -> list[Trial]:
-    """Those that promise more than their neighbours, the most promising first; of trials in the order of a shape."""
+    """Local maxima of the gain of trials in the order of their shape, the largest first."""
     gains = [-np.inf, *(one.gain for one in trials), -np.inf]
     found = [one for one, before, after in zip(trials, gains, gains[2:], strict=False)
              if one.gain >= max(before, after)]
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _roughly(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
+def _rough_predictions(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
+    """Predictions (n,) per run of a rough simulation with the record errors of a linearised model."""
     return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
 
 
-def _scaled(base: Baseline, one: Chosen) -> list[Trial]:
-    """A trial at the strength at which it explains most, under each prior."""
-    there = _roughly(base.linear, (*base.state.effects, one), base.state.logs)
+def _trials_at_best_strength(base: Baseline, one: Chosen) -> list[Trial]:
+    """The trial at its best strength, by each quadratic of the baseline."""
+    there = _rough_predictions(base.linear, (*base.state.effects, one), base.state.logs)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
     return [_trial(base, quadratic, one, change) for quadratic in base.quadratics]
 
 
 def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Array]) -> Trial:
+    """The trial at its best strength, by a quadratic."""
     linear = quadratic.linear
     white = linear.whitened(change)
     here = base.state.logs + quadratic.newton_step
-    mixed, own = linear.mixed(white)
+    mixed, own = linear.cross_products(white)
     absorbed = quadratic.covariance @ mixed
     along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
              - float(mixed @ quadratic.newton_step))
@@ -250,21 +254,20 @@ def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Arra
 
     if not own > 0:
         return Trial(one, 0.0, here, change)
-    strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
+    strongest = _STRONGEST_SHIFT if one.effect.realigns else _STRONGEST
     strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
-    scaled = scaled_by(one, strength)
+    scaled = scale_strength(one, strength)
     if scaled is None:
         return at(1.0, one)
     if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
         return at(strength, scaled)
-    # A resonance that is half as strong lies elsewhere, and may do something else altogether.
-    return max((_as_predicted(base, linear, trial) for trial in (at(strength, scaled), at(1.0, one))),
+    # A resonance half as strong has another frequency, and its change may be of another shape.
+    return max((_with_predicted_gain(base, linear, trial) for trial in (at(strength, scaled), at(1.0, one))),
                key=lambda trial: trial.gain)
 
 
-def _as_predicted(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
-    """The same with the gain that it truly has, the car's numbers counted to first order: sensors are tried on one body
-    then."""
+def _with_predicted_gain(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
+    """The trial with the gain of a full prediction, the car's numbers to first order."""
     state = base.state
     there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
     step = trial.logs - state.logs
@@ -272,31 +275,31 @@ def _as_predicted(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
     return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
 
 
-def _as_it_is(base: Baseline, one: Chosen, logs: Array) -> Trial:
-    """A trial as it is, in a car with these numbers (p,), which then take one step of Newton's; those that the effect
-    sets are held at their nominal values."""
-    linear = base.quadratics[-1].linear.holding(one.effect.replaces)
+def _trial_at_values(base: Baseline, one: Chosen, logs: Array) -> Trial:
+    """The trial at its own values, in a car with these numbers (p,), which then take one Newton step; those that the
+    effect sets are held at their nominal values."""
+    linear = base.quadratics[-1].linear.hold_fixed(one.effect.replaces)
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
-    there = _roughly(linear, (*base.state.effects, one), logs)
-    found = linear.eliminated(there)
-    pull = linear.gradient(found.residuals, logs)
-    step = np.linalg.solve(linear.information(logs), pull)
+    there = _rough_predictions(linear, (*base.state.effects, one), logs)
+    found = linear.fit_record_errors(there)
+    gradient = linear.gradient(found.residuals, logs)
+    step = np.linalg.solve(linear.information(logs), gradient)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
-    objective = found.squares + linear.prior.cost(logs) - float(pull @ step)
+    objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)
     return Trial(one, base.gain(objective, logs + step, linear), logs + step, change)
 
 
-def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
-    """A trial with the distance errors fitted anew from the distances as they were recorded: where positions are wrong,
-    those that were fitted without it are worth nothing."""
+def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:
+    """The trial with the distance errors fitted again from the recorded distances: where positions are wrong, those
+    that were fitted without the effect are too."""
     posterior, state = base.posterior, base.state
-    # It only has to tell where a fit begins: a round that gains a share of 0.4 % is the last.
-    found = aligned(posterior, posterior.at((*state.effects, one), state.logs), 0.004)
+    # It only decides where a fit begins: a round that gains less than 0.4 % of the whole gain is the last.
+    found = align(posterior, posterior.state_at((*state.effects, one), state.logs), 0.004)
     return replace(trial, one=one, gain=base.score - found.score, logs=state.logs, start=found.state)
 
 
-def scaled_by(one: Chosen, strength: float) -> Chosen | None:
-    """The effect at a share of its strength: of the way from its null to where it stands; None if it has no null."""
+def scale_strength(one: Chosen, strength: float) -> Chosen | None:
+    """The effect with its first strength times a factor, on its scale from the null on; None without a strength."""
     for place, parameter in enumerate(one.effect.parameters):
         if parameter.null is None or not parameter.moves:
             continue
@@ -308,17 +311,17 @@ def scaled_by(one: Chosen, strength: float) -> Chosen | None:
 
 
 def misalignment_of_record(base: Baseline) -> Misalignment:
-    """One factor and one time of all runs together that explain most of a model's distance errors."""
-    way, speed, moved_m = (np.concatenate(parts) for parts in zip(*(
-        (error.run.distance_m - error.run.distance_m[0], error.run.speed_mps, error.moved_m(k))
+    """The scale error and the delay, of all runs together, that explain most of a model's distance errors."""
+    way, speed, distance_error_m = (np.concatenate(parts) for parts in zip(*(
+        (error.run.distance_m - error.run.distance_m[0], error.run.speed_mps, error.distance_error_m(k))
         for error, k in zip(base.posterior.record_errors, base.state.record, strict=True)), strict=True))
-    (longer, earlier_s), *_ = np.linalg.lstsq(np.stack([way, speed], axis=1), moved_m, rcond=None)
+    (longer, earlier_s), *_ = np.linalg.lstsq(np.stack([way, speed], axis=1), distance_error_m, rcond=None)
     return Misalignment(float(1 / (1 + longer)), float(-earlier_s), *_filter_of(base.posterior))
 
 
 def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Misalignment:
-    """How the runs would have to be moved against the model to fit it best: all of them by one factor of their
-    distance, or by one time. Both are looked for in the slow part of the motion, whose waves are long."""
+    """The scale error and the delay at which all runs together correlate most with the model, each by itself. Both are
+    searched for in the slow part of the motion, whose waves are long."""
     pairs: list[tuple[Run, Array, Array]] = []
     for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
         size = max(1, round(slow_s * run.rate_hz))
@@ -326,8 +329,8 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
         slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, run.main(predicted))]
         pairs.append((run, slow[0], slow[1]))
 
-    def alike(scale: float, delay_s: float) -> float:
-        """Products of the measurement and the model, moved, over what they are at most."""
+    def correlation(scale: float, delay_s: float) -> float:
+        """Correlation of the measurement and the shifted model."""
         both = of = 0.0
         for run, measured, predicted in pairs:
             time_s = np.arange(run.count) / run.rate_hz
@@ -339,22 +342,23 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
             of += float(np.sqrt((kept @ kept) * (moved_mps2 @ moved_mps2)))
         return both / of if of > 0 else 0.0
 
-    still = alike(1.0, 0.0)
-    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), 0.08, 5e-4)
-    delay_s = _scanned(lambda off: alike(1.0, off), 1.5, 0.02)
-    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0,
-                        *_filter_of(posterior))
+    unshifted = correlation(1.0, 0.0)
+    scale = 1 + _grid_maximum(lambda off: correlation(1 + off, 0.0), 0.08, 5e-4)
+    delay_s = _grid_maximum(lambda off: correlation(1.0, off), 1.5, 0.02)
+    return Misalignment(
+        scale if correlation(scale, 0.0) > unshifted else 1.0,
+        delay_s if correlation(1.0, delay_s) > unshifted else 0.0, *_filter_of(posterior))
 
 
 def _filter_of(posterior: Posterior) -> tuple[tuple[float, int] | None, float]:
-    """The filter that the records seem to have gone through, and their rate."""
+    """Cut-off and order of the causal filter that was detected in the records (None: none), and their rate."""
     runs = posterior.runs.runs
     causal = [run.low_pass for run in runs if run.low_pass is not None and run.low_pass.causal]
     return (causal[0].cutoff_hz, round(causal[0].order)) if causal else None, runs[0].rate_hz
 
 
-def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:
-    """Where something is largest between -reach and reach, looked for in steps and then in tenths of a step."""
+def _grid_maximum(correlation: Callable[[float], float], reach: float, step: float) -> float:
+    """Maximum of a function between -reach and reach, on a grid of steps and then of tenths of a step."""
     count = round(reach / step)
-    middle = max((step * k for k in range(-count, count + 1)), key=alike)
-    return max((middle + 0.1 * step * k for k in range(-10, 11)), key=alike)
+    middle = max((step * k for k in range(-count, count + 1)), key=correlation)
+    return max((middle + 0.1 * step * k for k in range(-10, 11)), key=correlation)

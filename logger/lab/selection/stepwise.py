@@ -1,9 +1,9 @@
 """The search for effects that a model lacks: add, swap, drop, while the evidence gains.
 
 Problem: something differs, and twenty effects, alone or together, might be why; or none of them; or nothing. Solution:
-every effect is screened beside the model, the promising ones are fitted, and the one with the most evidence is added if
-noise alone would hardly gain as much in so many trials and imitations do not. Then each of the others is taken out:
-whatever gains most in its place stays, or nothing. The next round begins on that model.
+every effect is screened on top of the model, the promising ones are fitted, and the one with the most evidence is added
+if it gains more than noise in so many trials, or an imitation, would. Then each effect found before is removed, and
+whatever gains most in its place is kept, or nothing. The next round begins with that model.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from types import MappingProxyType
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
-from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
+from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
+from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE, min_gain
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import (
     Baseline,
     Screened,
-    as_recorded,
+    effects_without,
     misalignment_of_record,
-    others,
-    screened,
-    shared_numbers,
-    taken_out,
+    screen,
+    shared_parameters,
+    without_distance_trend,
+    without_effect,
 )
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 from logger.vehicle.effect_parameters import moves_of
@@ -42,43 +42,42 @@ Progress = Callable[[str], None]
 class Effort:
     """How much work a search takes; more of it finds no less.
 
-    effects                      no more than so many are looked for
-    fitted, refined              how many effects are fitted at most, and how many of them with slopes of their own
-    worth_fitting, worth_refining    of the gain of the best one, or of one that would count: what an effect has to
-                                 promise for that (with a tenth for fitting, a sensor's bandwidth was missed)
-    as_good                      fits of one effect from different starts that gain so much of what the best of them
-                                 gains are all refined
-    worth_a_round                of what is left to explain: what a round of a fit has to gain to be worth another one;
-                                 little has to be settled where much is still to be found
+    effects                    most effects that are added
+    fitted, refined            how many effects are fitted at most, and how many of them with derivatives of their own
+    fit_share, refine_share    least gain for that, as a share of the largest gain or of the required one (with a tenth
+                               for fitting, a sensor's bandwidth was missed)
+    tie_share                  all fits of an effect from different starts that gain this share of its best are refined
+    round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
+                               left, a rough fit is enough
     """
 
     effects: int = 4
     fitted: int = 6
     refined: int = 3
-    worth_fitting: float = 0.03
-    worth_refining: float = 0.25
-    as_good: float = 0.9
-    worth_a_round: float = 0.02
+    fit_share: float = 0.03
+    refine_share: float = 0.25
+    tie_share: float = 0.9
+    round_share: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """All effects tried on a model: those that were fitted, best first, and what the others promised."""
+    """All effects tried on a model: those that were fitted, best first, and the screening of the others."""
 
     fits: tuple[CandidateFit, ...]
-    promises: tuple[Screened, ...]
+    unfitted: tuple[Screened, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What the search came to.
+    """The result of a search.
 
-    before     the model without effects that it lacks
-    now        with those that were chosen
-    gains      what each of these gains beside the others, by name, the most first
+    before     the model without the effects that were found
+    now        the model with them
+    gains      of each of them with the others present, by name, the largest first
     rivals     effects that explain as well in the place of each, by name
     first      the first round
-    steps      names of the effects that were added, with the model as it was then on what its fit did not see
+    steps      names of the effects that were added, each with the cross-validation of the model then
     """
 
     before: Baseline
@@ -90,7 +89,7 @@ class Selection:
 
 
 @dataclass(frozen=True, eq=False)
-class Instead:
+class Replaced:
     """One of a model's effects, in whose place others are tried."""
 
     now: Baseline
@@ -99,11 +98,11 @@ class Instead:
 
 @dataclass(eq=False)
 class Search:
-    """A search among effects, on models that have ``present`` others before them."""
+    """A search among effects, on models whose first ``present`` effects are given."""
 
     effects: Sequence[Effect]
     present: int
-    seen: Misalignment
+    misalignment: Misalignment
     progress: Progress = lambda words: None
     workers: int = 2
     effort: Effort = Effort()
@@ -112,192 +111,192 @@ class Search:
     _reduced: tuple[Baseline, dict[str, Baseline]] | None = None
 
     def run(self, before: Baseline) -> Selection:
-        """From a model without effects that it lacks."""
+        """Search on top of a fitted model."""
         now = before
         steps: list[tuple[str, HoldOut]] = []
         first = Round((), ())
         while len(now.state.effects) - self.present < self.effort.effects:
-            left = [one for one in self.effects if one.name not in now.state.names]
-            if not left:
+            untried = [one for one in self.effects if one.name not in now.state.names]
+            if not untried:
                 break
             self.progress(f"round {len(steps) + 1}")
-            tried = self.round(now, left, self._enough(now) if steps else 0.0)
+            tried = self.round(now, untried, self._required_gain(now) if steps else 0.0)
             first = first if steps else tried
             best = self._simplest(now, tried)
             if best is None:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
-            self._rivals[best.effect.name] = self._alike(now, best.gain, best.effect.name, tried)
-            now = self._akin_instead(now, self.refit(best))
+            self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
+            now = self._swap_for_related(now, self.refit(best))
             added = now.state.names[-1]
             earlier = [name for name in now.state.names[self.present:] if name != added]
             steps.append((added, now.hold_out))
             for name in earlier:
-                now, _ = self._reconsidered(now, name)
-        now, gains = self.needed(before, now)
+                now = self._reconsider(now, name)
+        now, gains = self.eliminate_backward(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps))
 
-    def left_out(self, found: Selection, name: str) -> Selection:
-        """The same without one of the effects that were chosen."""
-        now, gains = self.needed(found.before, self.without(found.now, name))
+    def without_effect(self, found: Selection, name: str) -> Selection:
+        """A result without one of its effects."""
+        now, gains = self.eliminate_backward(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
-    def round(self, now: Baseline, effects: Sequence[Effect], enough: float = 0.0,
-              instead: Instead | None = None) -> Round:
-        """Every effect tried on a model; those that realign runs beside these as they were recorded as well, where the
-        model lies far from there: what such an effect does may have been taken for a start or a factor of the
-        distance.
+    def round(self, now: Baseline, effects: Sequence[Effect], required_gain: float = 0.0,
+              instead: Replaced | None = None) -> Round:
+        """Every effect tried on a model. Where its distance errors are large, effects that shift runs are also tried
+        with the recorded distances: what they do may have been taken for a start or scale error.
 
-        enough     what an effect has to gain to count
-        instead    of which effect; None: of none
+        required_gain    least gain that counts
+        instead          the effect in whose place they are tried; None: in addition
         """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
             near = instead.one.values if instead is not None else {}
-            promises = self._screened(pool, now, effects, near)
-            worth = [(now, one) for one in self._worth_fitting(promises, enough)]
+            unfitted = self._screen_all(pool, now, effects, near)
+            worth = [(now, one) for one in self._promising_of(unfitted, required_gain)]
             if instead is not None:
-                there = taken_out(instead.now, instead.one.effect.name)
-                worth += [(there, one) for one in self._worth_fitting(
-                    self._screened(pool, there, effects, near), enough)]
+                there = without_effect(instead.now, instead.one.effect.name)
+                worth += [(there, one) for one in self._promising_of(
+                    self._screen_all(pool, there, effects, near), required_gain)]
             self._promising |= {one.effect.name for _, one in worth}
             aligning = [one for one in effects if one.realigns]
-            if now.state.size.is_unusual and aligning:
-                there = as_recorded(now)
-                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, aligning), enough)]
+            if now.state.size.is_unusually_large and aligning:
+                there = without_distance_trend(now)
+                worth += [(there, one) for one in self._promising_of(
+                    self._screen_all(pool, there, aligning), required_gain)]
             self.progress(f"fitting {len(worth)} of them")
-            tries = _roughly_fitted(pool, now.score, worth)
+            tries = _fit_all_roughly(pool, now.score, worth)
             rough = _best_of_each(tries)
             best = {one.effect.name: one.gain for one in rough[: effort.refined]
-                    if one.gain > effort.worth_refining * max(rough[0].gain, enough)}
-            good = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
-            if len(good) == 1 and self.accepted(now, good[0]):
-                good = []  # it stands alone, and is fitted in full where it is chosen
+                    if one.gain > effort.refine_share * max(rough[0].gain, required_gain)}
+            good = [one for one in tries if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
+            if len(good) == 1 and self.is_accepted(now, good[0]):
+                good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
-            fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), good))
-        # A fit that is much worse than the model without the effect went astray: its promise says more.
+            fine = list(pool.map(lambda one: refine(now.score, one, effort.round_share * now.explanation), good))
+        # A fit that is much worse than the model without the effect has diverged: its screening says more.
         fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
-                if one.gain > -least_gain(len(self.effects))]
+                if one.gain > -min_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
-        return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
+        return Round(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
-    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect],
+    def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect],
                   near: Mapping[str, float] = MappingProxyType({})) -> list[Screened]:
-        """Effects tried beside a model, the most promising first."""
-        seen = [self.seen, misalignment_of_record(base)] if base.state.size.is_unusual else [self.seen]
+        """Screenings of effects on a model, the largest gain first."""
+        misaligned = [self.misalignment]
+        if base.state.size.is_unusually_large:
+            misaligned.append(misalignment_of_record(base))
         found = []
-        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, seen, near), effects), 1):
+        for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
             self.progress(f"screened {done} of {len(effects)} effects")
             found.append(one)
         return sorted(found, key=lambda one: -one.gain)
 
-    def _worth_fitting(self, promises: Sequence[Screened], enough: float) -> list[Screened]:
-        """Those that promise something, of some that are sorted by what they promise."""
-        least = self.effort.worth_fitting * max(promises[0].gain, enough)
-        return [one for one in promises[: self.effort.fitted] if one.gain > least]
+    def _promising_of(self, unfitted: Sequence[Screened], required_gain: float) -> list[Screened]:
+        """The first of some screenings in the order of their gain, down to a share of the largest."""
+        least = self.effort.fit_share * max(unfitted[0].gain, required_gain)
+        return [one for one in unfitted[: self.effort.fitted] if one.gain > least]
 
-    def accepted(self, now: Baseline, one: CandidateFit) -> bool:
-        """Whether an effect is there: neither by chance nor by imitation, not at an end of its range, and nowhere that
-        the record does not show."""
-        return self._is_evident(now, one.gain) and not out_of_sight(now.posterior, one.chosen)
+    def is_accepted(self, now: Baseline, one: CandidateFit) -> bool:
+        """Whether an effect gains enough, and its values are within its range and within what the record shows."""
+        return self._is_evident(now, one.gain) and not is_outside_data(now.posterior, one.chosen)
 
     def _is_evident(self, without: Baseline, gain: float) -> bool:
-        """Whether so much is gained over a model neither by chance nor by imitation."""
-        return gain > self._enough(without)
+        """Whether a gain over a model is more than chance or imitation would give."""
+        return gain > self._required_gain(without)
 
-    def _enough(self, without: Baseline) -> float:
-        """More than chance or imitation gains over a model."""
-        return max(least_gain(len(self.effects)), IMITATION * without.explanation)
+    def _required_gain(self, without: Baseline) -> float:
+        """The most that chance or imitation gains over a model."""
+        return max(min_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
-        """Of those that are there and cannot be distinguished from the likeliest, the plainest."""
-        there = [one for one in tried.fits if self.accepted(now, one)]
-        return min((one for one in there if one.gain > there[0].gain - CONFUSED),
+        """The simplest of the accepted effects that cannot be distinguished from the most likely one."""
+        accepted = [one for one in tried.fits if self.is_accepted(now, one)]
+        return min((one for one in accepted if one.gain > accepted[0].gain - INDISTINGUISHABLE),
                    key=lambda one: self._complexity(one.chosen), default=None)
 
     def _complexity(self, one: Chosen) -> tuple[bool, int]:
-        """What the records show anyhow is plainest, and then what has the fewest numbers."""
-        return not one.effect.is_seen(one.values, self.seen), len(moves_of([one]))
+        """Order of simplicity: effects that the records show by themselves first, then by their free parameters."""
+        return not one.effect.is_seen(one.values, self.misalignment), len(moves_of([one]))
 
     def without(self, now: Baseline, name: str) -> Baseline:
-        """A model without one of its effects, fitted; kept as long as this is the model."""
+        """A model without one of its effects, fitted; kept for the model that was asked for last."""
         if self._reduced is None or self._reduced[0] is not now:
             self._reduced = now, {}
         kept = self._reduced[1]
         if name not in kept:
-            kept[name] = self._fitted_without(now, name)
+            kept[name] = self._fit_without(now, name)
         return kept[name]
 
-    def _fitted_without(self, now: Baseline, name: str) -> Baseline:
-        rest = others(now.state, name)
-        away = next(one for one in now.state.effects if one.effect.name == name)
+    def _fit_without(self, now: Baseline, name: str) -> Baseline:
+        rest = effects_without(now.state, name)
+        removed = next(one for one in now.state.effects if one.effect.name == name)
         posterior = now.posterior
-        if away.effect.realigns:
-            return Baseline.of(fit(aligned(posterior, posterior.at(rest, now.state.logs))))
-        start = LinearModel(posterior, posterior.at(rest, now.state.logs, now.state.record, now.state.size))
-        return Baseline.of(fit(start, now.linear.numbers, worth=self.effort.worth_a_round * now.explanation))
+        if removed.effect.realigns:
+            return Baseline.of(fit(align(posterior, posterior.state_at(rest, now.state.logs))))
+        start = LinearModel(posterior, posterior.state_at(rest, now.state.logs, now.state.record, now.state.size))
+        return Baseline.of(fit(start, now.linear.numbers, min_gain=self.effort.round_share * now.explanation))
 
     def refit(self, one: CandidateFit) -> Baseline:
         """A model with one more effect, fitted in full."""
         posterior = one.found.posterior
-        return Baseline.of(fit(aligned(posterior, one.found.state), one.found.numbers))
+        return Baseline.of(fit(align(posterior, one.found.state), one.found.numbers))
 
-    def _akin_instead(self, without: Baseline, now: Baseline) -> Baseline:
-        """The model, or one with another effect in the place of the one that was added last, where that has numbers in
-        common with it, and explains more, or as much and is plainer: a sharp resonance promises nothing beside the
-        place where it is, and hardly anything is screened there."""
+    def _swap_for_related(self, without: Baseline, now: Baseline) -> Baseline:
+        """The model, or one with an effect of the same parameters in the place of the one that was added last, if that
+        is preferred: a sharp resonance gains nothing at another frequency, and screening tries few frequencies."""
         here, gain = now.state.effects[-1], without.score - now.score
-        akin = [one for one in self.effects if one.name not in now.state.names and shared_numbers(one, here.values)]
-        if not akin:
+        related = [one for one in self.effects
+                   if one.name not in now.state.names and shared_parameters(one, here.values)]
+        if not related:
             return now
-        self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in akin)}?")
+        self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in related)}?")
         with ThreadPoolExecutor(self.workers) as pool:
-            worth = self._worth_fitting(self._screened(pool, without, akin, here.values), gain)
-            rough = _best_of_each(_roughly_fitted(pool, without.score, [(without, one) for one in worth]))
-            fine = _best_of_each(list(pool.map(partial(refined, without.score), rough)))
+            worth = self._promising_of(self._screen_all(pool, without, related, here.values), gain)
+            rough = _best_of_each(_fit_all_roughly(pool, without.score, [(without, one) for one in worth]))
+            fine = _best_of_each(list(pool.map(partial(refine, without.score), rough)))
         best = self._simplest(without, Round(tuple(fine), ()))
-        if best is None or not self._outdoes(best, here, gain):
+        if best is None or not self._is_preferred(best, here, gain):
             return now
-        self._rivals[best.effect.name] = (here.effect.name,) if abs(best.gain - gain) < CONFUSED else ()
+        self._rivals[best.effect.name] = (here.effect.name,) if abs(best.gain - gain) < INDISTINGUISHABLE else ()
         return self.refit(best)
 
-    def _outdoes(self, other: CandidateFit, one: Chosen, gain: float) -> bool:
-        """Whether an effect in the place of one that gains so much explains more, or as much and is plainer."""
-        plainer = self._complexity(other.chosen) < self._complexity(one)
-        return other.gain > gain + (-CONFUSED if plainer else CONFUSED)
+    def _is_preferred(self, other: CandidateFit, one: Chosen, gain: float) -> bool:
+        """Whether an effect in the place of one that gains so much explains more, or as much and is simpler."""
+        simpler = self._complexity(other.chosen) < self._complexity(one)
+        return other.gain > gain + (-INDISTINGUISHABLE if simpler else INDISTINGUISHABLE)
 
-    def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
-        """The model with whatever gains most in the place of an effect, or as much and is plainer, of all that any
-        round found worth a fit and all that is described by the same numbers, which may be the same effect elsewhere;
-        and what it gains."""
+    def _reconsider(self, now: Baseline, name: str) -> Baseline:
+        """The model, or one with another effect in the place of this one, if that is preferred: of all that any round
+        fitted, and all with the same parameters."""
         self.progress(f"is {name} still what it was?")
         without, here = self.without(now, name), next(one for one in now.state.effects if one.effect.name == name)
         gain = without.score - now.score
         may_be = [one for one in self.effects if one.name == name or (one.name not in now.state.names and (
-            one.name in self._promising or shared_numbers(one, here.values)))]
-        tried = self.round(without, may_be, gain, Instead(now, here))
+            one.name in self._promising or shared_parameters(one, here.values)))]
+        tried = self.round(without, may_be, gain, Replaced(now, here))
         best = self._simplest(without, tried)
-        if best is not None and self._outdoes(best, here, gain):
+        if best is not None and self._is_preferred(best, here, gain):
             now, gain = self.refit(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
-        self._rivals[name] = self._alike(without, gain, name, tried)
-        return now, gain
+        self._rivals[name] = self._rivals_of(without, gain, name, tried)
+        return now
 
-    def _alike(self, without: Baseline, gain: float, name: str, tried: Round) -> tuple[str, ...]:
-        """Effects that explain as well as one that gains so much."""
+    def _rivals_of(self, without: Baseline, gain: float, name: str, tried: Round) -> tuple[str, ...]:
+        """Names of other effects that cannot be distinguished from one that gains so much."""
         return tuple(one.effect.name for one in tried.fits
-                     if one.effect.name != name and abs(one.gain - gain) < CONFUSED
-                     and not out_of_sight(without.posterior, one.chosen))
+                     if one.effect.name != name and abs(one.gain - gain) < INDISTINGUISHABLE
+                     and not is_outside_data(without.posterior, one.chosen))
 
-    def needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
-        """The model without effects that are not needed beside the others, or with which the error on what no fit saw
-        is larger than without; and what each of those that stay gains."""
+    def eliminate_backward(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
+        """The model without effects that gain too little with the others present, or that raise the hold-out error; and
+        the gain of each of those that stay."""
         names = list(now.state.names[self.present:])
         if len(names) == 1:
-            if _raises(now, before, names[0]):
+            if _worsens_hold_out(now, before, names[0]):
                 return before, {}
             return now, {names[0]: before.score - now.score}
         gains: dict[str, float] = {}
@@ -307,7 +306,7 @@ class Search:
                 without = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in without.items()}
             least = min(gains, key=lambda name: gains[name])
-            raising = [name for name in names if _raises(now, without[name], name)]
+            raising = [name for name in names if _worsens_hold_out(now, without[name], name)]
             if raising:
                 least = min(raising, key=lambda name: gains[name])
             elif len(names) == 1 or self._is_evident(without[least], gains[least]):
@@ -318,37 +317,37 @@ class Search:
         return now, self._findings(now, dict(sorted(gains.items(), key=lambda pair: -pair[1])))
 
     def _findings(self, now: Baseline, gains: dict[str, float]) -> dict[str, float]:
-        """Without those that only mend what is uncertain of a filter, where that is found as well."""
+        """The gains without effects that only correct what is uncertain of a filter, where that is found as well."""
         by_name = {one.effect.name: one for one in now.state.effects}
-        if not any(by_name[name].effect.is_seen(by_name[name].values, self.seen) for name in gains):
+        if not any(by_name[name].effect.is_seen(by_name[name].values, self.misalignment) for name in gains):
             return gains
         return {name: gain for name, gain in gains.items()
-                if not by_name[name].effect.is_trifle(by_name[name].values, self.seen)}
+                if not by_name[name].effect.is_trifle(by_name[name].values, self.misalignment)}
 
 
-def _raises(now: Baseline, without: Baseline, name: str) -> bool:
-    """Whether the error on what no fit saw is larger with one of a model's effects. Of an effect that does no more than
-    move runs nothing is asked: without it the distance errors do the same, and these are known on all of a run."""
+def _worsens_hold_out(now: Baseline, without: Baseline, name: str) -> bool:
+    """Whether the hold-out error is larger with one of a model's effects. Not asked of an effect that only shifts runs:
+    without it the distance errors do the same, and these are fitted to all of a run."""
     effect = next(one.effect for one in now.state.effects if one.effect.name == name)
-    return effect.reshapes and now.hold_out.raises(without.hold_out)
+    return effect.reshapes and now.hold_out.is_worse_than(without.hold_out)
 
 
-def out_of_sight(posterior: Posterior, one: Chosen) -> bool:
-    """Whether an effect is at an end of its range, or resonates above all that the records hold; that is seen by what
-    it does below, if at all, and not where a record was filtered, which looks alike."""
+def is_outside_data(posterior: Posterior, one: Chosen) -> bool:
+    """Whether an effect is at an end of its range, or resonates above the pass band of all records. Such a resonance is
+    seen by its flank below, unless a record was filtered, which looks the same."""
     runs = posterior.runs.runs
     filtered = any(run.facts.pass_band_hz is not None for run in runs)
     return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
 
 
-def _roughly_fitted(pool: ThreadPoolExecutor, score: float,
+def _fit_all_roughly(pool: ThreadPoolExecutor, score: float,
                     worth: Sequence[tuple[Baseline, Screened]]) -> list[CandidateFit]:
-    """All that is worth a fit, each beside its model."""
-    return [one for some in pool.map(lambda pair: roughly_fitted(score, *pair), worth) for one in some]
+    """Rough fits of screened effects, each on its model."""
+    return [one for some in pool.map(lambda pair: fit_roughly(score, *pair), worth) for one in some]
 
 
 def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Of every effect the fit that is best, best first."""
+    """The best fit of each effect, best first."""
     found: dict[str, CandidateFit] = {}
     for one in sorted(fits, key=lambda one: -one.gain):
         found.setdefault(one.effect.name, one)

@@ -1,10 +1,9 @@
-"""The rounds of a diagnosis without a profile: what is missing, and what such drives cannot tell.
+"""Diagnosis without a profile: which effects a model lacks, and what such drives cannot identify.
 
-Problem: as in ``diagnosis``, but the road is unknown, and part of what an effect does the road takes for itself.
-Solution: in each round every effect that can be tried is tried by the slopes on top of the model, the promising ones
-are fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
-What cannot be learned is not a list in a text: it is read off the information that these drives hold, with the road
-and without it.
+Problem: as in ``lab.diagnosis``, but the road is unknown and absorbs part of what an effect does. Solution: in each
+round every effect that can be tried is screened by a score test, the promising ones are fitted in full, and the best is
+added if noise would hardly gain as much in so many trials and it helps to predict each drive by the others. What cannot
+be identified is computed from the information of these drives, with the road and without it.
 """
 
 from __future__ import annotations
@@ -16,33 +15,33 @@ import numpy as np
 
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
-from logger.lab.likelihood.standard_errors import with_errors
+from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
-from logger.lab.unknown_road.fisher_scoring import Fitted, fitted, inverse
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.unknown_road.fisher_scoring import RoadFit, fit, inverse
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
-from logger.lab.unknown_road.screening import Trial, trials
+from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
+from logger.lab.unknown_road.screening import Trial, screen
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
 from logger.vehicle.effect_parameters import moves_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
-TAKEN_BY_ROAD = 0.02
-"""The road takes an effect of whose information it leaves no more than this share: over a road that was measured, the
-same drives would show it seven times as well."""
+ABSORBED_BY_ROAD = 0.02
+"""The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
+show it seven times as well (root of 1 / 0.02)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An effect that was tried on the model of its round.
 
-    error          of all drives, each with the road estimated from the others
-    p_value        how often noise alone would gain as much, times the number of candidates
-    gain           of minus twice the log of the evidence; where it was not fitted, what its slopes promise
-    confused_with  effects that explain about as much
-    fitted         with the car's numbers and the road; else it was added at the strength that its slopes promise
+    error            leave-one-out error of all drives
+    p_value          bound on the probability that noise alone gains as much with any of the candidates
+    gain             of minus twice the log of the evidence; where it was not fitted, by its score test
+    confused_with    effects that explain about as much
+    fitted           with the car's numbers and the road; else it was added at the best strength of its score test
     """
 
     one: Chosen
@@ -54,18 +53,17 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """The effect's."""
+        """The effect's name."""
         return self.one.effect.name
 
     def helps(self, error: float) -> bool:
-        """Whether it is there: not by chance, and of help in predicting each drive by the others, to which a model
-        without it makes this error."""
+        """Whether it is accepted: not by chance, and without a larger leave-one-out error than the model without it."""
         return self.fitted and self.p_value < FALSE_ALARM and self.error <= error
 
 
 @dataclass(frozen=True, eq=False)
 class UnknownRoadDiagnosis:
-    """What a diagnosis without a profile found.
+    """The result of a diagnosis without a profile.
 
     candidates    best first, those of the verdict before the others
     missing       effects that the model lacks, with standard errors, in the order they were found
@@ -73,9 +71,9 @@ class UnknownRoadDiagnosis:
     by_run        error of each run, before and after
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
-    together      what these drives cannot tell of the car's numbers
+    confounded    what these drives cannot identify of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
-    doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
+    doubtful      pairs of runs that may be over one road or two, by name
     """
 
     candidates: tuple[Candidate, ...]
@@ -84,59 +82,58 @@ class UnknownRoadDiagnosis:
     by_run: tuple[tuple[float, float], ...]
     floor_error: float
     untried: Mapping[str, str]
-    taken_by_road: Mapping[str, float]
+    absorbed_by_road: Mapping[str, float]
     hidden: Mapping[str, float]
-    together: tuple[Finding, ...]
+    confounded: tuple[Finding, ...]
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
 
     @property
     def unexplained(self) -> bool:
-        """Whether more is left than that noise."""
+        """Whether the residual is above the noise."""
         return self.excess > UNEXPLAINED
 
 
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
                        progress: Progress = lambda words: None, most_effects: int = 3) -> UnknownRoadDiagnosis:
-    """Find the effects that the model, with those that are ``present``, lacks; no more than so many.
+    """Find the effects that the model, with those that are ``present``, lacks; at most so many.
 
-    ValueError if one that is present leaves the car answering out of proportion to the road; NotOneRoad for drives that
-    are plainly over two.
+    ValueError if the car is not linear with one that is present; NotOneRoad for drives that are certainly over two.
     """
     progress("are the drives over one road?")
     nominal = problem.start(present)
     untried = _obstacles(problem, effects, present)
-    left = {name: one for name, one in effects.items() if name not in untried}
-    alike = likenesses(problem, nominal, _trials(left))
-    if found := surely_two_roads(alike):
+    remaining = {name: one for name, one in effects.items() if name not in untried}
+    agreements = road_agreements(problem, nominal, _trials(remaining))
+    if found := certain_two_roads(agreements):
         one, other = (problem.runs[run].name for run in found)
         raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
-    before = now = fitted(problem.prepared(nominal), nominal)
+    before = now = fit(problem.preconditioned(nominal), nominal)
     errors = [before.problem.error(replace(nominal, roads=before.state.roads)), before.problem.error(before.state)]
     first: list[Candidate] = []
     taken: list[Candidate] = []
     while len(taken) < most_effects:
-        progress(f"round {len(taken) + 1}: trying {len(left)} effects")
-        ranked = _ranked(trials(now.problem, now, _trials(left)))
+        progress(f"round {len(taken) + 1}: trying {len(remaining)} effects")
+        ranked = _by_effect(screen(now.problem, now, _trials(remaining)))
         models = _fits(now, ranked, progress)
-        candidates = _judged(now, models, len(left), errors[-1])
+        candidates = _candidates(now, models, len(remaining), errors[-1])
         first = first or [*candidates, *(
-            _candidate(now.problem, _beside(now, ones[0].at), ones[0].gain, len(left), fitted=False)
+            _candidate(now.problem, _with_effect(now, ones[0].best), ones[0].gain, len(remaining), fitted=False)
             for name, ones in ranked.items() if name not in models)]
         best = next((one for one in candidates if one.helps(errors[-1])), None)
         if best is None:
             break
         taken.append(best)
         now = models[best.name]
-        now = replace(now, problem=now.problem.prepared(now.state))
+        now = replace(now, problem=now.problem.preconditioned(now.state))
         errors.append(now.problem.error(now.state))
-        del left[best.name]
-    usual = {one.one.effect.name: one for one in trials(
-        now.problem, now, [chosen(one, one.usual) for one in left.values()])}
-    road = {name: one.beside_road for name, one in usual.items() if one.beside_road < TAKEN_BY_ROAD}
+        del remaining[best.name]
+    usual = {one.chosen.effect.name: one for one in screen(
+        now.problem, now, [chosen(one, one.usual) for one in remaining.values()])}
+    road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
     noise = now.problem.noise(now.state)
     return UnknownRoadDiagnosis(
         (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
@@ -144,8 +141,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         tuple(zip(now.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         noise.deviation_mps2 / problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
-        _together(now), now.state.noise_mps2, _excess(now, noise),
-        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in maybe_two_roads(alike)),
+        _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
+        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
     )
 
 
@@ -162,7 +159,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None:
             try:
-                problem.response((*present, chosen(effect, effect.usual)), problem.stands)
+                problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
             except ValueError:
                 why = "a car with it does not answer in proportion to the road, which takes a measured road"
         if why is not None:
@@ -177,52 +174,53 @@ def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:
     return [chosen(effect, values) for effect in effects.values() for values in effect.trials()]
 
 
-def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
-    """Trials by the names of their effects, the most promising first."""
+def _by_effect(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
+    """Trials by the names of their effects, the largest gain first."""
     found: dict[str, list[Trial]] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
-        found.setdefault(one.one.effect.name, []).append(one)
+        found.setdefault(one.chosen.effect.name, []).append(one)
     return found
 
 
-def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
-          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, Fitted]:
-    """The most promising effects fitted on top of the model, by name; the best of a few steps from each start goes on.
+def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
+          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, RoadFit]:
+    """Fit the effects with the largest gains on top of the model, by name; the best of a few steps from each start goes
+    on.
 
-    most, share, least    so many at most, of those that promise this share of the best one, and so much
-    starts                so many trials as they are; the best one also at the strength that it promises, which holds
-                          for small changes only
+    most, share, least    so many at most, of those whose gain is this share of the largest, and so much
+    starts                so many trials at their own values; the best one also at its best strength, which holds for
+                          small changes only
     """
     enough = max([least, *(share * ones[0].gain for ones in ranked.values())])
     found = {}
     for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
         progress(f"fitting {name}")
-        begins = [ranked[name][0].at, *(trial.one for trial in ranked[name][:starts])]
-        tries = [fitted(base.problem, _beside(base, one), first_steps) for one in begins]
+        begins = [ranked[name][0].best, *(trial.chosen for trial in ranked[name][:starts])]
+        tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
         best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
-        found[name] = fitted(best.problem, best.state)
+        found[name] = fit(best.problem, best.state)
     return found
 
 
-def _beside(base: Fitted, one: Chosen) -> RoadFitState:
-    """The model with an effect."""
+def _with_effect(base: RoadFit, one: Chosen) -> RoadFitState:
+    """The state of a model with one more effect."""
     effects = (*base.state.effects, one)
     return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
 
 
-def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, error: float) -> list[Candidate]:
-    """Fitted effects as candidates of so many, best first, with those that explain about as much as each."""
+def _candidates(base: RoadFit, models: Mapping[str, RoadFit], count: int, error: float) -> list[Candidate]:
+    """Fitted effects as candidates of so many, best first, each with those that cannot be distinguished from it."""
     found = [_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count)
              for one in models.values()]
     found.sort(key=lambda one: -one.gain)
     there = [one for one in found if one.helps(error)]
     return [replace(one, confused_with=tuple(other.name for other in there if other is not one and one in there
-                                             and abs(other.gain - one.gain) < CONFUSED)) for one in found]
+                                             and abs(other.gain - one.gain) < INDISTINGUISHABLE)) for one in found]
 
 
 def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
-    """The last effect of a state as one of so many candidates, by its gain in minus twice the log of the likelihood,
-    of which the evidence leaves what its numbers do not cost (G. Schwarz 1978)."""
+    """The last effect of a state as one of so many candidates. Its gain in minus twice the log of the likelihood, less
+    what its numbers cost (G. Schwarz 1978), is that in the evidence."""
     one = state.effects[-1]
     gain -= len(moves_of([one])) * float(np.log(problem.samples))
     return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
@@ -231,28 +229,28 @@ def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, 
 # --- the residual ---
 
 
-def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
+def _with_errors(model: RoadFit) -> tuple[Chosen, ...]:
     """The effects of a model with standard errors."""
     first = len(model.state.logs)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
-    return with_errors(model.state.effects, model.moves, deviations)
+    return with_standard_errors(model.state.effects, model.moves, deviations)
 
 
-def _together(model: Fitted) -> tuple[Finding, ...]:
-    """What these drives cannot tell of masses, springs and dampers when the road is unknown, whatever their prior."""
+def _confounded_numbers(model: RoadFit) -> tuple[Finding, ...]:
+    """Masses, springs and dampers that these drives cannot identify while the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.moves), len(model.data))
     mixed = model.data[np.ix_(own, road)]
-    left = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
-    powers, directions = np.linalg.eigh(left)
+    marginal = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
+    powers, directions = np.linalg.eigh(marginal)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
     return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
 
 
-def _excess(model: Fitted, noise: Noise) -> float:
-    """By what share what no road explains is above the noise; no more than that asks for no explanation where chance
-    would make so much. Of a sample's freedom the recorder's filter leaves what it passes."""
+def _excess(model: RoadFit, noise: Noise) -> float:
+    """Share by which what no road explains is above the noise; where chance may give as much, no more than
+    ``UNEXPLAINED``. Degrees of freedom of a sample are reduced by the recorder's filter."""
     from scipy.stats import norm
 
     above = model.state.noise_mps2 / noise.deviation_mps2 - 1

@@ -1,7 +1,7 @@
-"""Fits of a model to drives over an unknown road: Fisher's scoring.
+"""Fits of a model to drives over an unknown road, by Fisher scoring.
 
-The slopes and the information of the marginal likelihood are known, its value is not: each step solves the information
-for the slopes, within the bounds of the numbers (R. A. Fisher 1925).
+The score and the information of the marginal likelihood are known, its value is not: each step solves the information
+for the score, within the bounds of the numbers (R. A. Fisher 1925).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """A state that was fitted, with the information on its numbers.
+class RoadFit:
+    """A fitted state, with the information on its numbers.
 
-    moves          numbers of its effects
-    data           (m, m) information of the drives on the logs, the moves (on their scales) and the roads' numbers
-    information    the same with the priors
-    problem        quick for states like this one
+    moves          free parameters of its effects
+    data           information of the drives on the logs, the moves (on their scales) and the roads' numbers (m, m)
+    information    of drives and priors (m, m)
+    problem        with a preconditioner for states near this one
     """
 
     state: RoadFitState
@@ -37,12 +37,12 @@ class Fitted:
     problem: SameRoad
 
 
-def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: float = 0.1,
-           many_rounds: int = 12) -> Fitted:
-    """The most probable state, by so many of Fisher's steps from this one at most.
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: float = 0.1,
+           many_rounds: int = 12) -> RoadFit:
+    """Fit the most probable state, by so many scoring steps from a state at most.
 
-    settled        a step that promises less, in the log of the probability, is the last
-    many_rounds    equations that take more rounds are prepared again where the fit has come to
+    converged      the fit ends before a step of a smaller expected gain in the log of the probability
+    many_rounds    equations that take more iterations get a new preconditioner
     """
     moves = moves_of(state.effects)
     p, q = len(state.logs), len(moves)
@@ -55,24 +55,24 @@ def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: flo
 
     for count in range(steps):
         logs, effects, roads = at(here)
-        gains, slopes = sloped(problem, effects, moves, logs)
+        gains, slopes = response_and_slopes(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
-            problem = problem.prepared(RoadFitState(effects, logs, roads, gains))
-        score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
+            problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
+        score, data = problem.score_and_information(problem.table(gains, slopes), roads, information=True)
         off, precision = problem.prior_terms(logs, q, roads)
         score -= precision * off
         information = data + np.diag(precision)
         step = _step(score, information, here, low, high)
-        if count and float(score @ step) < settled:
+        if count and float(score @ step) < converged:
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
     found = RoadFitState(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), data, information, problem)
+    return RoadFit(found, tuple(moves), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
-    """Fisher's step within bounds."""
+    """The scoring step within bounds."""
     free = ~(((here <= low) & (score < 0)) | ((here >= high) & (score > 0)))
     step = np.zeros_like(here)
     step[free] = inverse(information[np.ix_(free, free)]) @ score[free]
@@ -80,15 +80,15 @@ def _step(score: Array, information: Array, here: Array, low: Array, high: Array
 
 
 def inverse(information: Array, ridge: float = 1e-6) -> Array:
-    """Inverse of a symmetric matrix (m, m) whose rows may differ by powers of ten, held off singularity."""
+    """Inverse of a symmetric matrix (m, m), scaled to a unit diagonal and regularised by a ridge."""
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 
-def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
+def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
            step: float = 1e-3) -> tuple[Complex, Complex]:
-    """A response (x, f) and its slopes (p + q, x, f) by the logs and the moves, over steps of this share."""
+    """A response (x, f) and its derivatives (p + q, x, f) by the logs and the moves, over steps of this share."""
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):
@@ -105,7 +105,7 @@ def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move]
 
 def _limits(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int,
             longest_log: float = 0.5) -> tuple[Array, Array, Array]:
-    """Of each number its bounds and how far it may go in one step (count,); those of the moves begin at ``first``."""
+    """Bounds and longest step of each number (count,); those of the moves begin at ``first``."""
     low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
     for index, move in enumerate(moves, first):
         parameter = effects[move.effect].effect.parameters[move.parameter]

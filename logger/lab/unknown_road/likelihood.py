@@ -1,16 +1,16 @@
-"""Which effects a model lacks, from drives over one road that nobody measured.
+"""The marginal likelihood of drives over one road that nobody measured.
 
 Problem: without a profile there is no prediction to compare a drive with; the road would explain whatever the model
-does not. Solution: drives at different speeds meet the same road, and what one of them says of it the others have to
-agree with. The road, a Gaussian process of free level and waviness, is integrated out (``unknown_road``); models are
-compared by the likelihood of all drives together. The way is cut into stretches of some seconds, each with a level and
-a waviness of its own and with places that may be a little off, as roads change and distance signals wander.
+does not. Solution: drives at different speeds are over the same road, and have to agree on it. The road, a Gaussian
+process of free level and waviness, is integrated out (``unknown_road``); models are compared by the likelihood of all
+drives together. The way is cut into stretches of some seconds, each with a level and a waviness of its own and with
+places that may be a little off, as roads change and distance signals drift.
 
-The likelihood itself is never computed, only its slopes are. What one model gains over another is their integral along
-a straight way from the one response to the other, which is short: the slopes, by a few points, are Gauss's.
+The likelihood itself is never computed, only its score is. The gain of one model over another is the integral of the
+score along a straight line from the one response to the other, by Gauss's quadrature with a few points.
 
-Only effects that leave a car answering in proportion to the road can be tried. What a road that is free takes for
-itself (a gain; a longer contact patch) shows in the information that remains of an effect once it is integrated out.
+Only effects with which a car is linear can be tried. What a free road absorbs (a gain; a longer contact patch) is known
+from the information that remains of an effect once the road is integrated out.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ Complex = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.intp]
 
 PROBES = 8
-"""Simulated drives that slopes are compared with: gains are taken for less than they seem by one part in so many."""
+"""Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
+is divided by that. A judgement: fits take a time in proportion."""
 
 
 class NotOneRoad(ValueError):
@@ -54,10 +55,10 @@ class RoadFitState:
     """A model with all its numbers.
 
     effects    with their values
-    logs       (p,) logarithms of the car's numbers over the nominal ones
-    roads      (r,) of every stretch its level, its waviness and the places of its drives but the first, in this
-               order; the logarithm of the noise last
-    gains      (x, f) its response
+    logs       logarithms of the car's numbers over the nominal ones (p,)
+    roads      of every stretch its level, its waviness and the places of its drives but the first, in this order; the
+               logarithm of the noise last (r,)
+    gains      the car's response (x, f)
     """
 
     effects: tuple[Chosen, ...]
@@ -67,29 +68,29 @@ class RoadFitState:
 
     @property
     def noise_mps2(self) -> float:
-        """Deviation of what no road explains."""
+        """Standard deviation of what no road explains."""
         return float(np.exp(self.roads[-1]))
 
 
 class SameRoad:
-    """Drives over one road, a nominal vehicle, and what may be a little off.
+    """Drives over one road, a nominal vehicle, and priors of its numbers and of the road.
 
-    stands    the vehicle as it stands, where fits begin, if that is another than was given
+    start_vehicle    the vehicle as it stands, where fits begin, if that is another than was given
 
     NotOneRoad unless each of the runs shares some seconds of the way with another.
     """
 
     def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
-                 stands: Vehicle | None = None) -> None:
-        stands = stands or vehicle
+                 start_vehicle: Vehicle | None = None) -> None:
+        start_vehicle = start_vehicle or vehicle
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
-        self.vehicle = replace(vehicle, contact_patch_m=stands.contact_patch_m)  # that is not free
+        self.vehicle = replace(vehicle, contact_patch_m=start_vehicle.contact_patch_m)  # that is not free
         known = VehiclePrior.of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
         self.prior = VehiclePrior(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
-                                  known.steps[kept], wall=False)
-        self.stands = self.prior.logs(self.vehicle, stands)
-        structure = compose(stands).structure
+                                  known.steps[kept], soft_bounds=False)
+        self.start_vehicle = self.prior.logs(self.vehicle, start_vehicle)
+        structure = compose(start_vehicle).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
         least_s = 3.0  # of a stretch, some periods of a body's bounce, to say anything of it
@@ -100,7 +101,7 @@ class SameRoad:
                              "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
-        nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
+        nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
         sizes = [1 + len(parts) for parts in self.stretches]
         ends = np.cumsum(sizes)
@@ -113,22 +114,21 @@ class SameRoad:
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
-        """The response (x, f) of the car with these numbers and effects. ValueError if it does not answer in proportion
-        to the road."""
+        """The response (x, f) of the car with these numbers and effects. ValueError if it is not linear."""
         return response_of(self.car(effects, logs), self.rate_hz)
 
     def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
-        """A response (x, f) with slopes (p, x, f), as roads are asked with."""
+        """The table of a response (x, f) with derivatives (p, x, f)."""
         found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
         return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
 
     def start(self, effects: Sequence[Chosen] = ()) -> RoadFitState:
-        """The car as it stands on roads of a likely level."""
-        return RoadFitState(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
+        """The vehicle that fits begin at, with these effects, on roads of a likely level."""
+        return RoadFitState(tuple(effects), self.start_vehicle, self._first, self.response(effects, self.start_vehicle))
 
-    def scored(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
-        """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
-        the information (m, m) or zeros; nothing of the priors is in them."""
+    def score_and_information(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
+        """Score of the log-likelihood (m,) by the parameters of a table's derivatives and by the numbers of the roads,
+        and the information (m, m) or zeros, both without the priors."""
         p, self.rounds = len(table.slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
         for road, at, part, _ in self._at(table, roads):
@@ -139,8 +139,8 @@ class SameRoad:
             matrix[np.ix_(whole, whole)] += known
         return slopes, matrix
 
-    def prepared(self, state: RoadFitState) -> SameRoad:
-        """The same drives, quick for models that are like this one."""
+    def preconditioned(self, state: RoadFitState) -> SameRoad:
+        """The problem with preconditioners for models near a state."""
         other = copy(self)
         other._roads = []
         for road, at, *_ in self._at(self.table(state.gains), state.roads):
@@ -149,8 +149,8 @@ class SameRoad:
         return other
 
     def _at(self, table: Tabulated, roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
-        """Every stretch under a car of this response: its road, its numbers, where these stand among those of all
-        roads, and the runs that its drives are of."""
+        """Every stretch under a car of this response: its road, its numbers, their indices among those of all roads,
+        and the runs of its drives."""
         for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
             own = roads[part]
             at = RoadState(np.zeros(len(table.slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
@@ -159,11 +159,11 @@ class SameRoad:
 
     def prior_terms(self, logs: Array, moves: int, roads: Array, waviness_off: float = 0.3,
                     place_off_m: float = 0.05) -> tuple[Array, Array]:
-        """How far a state's numbers are from what they usually are (m,), and the precision of that (m,): of the car's,
-        of so many moves of effects, which are free, and of the roads'.
+        """Deviations of a state's numbers from the means of their priors (m,), and the prior precisions (m,): of the
+        car's, of so many free parameters of effects, which have none, and of the roads'.
 
-        waviness_off, place_off_m    how far stretches of a road usually are off in their waviness, and their places
-                                     from those of the whole way (judgements)
+        waviness_off, place_off_m    prior standard deviations of a stretch's waviness, and of its places from those of
+                                     the whole way (judgements)
         """
         off, precision = np.zeros(self.count), np.zeros(self.count)
         for part in self._parts:
@@ -176,45 +176,44 @@ class SameRoad:
         return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
 
     def cost(self, state: RoadFitState) -> float:
-        """What the state's numbers cost: squares of their deviations."""
+        """Minus twice the log-density of the priors of a state's numbers, without its constant."""
         p = len(state.logs)
         off, precision = self.prior_terms(state.logs, 0, state.roads)
         return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
 
     def gain(self, before: RoadFitState, after: RoadFitState) -> float:
-        """By how much minus twice the log-likelihood falls from one state to another, the priors counted in: the
-        integral of the slopes between them."""
+        """By how much minus twice the log-posterior falls from one state to another: the integral of the score between
+        them."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
         total = 0.0
         nodes, weights = np.polynomial.legendre.leggauss(3)
         for node, weight in zip(0.5 * (nodes + 1), 0.5 * weights, strict=True):
             table = self.table(before.gains + node * change, change[None])
-            slopes, _ = self.scored(table, before.roads + node * road_change, information=False)
+            slopes, _ = self.score_and_information(table, before.roads + node * road_change, information=False)
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
     def predicted_by_others(self, state: RoadFitState) -> Iterator[tuple[int, Array, Array]]:
-        """Of every drive over every stretch: its run, what was read (n,), and what the other drives make one expect
-        (n,)."""
+        """Every drive over every stretch: its run, what was read (n,), and its prediction by the other drives (n,)."""
         for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, run in enumerate(runs):
                 yield run, road.measured[number], road.predicted(at, number)
 
     def predicted_by_each(self, state: RoadFitState) -> Iterator[tuple[int, int, Array, Array]]:
-        """Of every two drives over a stretch, either way: the run, the one that predicts it, what was read (n,), and
-        what the latter alone makes one expect (n,)."""
+        """Every ordered pair of drives over a stretch: the run, the one that predicts it, what was read (n,), and its
+        prediction by the latter alone (n,)."""
         for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, by in permutations(range(len(runs)), 2):
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
     def errors(self, state: RoadFitState) -> list[float]:
-        """Of every run, rms(read - expected) / rms(read), the road being known from the other drives alone; nan for one
-        that no other shares a stretch with."""
+        """Leave-one-out error of every run, rms(read - predicted) / rms(read), the prediction being by the other
+        drives; nan for one that no other shares a stretch with."""
         drives = list(self.predicted_by_others(state))
         return [_error([one for one in drives if one[0] == run]) for run in range(len(self.runs))]
 
     def error(self, state: RoadFitState) -> float:
-        """That error of all runs together."""
+        """Leave-one-out error of all runs together."""
         return _error(list(self.predicted_by_others(state)))
 
     @property
@@ -225,26 +224,26 @@ class SameRoad:
 
     @property
     def least_mps2(self) -> float:
-        """The least that a model leaves: what two right simulations of a car differ by [m/s2]."""
+        """The least residual of a model: the discrepancy of two right simulations of a car [m/s2]."""
         return DISCREPANCY * self.size_mps2
 
     @property
     def samples(self) -> int:
-        """How many samples there are, of all drives."""
+        """Number of samples of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
     def noise(self, state: RoadFitState) -> Noise:
-        """The sensor's noise, under what each drive has that the others do not tell: that is more than noise where the
-        road moves the car, so that it is asked only for noise that the recorder filtered."""
-        left: dict[int, list[Array]] = {}
+        """The sensor's noise, from the leave-one-out residuals: these are more than noise where the road moves the car,
+        so that bands of noise that the recorder filtered have to be equally loud."""
+        residuals: dict[int, list[Array]] = {}
         for run, read, expected in self.predicted_by_others(state):
-            left.setdefault(run, []).append(read - expected)
-        runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
+            residuals.setdefault(run, []).append(read - expected)
+        runs = [_joined(self.runs[run], parts) for run, parts in residuals.items()]
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
     def _start(self, nominal: Tabulated) -> Array:
-        """Levels and noise from the spectra; places by trying them on the longest stretch."""
+        """First guess of the roads' numbers: levels and noise from spectra; places by ``_offsets``."""
         first = np.zeros(int(self._parts[-1][-1]) + 1)
         noises = []
         for road, part in zip(self._roads, self._parts, strict=True):
@@ -259,13 +258,13 @@ class SameRoad:
         return first
 
     def _offsets(self, nominal: Tabulated, first: Array) -> Array:
-        """By how much each run's places are off [m] against those of the first run of the stretch that most runs share;
-        where some are not over that one, by way of runs that share another stretch with both."""
+        """Offsets of each run's places [m] from those of the first run of the stretch that most runs share; of runs
+        that are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}
-        left = list(self._at(nominal, first))
-        while left := [one for one in left if any(run not in offsets for run in one[-1])]:
-            tied = [one for one in left if any(run in offsets for run in one[-1])]
-            road, at, _, runs = max(tied or left, key=lambda one: len(one[-1]))
+        open_ones = list(self._at(nominal, first))
+        while open_ones := [one for one in open_ones if any(run not in offsets for run in one[-1])]:
+            tied = [one for one in open_ones if any(run in offsets for run in one[-1])]
+            road, at, _, runs = max(tied or open_ones, key=lambda one: len(one[-1]))
             offset = partial(road.offset, at)  # against the first run of the stretch
             if runs[0] not in offsets:
                 known = next((number for number, run in enumerate(runs) if run in offsets), None)
@@ -281,8 +280,8 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
 
 
 def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
-    """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: of
-    each stretch the runs, by number, and their drives."""
+    """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: the
+    numbers of the runs of each, and their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
                     for places in ([run.first for run in runs], [-1] * len(runs)))
@@ -306,7 +305,7 @@ def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[l
 
 
 def _joined(run: Run, parts: Sequence[Array]) -> Run:
-    """What was left in parts of a run, as a run."""
-    left = np.concatenate([np.zeros(run.first), *parts])
-    own = slice(len(left))
-    return replace(run, measured_mps2=left, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])
+    """Residuals of parts of a run, as a run."""
+    residual = np.concatenate([np.zeros(run.first), *parts])
+    own = slice(len(residual))
+    return replace(run, measured_mps2=residual, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])

@@ -1,13 +1,12 @@
-"""Whether drives that are said to be over one road are, before anything is made of it.
+"""A test whether drives were over one road.
 
 Problem: drives over two roads disagree whatever the car, and a search for what a model lacks then finds effects that
-make up for the disagreement. How much a model leaves does not tell: a car that lacks something leaves much as well.
-Solution: what one drive says of the road is compared with what another one read. Over one road they go together,
-through a wrong car as well, if less; over two they do so only as much as chance makes two such records, which is what
-they do shifted against each other by far. Both are weighed by the power that was read at each frequency and around
-each instant, so that neither a resonance of the car nor a bump counts for all. A car that lacks much may show nothing
-at all: before drives are called apart, the car is tried with each of the effects that it may lack. Where one road would
-not show either, nothing is said.
+imitate the disagreement. The size of the residual cannot decide: a car that lacks something has a large one as well.
+Solution: the record that one drive predicts is correlated with another drive's. Over one road they correlate, through a
+wrong car as well, if less; over two roads only by chance, which is measured at lags far apart. Both are divided by the
+spectrum and by the envelope of what was read, so that neither a resonance of the car nor a bump dominates. A car that
+lacks much may correlate with nothing: before drives are rejected, the car is tried with each of the effects that it may
+lack. Where one road would not be significant either, the pair is reported as doubtful.
 """
 
 from __future__ import annotations
@@ -25,20 +24,18 @@ from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
 
-SEEN = 5.0
-"""Standard deviations of chance from which on two drives are over one road: 3e-7 each time, and some hundred places and
-tens of cars are tried."""
-PLAIN = 2 * SEEN
-"""Those that one road would have to make before drives that show less than half of them are over two."""
+AGREEMENT_SIGMA = 5.0
+"""Standard deviations of chance from which on two drives are over one road: a p-value of 3e-7, and some hundred lags
+and tens of cars are tried."""
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """What one run predicts of another one, in standard deviations of chance.
+class RoadAgreement:
+    """Correlation of one run with its prediction by another one, in standard deviations of chance.
 
-    run, by    numbers of the runs: that which is predicted, and that which predicts it
-    found      how well what is predicted goes with what was read
-    expected   how well it would, were the model right
+    run, by    numbers of the runs: the one that is predicted, and the one that predicts it
+    found      the correlation
+    expected   with a right model
     """
 
     run: int
@@ -47,77 +44,84 @@ class Likeness:
     expected: float
 
     @property
-    def seen(self) -> bool:
-        """Whether that is more than chance."""
-        return self.found > SEEN
+    def is_significant(self) -> bool:
+        """Whether the correlation is more than chance."""
+        return self.found > AGREEMENT_SIGMA
 
 
-def likenesses(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[Likeness]:
-    """Of all pairs of runs that share some of the way, each either way: through the car of a state or, where that shows
-    two roads, with one of the effects that it may lack, whichever makes them most alike."""
-    found = _likenesses(problem, state)
+def road_agreements(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[RoadAgreement]:
+    """Agreements of all pairs of runs that share some of the way, in either direction: by the car of a state and, where
+    that would mean two roads, with each of the effects that it may lack; the largest of these."""
+    found = _road_agreements(problem, state)
     for one in lacking:
-        if surely_two_roads(found) is None:
+        if certain_two_roads(found) is None:
             break
         effects = (*state.effects, one)
-        other = _likenesses(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
+        other = _road_agreements(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
         found = [replace(old, found=max(old.found, new.found)) for old, new in zip(found, other, strict=True)]
     return found
 
 
-def surely_two_roads(found: Sequence[Likeness]) -> tuple[int, int] | None:
-    """The two runs that are most plainly over two roads; None if no two are."""
-    plain = {pair: most for pair, most in _unseen(found).items() if most > PLAIN}
-    return max(plain, key=lambda pair: plain[pair]) if plain else None
+def certain_two_roads(found: Sequence[RoadAgreement]) -> tuple[int, int] | None:
+    """The two runs that are most certainly over two roads; None if no two are."""
+    certain = {pair: most for pair, most in _disagreeing_pairs(found).items() if _is_certain(most)}
+    return max(certain, key=lambda pair: certain[pair]) if certain else None
 
 
-def maybe_two_roads(found: Sequence[Likeness]) -> list[tuple[int, int]]:
+def possible_two_roads(found: Sequence[RoadAgreement]) -> list[tuple[int, int]]:
     """Pairs of runs that may be over one road or two."""
-    return [pair for pair, most in _unseen(found).items() if most <= PLAIN]
+    return [pair for pair, most in _disagreeing_pairs(found).items() if not _is_certain(most)]
 
 
-def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
-    """Pairs of runs of which neither predicts the other, and how well one would were they over one road."""
-    ways: defaultdict[tuple[int, int], list[Likeness]] = defaultdict(list)
+def _is_certain(expected: float) -> bool:
+    """Whether one road would have shown: with twice what is significant, as drives that disagree show less than
+    half."""
+    return expected > 2 * AGREEMENT_SIGMA
+
+
+def _disagreeing_pairs(found: Sequence[RoadAgreement]) -> dict[tuple[int, int], float]:
+    """Pairs of runs of which neither predicts the other, with the agreement expected over one road."""
+    ways: defaultdict[tuple[int, int], list[RoadAgreement]] = defaultdict(list)
     for one in found:
         ways[min(one.run, one.by), max(one.run, one.by)].append(one)
     return {pair: max(one.expected for one in both) for pair, both in ways.items()
-            if not any(one.seen for one in both)}
+            if not any(one.is_significant for one in both)}
 
 
-def _likenesses(problem: SameRoad, state: RoadFitState) -> list[Likeness]:
+def _road_agreements(problem: SameRoad, state: RoadFitState) -> list[RoadAgreement]:
+    """Agreements by the car of a state."""
     parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
     for run, by, read, predicted in problem.predicted_by_each(state):
         parts[run, by].append((read, predicted))
-    return [_likeness(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
+    return [_road_agreement(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
 
 
-def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
-              far_s: float = 1.0) -> Likeness:
-    """Of what was read and predicted (n,) of each stretch: together, where places may be a little off yet, over what
-    chance makes, as those show that are shifted by far."""
+def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
+              far_s: float = 1.0) -> RoadAgreement:
+    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within ``near_s``,
+    as places may be a little off, over the r.m.s. correlation beyond ``far_s``."""
     near = round(near_s * rate_hz)
-    like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
+    correlation, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:
-        ours, theirs = _even(read, predicted, rate_hz)
+        ours, theirs = _spectrally_flat(read, predicted, rate_hz)
         size = float(np.linalg.norm(ours))
         share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
-        ours, theirs = (_steady(one, rate_hz) for one in (ours, theirs))
+        ours, theirs = (_envelope_flat(one, rate_hz) for one in (ours, theirs))
         both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
         far = min(round(far_s * rate_hz), len(both) // 4)
         chance += float((both[far:-far] ** 2).mean())
-        like += both[np.arange(-near, near + 1)]
+        correlation += both[np.arange(-near, near + 1)]
         expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
     deviation = float(np.sqrt(chance))
     if not deviation > 0:  # nothing is predicted
-        return Likeness(run, by, 0.0, 0.0)
-    return Likeness(run, by, float(like.max()) / deviation, expected / deviation)
+        return RoadAgreement(run, by, 0.0, 0.0)
+    return RoadAgreement(run, by, float(correlation.max()) / deviation, expected / deviation)
 
 
-def _even(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
+def _spectrally_flat(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
           width_hz: float = 1.5) -> tuple[Array, Array]:
-    """What was read and what was predicted (n,), tapered by a tenth at each end, both over the root of the power that
-    was read around each frequency that the recorder passes."""
+    """What was read and what was predicted (n,), tapered by a tenth at each end, both divided by the smoothed spectrum
+    of what was read, at the frequencies that the recorder passes."""
     n = len(read)
     ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.1 * n)
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
@@ -129,14 +133,14 @@ def _even(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
     return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
 
 
-def _steady(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
-    """Samples (n,) as strong all along: two roads that have a bump at about one place are two roads all the same."""
+def _envelope_flat(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
+    """Samples (n,) over their envelope: two roads with a bump at about one place are two roads all the same."""
     envelope = np.sqrt(_smooth(samples**2, round(width_s * rate_hz)))
     return np.asarray(samples / np.maximum(envelope, 1e-300))
 
 
 def _smooth(power: Array, width: int) -> Array:
-    """Means (n,) of so many neighbours."""
+    """Moving average (n,) over so many samples."""
     width = max(1, width)
     around = np.pad(power, width, mode="reflect")
     return np.asarray(np.convolve(around, np.ones(width) / width, "same")[width:-width])

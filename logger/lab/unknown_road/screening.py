@@ -1,4 +1,4 @@
-"""Effects tried on top of a model of drives over an unknown road, by its slopes."""
+"""Score tests of effects on top of a model of drives over an unknown road."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.selection.screening import scaled_by
-from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, sloped
+from logger.lab.selection.screening import scale_strength
+from logger.lab.unknown_road.fisher_scoring import RoadFit, inverse, response_and_slopes
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
 
@@ -17,28 +17,28 @@ from logger.vehicle.effect import Chosen
 class Trial:
     """An effect at some values on top of a model.
 
-    gain           what it promises, in minus twice the log-likelihood
-    at             the values at which it does
-    deviations     how many standard errors it stands out by at its values, all that is free being fitted
-    beside_road    the same share of its information (0 to 1) that roads and places do not take
+    gain                 expected, in minus twice the log-likelihood
+    best                 the effect at its best strength, which has this gain
+    deviations           expected significance at its values, all free numbers fitted, in standard deviations
+    share_beyond_road    share of its information (0 to 1) that roads and places do not absorb
     """
 
-    one: Chosen
+    chosen: Chosen
     gain: float
-    at: Chosen
+    best: Chosen
     deviations: float
-    beside_road: float
+    share_beyond_road: float
 
 
-def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
-    """Effects tried on top of a fitted model, by its slopes along the change that each makes in the response: a score
-    test, the car's numbers and the roads' projected out."""
+def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Trial]:
+    """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
+    numbers and the roads' are projected out."""
     state = base.state
-    gains, own = sloped(problem, state.effects, base.moves, state.logs)
+    gains, own = response_and_slopes(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
     table = problem.table(gains, np.array([*own, *changes]))
-    slopes, information = problem.scored(table, state.roads, information=True)
+    slopes, information = problem.score_and_information(table, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
     off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)
@@ -48,26 +48,26 @@ def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Tria
     found = []
     for index, one in enumerate(ones, p):
         alone, mixed = information[index, index], information[index, rest]
-        left = max(float(alone - mixed @ known @ mixed), 0.0)
-        taken = information[index, road]
-        share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
+        remaining = max(float(alone - mixed @ known @ mixed), 0.0)
+        with_road = information[index, road]
+        share = float(1 - with_road @ by_road @ with_road / alone) if alone > 0 else 0.0
         slope = float(slopes[index] - mixed @ known @ score)
-        found.append(_trial(one, slope, left, alone, max(share, 0.0)))
+        found.append(_trial(one, slope, remaining, alone, max(share, 0.0)))
     return found
 
 
-def _trial(one: Chosen, slope: float, left: float, alone: float, share: float, weakest: float = 0.03,
+def _trial(one: Chosen, slope: float, remaining: float, alone: float, share: float, weakest: float = 0.03,
            strongest: float = 3.0) -> Trial:
-    """A trial at the strength that its slope and its information promise, within these bounds.
+    """The trial at its best strength by its score and its information, within these bounds.
 
-    left, alone    its information with all that is free fitted, and by itself; of less than 1e-4 of that rounding is
-                   most
+    remaining, alone    its information with all free numbers projected out, and before; a share below 1e-4 is mostly
+                        rounding
     """
-    if not left > 1e-4 * alone:
+    if not remaining > 1e-4 * alone:
         return Trial(one, 0.0, one, 0.0, share)
-    strength = float(np.clip(slope / left, weakest, strongest))
-    scaled = scaled_by(one, strength)
+    strength = float(np.clip(slope / remaining, weakest, strongest))
+    scaled = scale_strength(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one
-    gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / PROBES)
-    return Trial(one, gain, scaled, float(np.sqrt(left)), share)
+    gain = (2 * strength * slope - strength**2 * remaining) / (1 + 1 / PROBES)
+    return Trial(one, gain, scaled, float(np.sqrt(remaining)), share)

@@ -1,9 +1,9 @@
-"""What a car with effects records of a road as a linear response, where it is one.
+"""The linear frequency response of a car with effects, as a table, where it has one.
 
-Problem: where nobody measured the road, it has to be integrated out, and that can be done for a car that answers in
-proportion to it. Most effects leave a car so, some of them in ways that no constant matrix holds (a spring in series
-with a damper, a delay). Solution: the response is computed frequency by frequency from the same parts that simulations
-are made of; whether a corner's laws are straight is found by asking them.
+Problem: where nobody measured the road, it has to be integrated out, which is possible for a linear car. With most
+effects a car is linear, with some in ways that no constant matrix describes (a spring in series with a damper, a
+delay). Solution: the response is computed frequency by frequency from the same parts as simulations; whether a corner's
+laws are linear is tested at some motions.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _STEP_HZ = 0.025
-"""Responses are tabulated so densely: eight steps are as wide as a resonance at 1 Hz with a damping ratio of 0.1."""
+"""Step of the table: eight are as wide as a resonance at 1 Hz with a damping ratio of 0.1."""
 
 
-def _is_straight(laws: CornerLaws) -> bool:
-    """Whether all forces of a corner are in proportion to how it is moved; of a damper, at some rates either way."""
+def _is_linear(laws: CornerLaws) -> bool:
+    """Whether all forces of a corner are linear in its motion; a damper is tested at some rates in both directions."""
     if laws.springs or laws.others or laws.motions or laws.tires or laws.rubs or not laws.tire_pulls:
         return False
     rates_mps = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
@@ -36,16 +36,16 @@ def _is_straight(laws: CornerLaws) -> bool:
 
 
 def frequencies_of(rate_hz: float) -> Array:
-    """Frequencies (f,) that responses are given at [Hz]."""
+    """Frequencies (f,) of the table [Hz]."""
     return np.arange(0.0, rate_hz / 2 + _STEP_HZ, _STEP_HZ)
 
 
 def response_of(car: Car, rate_hz: float) -> Complex:
-    """Readings per elevation under each axle (x, f) at ``frequencies_of``, behind the recorder's filter [1/s2].
+    """Reading per elevation under each axle (x, f) at ``frequencies_of``, the recorder's filter included [1/s2].
 
-    Left and right wheels see the same road. ValueError for a car whose laws are not straight.
+    Left and right wheels are on the same road. ValueError for a car whose laws are not linear.
     """
-    if car.records or not all(map(_is_straight, car.laws)):
+    if car.records or not all(map(_is_linear, car.laws)):
         raise ValueError("expected a car that answers in proportion to the road")
     f_hz = frequencies_of(rate_hz)
     structure, s = car.structure, np.asarray(2j * np.pi * f_hz, np.complex128)
@@ -62,18 +62,18 @@ def response_of(car: Car, rate_hz: float) -> Complex:
 
 
 def _damper(laws: CornerLaws, s: Complex) -> Complex:
-    """Force per extension of a damper behind its mount."""
+    """Force per extension of a damper in series with its mount."""
     alone = s * float(laws.damper(np.ones(1))[0])
     return alone if np.isinf(laws.mount_n_per_m) else alone / (1 + alone / laws.mount_n_per_m)
 
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """A car as a table of its response, whatever values it is asked for.
+    """A table of a car's response, for any values of its parameters.
 
     behind_m, contact_patch_m    as its structure's, each axle once
     rate_hz                      of the recorder
-    gains, slopes                (x, f) and (p, x, f) at ``frequencies_of``
+    gains, slopes                responses (x, f) and derivatives (p, x, f) at ``frequencies_of``
     """
 
     behind_m: Array
@@ -84,11 +84,11 @@ class Tabulated:
 
     @property
     def parameters(self) -> Sequence[Free]:
-        """What the slopes are by."""
+        """Parameters of the derivatives."""
         return [Free(f"number {index}", 0.0, -1.0, 1.0, place=True) for index in range(len(self.slopes))]
 
     def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
-        """The table at other frequencies."""
+        """Responses and derivatives interpolated at other frequencies."""
         place = np.minimum(f_hz / _STEP_HZ, self.gains.shape[-1] - 1.001)
         low = place.astype(np.intp)
         share = place - low

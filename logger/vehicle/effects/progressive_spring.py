@@ -1,4 +1,4 @@
-"""Suspension springs harden with travel: a cubic term beside the linear rate.
+"""Suspension springs harden with travel: a cubic term added to the linear rate.
 
 F = k x + k3 x^3, with x the travel from where the car rests.
 """

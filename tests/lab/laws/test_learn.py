@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.learn import Learning, learn
 from logger.plugins import catalogue
 from logger.store.formats.effect_file import own_effect, shipped_effects
@@ -41,9 +41,10 @@ def learned(effects: Sequence[Chosen], **how: Any) -> Learning:
 
 def drafts() -> list[Draft]:
     posterior = posterior_of(secret_runs())
-    look = Look(posterior, posterior.start())
-    found = [(family, draft) for family in FAMILIES.values() for draft in family.drafts(look)]
-    return [*(draft for _, draft in found), *(more for family, draft in found for more in family.narrower(draft, look))]
+    context = LawContext(posterior, posterior.start())
+    found = [(family, draft) for family in FAMILIES.values() for draft in family.drafts(context)]
+    return [*(draft for _, draft in found),
+            *(more for family, draft in found for more in family.narrower(draft, context))]
 
 
 @pytest.mark.parametrize("draft", drafts(), ids=lambda draft: f"{draft.name}-{draft.variant}")
@@ -72,7 +73,7 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
     found = learned([chosen(QuadraticDamping(), {})], rougher=2.0)
     law = found.law
     assert law is not None
-    assert law.family.name == "force_by_rate" and not law.beside and not law.draft.axle
+    assert law.family.name == "force_by_rate" and not law.effects and not law.draft.axle
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
     true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
     assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from logger.lab.diagnosis import refitted
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.laws.families.wheel_turns import FAMILY as WHEEL_TURNS
 from logger.lab.laws.own_phases import EACH
-from logger.lab.laws.screening import screened_law
-from logger.lab.selection.candidate_fit import refined, roughly_fitted
+from logger.lab.laws.screening import screen_law
+from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -43,12 +43,12 @@ def test_a_hum_that_begins_elsewhere_in_each_run_is_found_with_a_pair_for_each()
     posterior = posterior_of(humming())
     start = posterior.start()
     base = refitted(posterior, start)
-    drafts = [one for one in HUM.drafts(Look(posterior, base.state)) if one.variant.startswith("steady")]
-    alike, each = (roughly_fitted(base.score, base, screened_law(base, one, misalignment(posterior, start)))[0]
+    drafts = [one for one in HUM.drafts(LawContext(posterior, base.state)) if one.variant.startswith("steady")]
+    alike, each = (fit_roughly(base.score, base, screen_law(base, one, misalignment(posterior, start)))[0]
                    for one in drafts)
     assert [one.variant for one in drafts] == ["steady", f"steady{EACH}"]
     assert each.gain > alike.gain + 100
-    found = refined(base.score, each).chosen.values
+    found = refine(base.score, each).chosen.values
     for number, phase in enumerate(PHASES, 1):
         pair = [found[f"{part}_run_{number}_mps2"] for part in ("cos", "sin")]
         assert pair == pytest.approx([SIZE_MPS2 * np.cos(phase), -SIZE_MPS2 * np.sin(phase)], abs=0.03)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.chart_data import Curves
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.families.friction_with_memory import FAMILY as FRICTION
 from logger.lab.laws.families.spring_with_memory import FAMILY as RUBBER
 from logger.lab.laws.picture import picture
@@ -18,10 +18,10 @@ from ...support.lab.secret_runs import posterior_of, secret_runs
 
 def drawn(family, **values: float) -> Curves:  # type: ignore[no-untyped-def]
     posterior = posterior_of(secret_runs())
-    look = Look(posterior, posterior.start())
-    draft = family.drafts(look)[0]
+    context = LawContext(posterior, posterior.start())
+    draft = family.drafts(context)[0]
     usual = {one.name: one.start for one in draft.parameters}
-    found = picture(draft, chosen(draft.effect, usual | values), NumberErrors({}, ()), look)
+    found = picture(draft, chosen(draft.effect, usual | values), NumberErrors({}, ()), context)
     assert found is not None
     return found
 

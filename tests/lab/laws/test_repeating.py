@@ -12,7 +12,7 @@ from logger.lab.laws import repeating
 from logger.lab.laws.families.clipping import FAMILY as CLIPPING
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.laws.families.wheel_turns import FAMILY as WHEEL_TURNS
-from logger.lab.laws.repeating import along_the_way, tone_in_time
+from logger.lab.laws.repeating import spatial_frequency, tone_in_time
 from logger.vehicle.effect import RecordEffect, Recording
 
 from ...support.lab.secret_runs import posterior_of, secret_runs
@@ -27,10 +27,10 @@ def look_at(monkeypatch: pytest.MonkeyPatch, signals: list[Array]) -> Any:
     """Runs whose residuals, white already, are these (n,) and noise."""
     rng = np.random.default_rng(2004)
     noisy = [one[FIRST:] + rng.normal(size=COUNT - FIRST) for one in signals]
-    monkeypatch.setattr(repeating, "white_residuals", lambda look: noisy)
+    monkeypatch.setattr(repeating, "white_residuals", lambda context: noisy)
     runs = [SimpleNamespace(rate_hz=100.0, first=FIRST, distance_m=way(speed), speed_mps=np.full(COUNT, speed))
             for speed in SPEEDS_MPS]
-    still = SimpleNamespace(moved_m=lambda record: [np.zeros(COUNT)] * len(runs))
+    still = SimpleNamespace(distance_error_m=lambda record: [np.zeros(COUNT)] * len(runs))
     return SimpleNamespace(runs=runs, posterior=still, state=SimpleNamespace(record=None))
 
 
@@ -41,43 +41,43 @@ def way(speed_mps: float) -> Array:
 def test_a_tone_that_wanders_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     late = 0.7 * np.sin(2 * np.pi * TIME_S / 18.3) + 0.2 * np.cos(2 * np.pi * TIME_S / 18.3)
     tone = np.sin(2 * np.pi * 21.7 * (TIME_S + late) + 1.0)
-    look = look_at(monkeypatch, [tone, tone])
-    found = tone_in_time(look, (5.0, 37.0), wanders=True)
+    context = look_at(monkeypatch, [tone, tone])
+    found = tone_in_time(context, (5.0, 37.0), wanders=True)
     assert found is not None and found.wanders
     assert found.frequency_hz == pytest.approx(21.7, abs=0.01) and found.period_s == pytest.approx(18.3, abs=0.05)
     assert (found.wander_sin_s, found.wander_cos_s) == pytest.approx((0.7, 0.2), abs=0.01)
 
 
 def test_a_steady_tone_and_one_by_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    look = look_at(monkeypatch, [0.5 * np.cos(2 * np.pi * 13.37 * TIME_S)] * 2)
-    found = tone_in_time(look, (5.0, 37.0), wanders=False)
+    context = look_at(monkeypatch, [0.5 * np.cos(2 * np.pi * 13.37 * TIME_S)] * 2)
+    found = tone_in_time(context, (5.0, 37.0), wanders=False)
     assert found is not None and not found.wanders and found.frequency_hz == pytest.approx(13.37, abs=0.003)
     turning = look_at(monkeypatch, [0.5 * np.cos(2 * np.pi * 0.531 * way(speed)) for speed in SPEEDS_MPS])
-    assert along_the_way(turning, (0.3, 1.6)) == pytest.approx(0.531, abs=2e-4)
+    assert spatial_frequency(turning, (0.3, 1.6)) == pytest.approx(0.531, abs=2e-4)
 
 
 def test_noise_does_not_repeat(monkeypatch: pytest.MonkeyPatch) -> None:
-    look = look_at(monkeypatch, [np.zeros(COUNT)] * 2)
-    assert tone_in_time(look, (5.0, 37.0), False) is None and along_the_way(look, (0.3, 1.6)) is None
-    assert tone_in_time(look, (5.0, 37.0), True) is None
+    context = look_at(monkeypatch, [np.zeros(COUNT)] * 2)
+    assert tone_in_time(context, (5.0, 37.0), False) is None and spatial_frequency(context, (0.3, 1.6)) is None
+    assert tone_in_time(context, (5.0, 37.0), True) is None
 
 
 def test_nothing_is_drafted_where_nothing_repeats() -> None:
-    from logger.lab.laws.families.family import Look
+    from logger.lab.laws.families.family import LawContext
 
     posterior = posterior_of(secret_runs())
-    look = Look(posterior, posterior.start())
-    assert HUM.drafts(look) == [] == WHEEL_TURNS.drafts(look)
+    context = LawContext(posterior, posterior.start())
+    assert HUM.drafts(context) == [] == WHEEL_TURNS.drafts(context)
 
 
 def test_a_clipped_record_is_that_of_a_clipped_motion() -> None:
     """Clipped in fine steps and filtered by another program: SciPy's resampling."""
     from scipy.signal import firwin, resample_poly
 
-    from logger.lab.laws.families.family import Look
+    from logger.lab.laws.families.family import LawContext
 
     posterior = posterior_of(secret_runs())
-    effect = CLIPPING.drafts(Look(posterior, posterior.start()))[0].effect
+    effect = CLIPPING.drafts(LawContext(posterior, posterior.start()))[0].effect
     assert isinstance(effect, RecordEffect)
     time_s = np.arange(16000) / 1600
     fine = 3 * np.sin(2 * np.pi * 1.3 * time_s) + 1.5 * np.sin(2 * np.pi * 9.1 * time_s)

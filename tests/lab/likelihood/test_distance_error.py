@@ -14,11 +14,11 @@ from logger.lab.likelihood.distance_error import (
     USUAL,
     ErrorSize,
     RecordError,
-    rate_of_change,
-    unusual_m,
-    usual_of,
+    derivative,
+    unusual_distance_error_m,
+    usual_size,
 )
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import RecordFacts, Run
@@ -38,13 +38,13 @@ SPEED_SCALE, TIME_OFFSET = EFFECTS["speed_scale"], EFFECTS["time_offset"]
 def laid(runs: list[Run], effects: tuple[Chosen, ...] = ()) -> tuple[Posterior, State]:
     """Runs with their distance errors fitted."""
     posterior = posterior_of(runs)
-    return posterior, aligned(posterior, posterior.start(effects)).state
+    return posterior, align(posterior, posterior.start(effects)).state
 
 
 def gain_of(runs: list[Run], one: Chosen) -> tuple[float, Chosen]:
     """By how much an effect makes a model more evident whose numbers and distance errors are all fitted; and it."""
     posterior = posterior_of(runs)
-    without, found = (fit(aligned(posterior, posterior.start(effects))) for effects in ([], [one]))
+    without, found = (fit(align(posterior, posterior.start(effects))) for effects in ([], [one]))
     return without.score - found.score, found.state.effects[0]
 
 
@@ -55,7 +55,7 @@ def gain_of(runs: list[Run], one: Chosen) -> tuple[float, Chosen]:
 def test_the_rate_of_change_of_a_wave_is_its_derivative(at_hz: float, within: float) -> None:
     time_s = np.arange(1000) / RATE_HZ
     turn = 2 * np.pi * at_hz
-    found = rate_of_change(np.sin(turn * time_s + 0.4), RATE_HZ)
+    found = derivative(np.sin(turn * time_s + 0.4), RATE_HZ)
     assert np.abs(found - turn * np.cos(turn * time_s + 0.4))[INNER].max() < within * turn
 
 
@@ -64,8 +64,8 @@ def test_a_recorder_that_averages_over_its_samples_is_allowed_its_droop() -> Non
     k = np.zeros(ERROR.count)
     k[-2:] = 0.01, np.pi**2 / 6  # sin(x) / x is 1 - x^2 / 6 with x = pi f / rate
     expected = (1.01 - (np.pi * 20.0 / RUN.rate_hz) ** 2 / 6) * wave
-    assert ERROR.recorded(wave, k)[INNER] == pytest.approx(expected[INNER], abs=1e-3)
-    assert ERROR.moved_m(k) == pytest.approx(0.0)
+    assert ERROR.with_recorder_error(wave, k)[INNER] == pytest.approx(expected[INNER], abs=1e-3)
+    assert ERROR.distance_error_m(k) == pytest.approx(0.0)
 
 
 def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
@@ -77,19 +77,19 @@ def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
     def wave(at_s: np.ndarray) -> np.ndarray:
         return np.sin(2 * np.pi * 1.3 * at_s) + 0.5 * np.sin(2 * np.pi * 4.1 * at_s)
 
-    later = wave(time_s + ERROR.moved_m(k) / RUN.speed_mps)
+    later = wave(time_s + ERROR.distance_error_m(k) / RUN.speed_mps)
     found = k @ ERROR.slopes(wave(time_s))
-    expected = ERROR.recorded(later, k) - wave(time_s)
+    expected = ERROR.with_recorder_error(later, k) - wave(time_s)
     assert np.abs(found - expected)[INNER].max() < 0.01 * np.abs(expected).max()
 
 
 def test_the_curve_goes_through_a_straight_line() -> None:
     line_m = 0.3 - 0.002 * np.arange(RUN.count)
-    assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
+    assert ERROR.distance_error_m(ERROR.coefficients_of(line_m)) == pytest.approx(line_m, abs=1e-12)
 
 
 def test_the_basis_is_that_of_splines_and_of_what_a_smoothing_filter_leaves() -> None:
-    count = ERROR.coefficients
+    count = ERROR.spline_count
     splines = BSpline.design_matrix(np.linspace(0, count - 3, RUN.count), np.arange(-3, count + 1.0), 3).toarray().T
     assert ERROR.basis[:count] == pytest.approx(splines, abs=1e-12)
     rough = replace(RUN, distance_m=np.round(RUN.distance_m, 2))
@@ -99,7 +99,7 @@ def test_the_basis_is_that_of_splines_and_of_what_a_smoothing_filter_leaves() ->
 
 @pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 63), (100.0, 303), (150.0, 363), (400.0, 363)])
 def test_longer_runs_have_more_coefficients_up_to_a_limit(lasts_s: float, coefficients: int) -> None:
-    assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).coefficients == coefficients
+    assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).spline_count == coefficients
 
 
 # --- the prior ---
@@ -110,7 +110,7 @@ def test_the_prior_has_the_deviations_that_it_was_given() -> None:
     covariance = np.linalg.inv(ERROR.precision(size))
 
     def deviation_m(sample: int) -> float:
-        rows = np.array([ERROR.moved_m(one)[sample] for one in np.eye(ERROR.count)])
+        rows = np.array([ERROR.distance_error_m(one)[sample] for one in np.eye(ERROR.count)])
         rows[-3] = 0.0  # what of the distance is rougher than any car drives is not of this size
         return float(np.sqrt(rows @ covariance @ rows))
 
@@ -136,8 +136,8 @@ def test_sizes_are_kept_as_logarithms_and_the_usual_ones_cost_nothing() -> None:
 def test_more_than_a_good_recorder_is_off_by_is_reported_and_no_less() -> None:
     usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * 20.0 + (USUAL.scale * np.ptp(RUN.distance_m)) ** 2)
     for factor, expected in ((2.5, 0.0), (4.0, 4.0 * usual_m)):
-        k = ERROR.through(np.full(RUN.count, -factor * usual_m))
-        assert unusual_m([ERROR, ERROR], [np.zeros(ERROR.count), k]) == pytest.approx(expected)
+        k = ERROR.coefficients_of(np.full(RUN.count, -factor * usual_m))
+        assert unusual_distance_error_m([ERROR, ERROR], [np.zeros(ERROR.count), k]) == pytest.approx(expected)
 
 
 # --- sizes that are found ---
@@ -149,8 +149,8 @@ def test_the_size_of_a_walk_is_found(size: ErrorSize) -> None:
     found = []
     for seed in range(6):
         case = drawn([], seed, size)
-        start = case.posterior.at((), case.logs)
-        found.append(np.log(aligned(case.posterior, start).size.walk_m / size.walk_m))
+        start = case.posterior.state_at((), case.logs)
+        found.append(np.log(align(case.posterior, start).size.walk_m / size.walk_m))
     assert np.mean(found) == pytest.approx(0.0, abs=0.35)
     assert np.std(found) < 0.6
 
@@ -159,7 +159,8 @@ def test_a_start_that_is_far_off_is_no_walk() -> None:
     true = noisy_runs()
     late = [replace(run, distance_m=run.distance_m + off) for run, off in zip(true, (0.06, -0.09), strict=True)]
     posterior, state = laid(late)
-    assert worst_rms([one + off for one, off in zip(posterior.moved_m(state.record), (0.06, -0.09), strict=True)],
+    found_m = posterior.distance_error_m(state.record)
+    assert worst_rms([one + off for one, off in zip(found_m, (0.06, -0.09), strict=True)],
                      true) < 0.005
     assert state.size.start_m > 3 * USUAL.start_m and state.size.walk_m < USUAL.walk_m
 
@@ -184,7 +185,7 @@ def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float, int]) -
     runs = [wrong_speed(run, wrong, i) for i, run in enumerate(true)]
     posterior, state = laid(runs)
     truth_m = off_m(runs, true)
-    left_m = [found - one for found, one in zip(posterior.moved_m(state.record), truth_m, strict=True)]
+    left_m = [found - one for found, one in zip(posterior.distance_error_m(state.record), truth_m, strict=True)]
     before_m = worst_rms(truth_m, true)
     assert before_m > 0.02 and worst_rms(left_m, true) < min(0.01, 0.5 * before_m)
     undisturbed = posterior_of(true)
@@ -203,8 +204,8 @@ def test_a_distance_that_wanders_hides_no_physics_and_makes_none(wrong: tuple[fl
 def test_runs_that_do_not_wander_stay_where_they_were_recorded() -> None:
     true = noisy_runs()
     posterior, state = laid(true)
-    assert worst_rms(posterior.moved_m(state.record), true) < 0.003
-    assert unusual_m(posterior.record_errors, state.record) == 0.0
+    assert worst_rms(posterior.distance_error_m(state.record), true) < 0.003
+    assert unusual_distance_error_m(posterior.record_errors, state.record) == 0.0
     assert state.size.walk_m < USUAL.walk_m
 
 
@@ -269,7 +270,7 @@ def by_receiver(run: Run, seed: int, late_s: float = 0.0) -> Run:
 
 @pytest.mark.parametrize("facts", [RecordFacts(), RecordFacts(place_std_m=0.0), RecordFacts(place_std_m=0.003)])
 def test_a_run_that_says_nothing_or_little_has_a_good_recorder(facts: RecordFacts) -> None:
-    assert usual_of(replace(RUN, facts=facts)) == USUAL
+    assert usual_size(replace(RUN, facts=facts)) == USUAL
 
 
 def test_a_receiver_is_off_by_what_it_says_at_the_start_and_by_as_much_a_minute_later() -> None:
@@ -279,7 +280,7 @@ def test_a_receiver_is_off_by_what_it_says_at_the_start_and_by_as_much_a_minute_
     moved = error.basis.T @ k[:-2]
     late_m = 0.1 * RUN.speed_mps
     assert moved[0].std() == pytest.approx(np.hypot(1.2, late_m[0]), rel=0.05)
-    walked = moved[-1] - moved[0] - (late_m[-1] - late_m[0]) / 0.1 * k[error.coefficients]
+    walked = moved[-1] - moved[0] - (late_m[-1] - late_m[0]) / 0.1 * k[error.spline_count]
     # A process that forgets itself in a minute: its structure function begins as 2 t / 60 of its variance.
     assert walked.std() == pytest.approx(1.2 * np.sqrt(2 * 20.0 / _FORGETS_S), rel=0.08)
 
@@ -292,8 +293,9 @@ def test_the_determinant_of_a_receiver_is_that_of_its_precision(size: ErrorSize)
 
 def test_what_a_receiver_may_be_off_by_is_not_unusual() -> None:
     error = RecordError.of(replace(RUN, facts=RECEIVER), Tolerance())
-    k = error.through(np.full(RUN.count, 2.0))
-    assert unusual_m([error], [k]) == 0.0 < unusual_m([ERROR], [ERROR.through(np.full(RUN.count, 2.0))])
+    k = error.coefficients_of(np.full(RUN.count, 2.0))
+    farther = ERROR.coefficients_of(np.full(RUN.count, 2.0))
+    assert unusual_distance_error_m([error], [k]) == 0.0 < unusual_distance_error_m([ERROR], [farther])
 
 
 @pytest.mark.slow
@@ -302,7 +304,8 @@ def test_runs_are_found_metres_off_and_nothing_is_made_of_it(seed: int) -> None:
     truth = noisy_runs(lasts_s=20.0)
     runs = [by_receiver(run, 10 * seed + number, 0.06) for number, run in enumerate(truth)]
     posterior, state = laid(runs)
-    left = [one - moved for one, moved in zip(off_m(runs, truth), posterior.moved_m(state.record), strict=True)]
+    found_m = posterior.distance_error_m(state.record)
+    left = [one - moved for one, moved in zip(off_m(runs, truth), found_m, strict=True)]
     assert worst_rms(left, truth) < 0.05
     for one in (chosen(TIME_OFFSET, TIME_OFFSET.usual), chosen(SPEED_SCALE, SPEED_SCALE.usual)):
         assert gain_of(runs, one)[0] < 10.0

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.likelihood.lag import WINDOW_S, Trend, constant, drift, followed_m, lags
+from logger.lab.likelihood.lag import WINDOW_S, Trend, constant_lag, lag_drift, lags, offset_by_lag_m
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -39,7 +39,7 @@ def recorded(runs: list[Run], predictions: list[Array], late_s: float = 0.0, lat
 @pytest.mark.parametrize("late_s", [0.03, -0.045, 0.25])
 def test_a_late_clock_is_one_time(late_s: float) -> None:
     runs, predictions = driven()
-    time, _, is_time = constant(lags(recorded(runs, predictions, late_s=late_s), predictions))
+    time, _, is_time = constant_lag(lags(recorded(runs, predictions, late_s=late_s), predictions))
     assert is_time
     assert time.value == pytest.approx(late_s, abs=max(5 * time.error, 1e-3))
     assert time.error < 2e-3 and time.p_value < 1e-6
@@ -48,7 +48,7 @@ def test_a_late_clock_is_one_time(late_s: float) -> None:
 @pytest.mark.parametrize("late_m", [0.25, -0.4])
 def test_a_wrong_place_is_one_length(late_m: float) -> None:
     runs, predictions = driven()
-    _, length, is_time = constant(lags(recorded(runs, predictions, late_m=late_m), predictions))
+    _, length, is_time = constant_lag(lags(recorded(runs, predictions, late_m=late_m), predictions))
     assert is_time is False
     assert length.value == pytest.approx(late_m, rel=0.05)
 
@@ -56,7 +56,7 @@ def test_a_wrong_place_is_one_length(late_m: float) -> None:
 def test_at_one_speed_a_time_and_a_length_are_the_same() -> None:
     run = a_run("run", 12.0, 20.0, 3, swing=0.02)
     predictions = SimulatedRuns([run], FINE_HZ).predict(compose(CAR))
-    assert constant(lags(recorded([run], predictions, late_s=0.03), predictions))[2] is None
+    assert constant_lag(lags(recorded([run], predictions, late_s=0.03), predictions))[2] is None
 
 
 @pytest.mark.parametrize("share", [0.01, -0.02])
@@ -65,7 +65,7 @@ def test_a_wrong_speed_grows_along_the_way(share: float) -> None:
     runs, predictions = driven()
     truth = [replace(run, distance_m=(1 - share) * run.distance_m) for run in runs]
     measured = SimulatedRuns(truth, FINE_HZ).predict(compose(CAR))
-    found = drift(lags(recorded(runs, measured), predictions))
+    found = lag_drift(lags(recorded(runs, measured), predictions))
     assert found.value == pytest.approx(share, rel=0.05)
     assert found.p_value < 1e-6
 
@@ -75,7 +75,7 @@ def test_where_nothing_is_off_there_is_neither_and_chance_says_so_honestly() -> 
     found = []
     for seed in range(30):
         windows = lags(recorded(runs, predictions, seed=seed), predictions)
-        found += [drift(windows).p_value, constant(windows)[0].p_value]
+        found += [lag_drift(windows).p_value, constant_lag(windows)[0].p_value]
     assert sum(one < 0.02 for one in found) <= 5  # of 60, with a probability below 0.001 for more
     assert np.mean(found) == pytest.approx(0.5, abs=0.15)
 
@@ -109,7 +109,7 @@ def test_a_car_that_is_farther_and_farther_ahead_is_followed() -> None:
     model = SimulatedRuns([run], FINE_HZ).predict(compose(CAR))
     (measured,) = recorded([run], truth)
     until_last_window = slice(run.first, -700)
-    followed = followed_m(measured, model[0])[until_last_window]
+    followed = offset_by_lag_m(measured, model[0])[until_last_window]
     assert followed == pytest.approx(ahead_m[until_last_window], abs=0.3) and followed[-1] > 3.0  # of 4.8 m in all
 
 
@@ -121,10 +121,10 @@ def test_what_is_not_alike_or_too_short_tells_nothing() -> None:
     runs, predictions = driven()
     noise = [measuring(run, np.random.default_rng(i).normal(0, 1, run.count)) for i, run in enumerate(runs)]
     windows = lags(noise, predictions)
-    time, length, rather = constant(windows)
-    assert is_unknown(drift(windows)) and is_unknown(time) and is_unknown(length) and rather is None
-    assert not followed_m(noise[0], predictions[0]).any()
+    time, length, rather = constant_lag(windows)
+    assert is_unknown(lag_drift(windows)) and is_unknown(time) and is_unknown(length) and rather is None
+    assert not offset_by_lag_m(noise[0], predictions[0]).any()
     short, model = driven(6.0, (8.0,))
     few = lags(recorded(short, model), model)
-    assert is_unknown(drift(few))
+    assert is_unknown(lag_drift(few))
     assert lags([], []).run.size == 0

@@ -42,7 +42,7 @@ def case() -> Case:
     logs = 0.5 * posterior.prior.deviations * rng.normal(size=len(posterior.prior.names))
     record = [1e-3 * rng.normal(size=one.count) for one in posterior.record_errors]
     effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
-    state = posterior.at(effects, logs, record)
+    state = posterior.state_at(effects, logs, record)
     linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
     own = effect_slopes(linear, effects, logs, moves_of(effects), linear.state.record, state.predictions)
     return Case(posterior, state, linear, linear.whitened(own))
@@ -92,8 +92,8 @@ def test_the_most_likely_records_are_those_of_least_squares() -> None:
     one, whole = case(), dense(case())
     rng = np.random.default_rng(2)
     predictions = [each + rng.normal(0, 0.02, len(each)) for each in one.state.predictions]
-    found = one.linear.eliminated(predictions)
-    white = np.concatenate(one.linear.whitened(one.posterior.left_by(predictions)))
+    found = one.linear.fit_record_errors(predictions)
+    white = np.concatenate(one.linear.whitened(one.posterior.residuals_of(predictions)))
     columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
     here = np.concatenate(one.state.record)
     root = np.linalg.cholesky(precision).T
@@ -116,7 +116,7 @@ def test_the_gradient_is_that_of_the_objective() -> None:
             one.state.predictions, numbers, own, strict=True)]
         return one.linear.objective(there, logs + x[: len(logs)])
 
-    residuals = one.linear.eliminated(one.state.predictions).residuals
+    residuals = one.linear.fit_record_errors(one.state.predictions).residuals
     found = one.linear.gradient(residuals, logs, one.own)
     steps = np.diag(1e-3 / np.sqrt(np.diag(one.linear.information(logs, one.own))))
     expected = [-(objective(step) - objective(-step)) / (4 * step.sum()) for step in steps]
@@ -127,7 +127,7 @@ def test_the_gradient_is_that_of_the_objective() -> None:
 def test_one_column_has_the_products_of_the_information() -> None:
     one = case()
     information = one.linear.information(one.state.logs, one.own)
-    mixed, with_itself = one.linear.mixed([each[0] for each in one.own])
+    mixed, with_itself = one.linear.cross_products([each[0] for each in one.own])
     assert mixed == pytest.approx(information[one.linear.count, : one.linear.count])
     assert with_itself == pytest.approx(information[one.linear.count, one.linear.count])
 
@@ -135,9 +135,10 @@ def test_one_column_has_the_products_of_the_information() -> None:
 def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> None:
     one, whole = case(), dense(case())
     columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
-    occam = np.linalg.slogdet(columns @ columns.T + precision)[1] - np.linalg.slogdet(precision)[1]
+    occam_factor = np.linalg.slogdet(columns @ columns.T + precision)[1] - np.linalg.slogdet(precision)[1]
     state = one.linear.state
-    expected = one.posterior.deviance(state) + one.posterior.cost(state) + occam + 2 * np.log(one.posterior.freedom)
+    expected = (one.posterior.deviance(state) + one.posterior.cost(state) + occam_factor
+                + 2 * np.log(one.posterior.freedom))
     assert one.linear.score == pytest.approx(expected, abs=1e-6)
 
 
@@ -153,35 +154,36 @@ def test_the_sizes_are_those_with_the_most_evidence() -> None:
         root = np.linalg.cholesky(np.eye(len(residual)) + slope.T @ np.linalg.solve(precision, slope))
         return float(2 * np.log(np.diag(root)).sum() + (solve_triangular(root, residual, lower=True) ** 2).sum())
 
-    def lack(logs: Array) -> float:
+    def minus_twice_log_evidence(logs: Array) -> float:
         size = ErrorSize.of(logs)
         return size.cost + sum(minus_twice_log_density(residual, slope, error.precision(size))
                                for residual, slope, error in zip(white, slopes, posterior.record_errors, strict=True))
 
-    best = minimize(lack, linear.size.logs, method="Nelder-Mead", options={"maxfev": 60}).fun
-    assert lack(linear.size.logs) < best + 1.0
-    assert lack(USUAL.logs) > best + 5.0
+    best = minimize(minus_twice_log_evidence, linear.size.logs, method="Nelder-Mead", options={"maxfev": 60}).fun
+    assert minus_twice_log_evidence(linear.size.logs) < best + 1.0
+    assert minus_twice_log_evidence(USUAL.logs) > best + 5.0
 
 
 def test_numbers_that_are_held_do_nothing_and_leave_the_model_as_it_was() -> None:
     one = case()
     before = one.linear.information(one.state.logs)
-    held = one.linear.holding(["sprung_mass_kg"])
+    held = one.linear.hold_fixed(["sprung_mass_kg"])
     information = held.information(one.state.logs)
     others = np.arange(1, len(information))
     assert information[np.ix_(others, others)] == pytest.approx(before[np.ix_(others, others)])
     assert information[0, 0] == pytest.approx(one.posterior.prior.curvature(one.state.logs)[0])
     assert not information[0, 1:].any()
     assert one.linear.information(one.state.logs) == pytest.approx(before)
-    assert one.linear.holding(["no_number_of_the_car"]) is one.linear
+    assert one.linear.hold_fixed(["no_number_of_the_car"]) is one.linear
 
 
 def test_without_the_wall_only_the_prior_is_another() -> None:
     one = case()
     far = 3.0 * one.posterior.prior.deviations
-    loose = one.linear.without_wall()
-    wall = one.posterior.prior.curvature(far) - one.posterior.prior.without_wall().curvature(far)
-    assert one.linear.information(far) - loose.information(far) == pytest.approx(np.diag(wall), rel=1e-6, abs=1e-3)
+    loose = one.linear.without_soft_bounds()
+    soft_bounds = one.posterior.prior.curvature(far) - one.posterior.prior.without_soft_bounds().curvature(far)
+    assert one.linear.information(far) - loose.information(far) == pytest.approx(
+        np.diag(soft_bounds), rel=1e-6, abs=1e-3)
     assert loose.objective(one.state.predictions, far) < one.linear.objective(one.state.predictions, far)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, aligned, fit
+from logger.lab.likelihood.map_fit import CONVERGED, align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -23,7 +23,7 @@ from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2
 
 
 def from_start(posterior: Posterior, *effects: Chosen) -> LinearModel:
-    return fit(aligned(posterior, posterior.start(effects)))
+    return fit(align(posterior, posterior.start(effects)))
 
 
 @cache
@@ -45,7 +45,7 @@ def noise_share(posterior: Posterior) -> float:
 def test_a_car_that_lacks_nothing_ends_at_the_noise_with_the_numbers_that_it_has() -> None:
     found, posterior = plain(), plain().posterior
     assert posterior.error(found.state) == pytest.approx(noise_share(posterior), rel=0.03)
-    assert not posterior.prior.at_the_wall(found.state.logs)
+    assert not posterior.prior.at_soft_bounds(found.state.logs)
     assert np.abs(found.state.logs / posterior.prior.deviations).max() < 1.0
 
 
@@ -92,7 +92,7 @@ def test_nothing_near_a_fit_is_likelier() -> None:
 def test_an_effect_that_does_nothing_explains_nothing_and_costs_its_numbers() -> None:
     posterior, state = plain().posterior, plain().state
     gain = chosen(EFFECTS["sensor_gain"], {"gain": 1.0})
-    same = posterior.at([gain], state.logs, state.record, state.size)
+    same = posterior.state_at([gain], state.logs, state.record, state.size)
     assert posterior.deviance(same) == pytest.approx(posterior.deviance(state), abs=1e-6)
     rise = LinearModel(posterior, same).score - LinearModel(posterior, state).score
     assert rise == pytest.approx(np.log(posterior.freedom), abs=1e-6)
@@ -108,8 +108,8 @@ def test_a_car_bends_no_farther_than_the_wall_and_without_it_as_far_as_the_runs_
     heavy = changed(CAR, {"sprung_mass_kg": 1.12 * CAR.sprung_mass_kg})
     posterior = Posterior(SimulatedRuns(noisy_runs(), FINE_HZ), heavy, Tolerance())
     firm = from_start(posterior)
-    loose = fit(LinearModel(posterior.without_wall(), firm.state), firm.numbers)
-    assert posterior.prior.at_the_wall(firm.state.logs)
+    loose = fit(LinearModel(posterior.without_soft_bounds(), firm.state), firm.numbers)
+    assert posterior.prior.at_soft_bounds(firm.state.logs)
     held, free = (read(one.posterior.prior.vehicle(heavy, one.state.logs), "sprung_mass_kg") for one in (firm, loose))
     assert held > 1.04 * CAR.sprung_mass_kg and free < held - 0.02 * CAR.sprung_mass_kg
     assert posterior.prior.cost(firm.state.logs) < posterior.prior.cost(loose.state.logs)
@@ -117,8 +117,8 @@ def test_a_car_bends_no_farther_than_the_wall_and_without_it_as_far_as_the_runs_
 
 
 def test_a_fit_begins_where_the_car_stands_and_its_prior_stays_where_it_was() -> None:
-    stands = changed(CAR, {"sprung_mass_kg": 1.02 * CAR.sprung_mass_kg})
-    posterior = Posterior(plain().posterior.runs, CAR, Tolerance(), stands)
+    start_vehicle = changed(CAR, {"sprung_mass_kg": 1.02 * CAR.sprung_mass_kg})
+    posterior = Posterior(plain().posterior.runs, CAR, Tolerance(), start_vehicle)
     start = posterior.start()
     assert read(posterior.prior.vehicle(CAR, start.logs), "sprung_mass_kg") == pytest.approx(1.02 * CAR.sprung_mass_kg)
     found = from_start(posterior)
@@ -128,14 +128,14 @@ def test_a_fit_begins_where_the_car_stands_and_its_prior_stays_where_it_was() ->
 def test_aligning_moves_no_number_of_the_car_and_makes_nothing_worse() -> None:
     posterior = drawn([], 4, plain().state.size).posterior
     start = posterior.start()
-    found = aligned(posterior, start)
+    found = align(posterior, start)
     assert found.state.logs.tolist() == start.logs.tolist()
     assert found.score <= LinearModel(posterior, start).score
 
 
 def test_a_round_that_is_not_worth_it_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     posterior = drawn([tire_damping(300.0)], 4, plain().state.size).posterior
-    start = aligned(posterior, posterior.start())
+    start = align(posterior, posterior.start())
     predict, asked = Posterior.predict, []
     monkeypatch.setattr(Posterior, "predict", lambda *given, **named: (asked.append(1), predict(*given, **named))[1])
     whole = fit(start)

@@ -14,11 +14,11 @@ from scipy.signal import firwin
 
 from logger.lab.likelihood.noise_floor import (
     UNEXPLAINED,
-    excess,
+    excess_over_noise,
     floor_error,
-    gain_of_an_explanation,
-    noise_of,
+    gain_of_full_explanation,
     sensor_noise,
+    sensor_noise_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
@@ -73,7 +73,7 @@ def a_band(samples: int) -> Bands:
 def test_noise_is_found_before_and_behind_the_recorders_filter(cut_hz: float | None) -> None:
     noise = white() if cut_hz is None else filtered(white(), cut_hz)
     posterior, state = leaving(noise)
-    found = noise_of(posterior, state)
+    found = sensor_noise_of(posterior, state)
     assert found.deviation_mps2 == pytest.approx(LEVEL, rel=0.05)
     assert floor_error(posterior, found) == pytest.approx(found.deviation_mps2 / posterior.size_mps2)
 
@@ -87,7 +87,7 @@ def test_the_standard_error_of_white_noise_holds() -> None:
 
 def test_no_noise_is_taken_for_less_than_simulations_are_accurate() -> None:
     posterior, state = leaving(white(level=1e-9))
-    assert noise_of(posterior, state).deviation_mps2 == pytest.approx(DISCREPANCY * posterior.size_mps2)
+    assert sensor_noise_of(posterior, state).deviation_mps2 == pytest.approx(DISCREPANCY * posterior.size_mps2)
 
 
 def test_filtered_noise_is_not_taken_for_as_little_as_its_quietest_band() -> None:
@@ -119,11 +119,11 @@ def test_what_is_above_the_noise_is_recognised_by_its_share(share: float, unexpl
     """White noise and more of it in the bands below 20 Hz, about half of them."""
     more = in_band(white(6000, 2, share * LEVEL), 0.5, 20.0)
     posterior, state = leaving(white() + more)
-    above = excess(posterior, state, 1e-3)
+    above = excess_over_noise(posterior, state, 1e-3)
     expected = np.sqrt(1 + share**2 * 19.5 / 37.0) - 1
     assert above == pytest.approx(expected, abs=0.04)
     assert (above > UNEXPLAINED) == unexplained
-    assert (gain_of_an_explanation(posterior, state) > 0) == unexplained
+    assert (gain_of_full_explanation(posterior, state) > 0) == unexplained
 
 
 def test_noise_alone_is_hardly_ever_unexplained_however_short_a_run_is() -> None:
@@ -131,7 +131,7 @@ def test_noise_alone_is_hardly_ever_unexplained_however_short_a_run_is() -> None
     times = 0
     for seed in range(40):
         posterior, state = leaving(white(500, seed), white(6000, seed + 100))
-        times += excess(posterior, state, 1e-3) > UNEXPLAINED
+        times += excess_over_noise(posterior, state, 1e-3) > UNEXPLAINED
     assert times == 0
 
 
@@ -139,15 +139,16 @@ def test_each_sensor_has_a_noise_of_its_own() -> None:
     """A coarse, loud sensor beside a quiet one: neither leaves more than its noise; one kind of both would."""
     residuals = [white(level=0.25), white(seed=2)]
     posterior, state = leaving(*residuals, facts=[RecordFacts(range_mps2=20.0), RecordFacts(range_mps2=40.0)])
-    assert excess(posterior, state, 1e-3) < UNEXPLAINED
-    assert noise_of(posterior, state).deviation_mps2 == pytest.approx(np.sqrt((0.25**2 + LEVEL**2) / 2), rel=0.05)
-    assert gain_of_an_explanation(posterior, state) == 0
+    assert excess_over_noise(posterior, state, 1e-3) < UNEXPLAINED
+    noise = sensor_noise_of(posterior, state)
+    assert noise.deviation_mps2 == pytest.approx(np.sqrt((0.25**2 + LEVEL**2) / 2), rel=0.05)
+    assert gain_of_full_explanation(posterior, state) == 0
     posterior, state = leaving(*residuals)
-    assert excess(posterior, state, 1e-3) > UNEXPLAINED
+    assert excess_over_noise(posterior, state, 1e-3) > UNEXPLAINED
 
 
 def test_what_two_right_simulations_differ_by_is_not_above_the_noise() -> None:
     _, state = predicted(6000)
     signal = state.predictions[0]
     posterior, there = leaving(0.9 * DISCREPANCY * signal + white(level=1e-3 * float(signal.std())))
-    assert excess(posterior, there, 1e-3) < UNEXPLAINED
+    assert excess_over_noise(posterior, there, 1e-3) < UNEXPLAINED

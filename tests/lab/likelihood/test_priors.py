@@ -25,21 +25,21 @@ def test_lengths_and_other_numbers_have_the_tolerance_that_was_given() -> None:
 
 
 def test_without_the_wall_the_cost_is_that_of_a_normal_density() -> None:
-    loose = PRIOR.without_wall()
+    loose = PRIOR.without_soft_bounds()
     density = norm(scale=PRIOR.deviations)
     assert loose.cost(FAR) == pytest.approx(2 * (density.logpdf(0.0) - density.logpdf(FAR)).sum())
 
 
 def test_the_wall_stands_beyond_two_deviations_and_rises() -> None:
-    loose = PRIOR.without_wall()
+    loose = PRIOR.without_soft_bounds()
     near = np.clip(FAR, -1.99 * PRIOR.deviations, 1.99 * PRIOR.deviations)
     assert PRIOR.cost(near) == loose.cost(near)
     assert PRIOR.cost(FAR) > loose.cost(FAR) + 100
-    assert not PRIOR.at_the_wall(near)
-    assert PRIOR.at_the_wall(FAR) and not loose.at_the_wall(FAR)
+    assert not PRIOR.at_soft_bounds(near)
+    assert PRIOR.at_soft_bounds(FAR) and not loose.at_soft_bounds(FAR)
 
 
-@pytest.mark.parametrize("prior", [PRIOR, PRIOR.without_wall()], ids=["wall", "no wall"])
+@pytest.mark.parametrize("prior", [PRIOR, PRIOR.without_soft_bounds()], ids=["wall", "no wall"])
 def test_gradient_and_curvature_are_half_the_costs_derivatives(prior: VehiclePrior) -> None:
     steps = 1e-6 * PRIOR.deviations
     slope = np.array([(prior.cost(FAR + row) - prior.cost(FAR - row)) / (2 * row.sum()) for row in np.diag(steps)])
@@ -50,12 +50,12 @@ def test_gradient_and_curvature_are_half_the_costs_derivatives(prior: VehiclePri
 
 
 def test_the_nearest_numbers_within_the_wall_cost_no_more_than_a_normal_prior_asks() -> None:
-    within = PRIOR.within_wall(FAR)
-    assert not PRIOR.at_the_wall(within)
+    within = PRIOR.clip_to_soft_bounds(FAR)
+    assert not PRIOR.at_soft_bounds(within)
     inside = np.abs(FAR) < 2 * PRIOR.deviations
     assert within[inside].tolist() == FAR[inside].tolist()
     assert np.abs(within / PRIOR.deviations)[~inside] == pytest.approx(2.0)
-    assert PRIOR.without_wall().within_wall(FAR).tolist() == FAR.tolist()
+    assert PRIOR.without_soft_bounds().clip_to_soft_bounds(FAR).tolist() == FAR.tolist()
 
 
 def test_logarithms_bring_one_car_to_another_and_back() -> None:

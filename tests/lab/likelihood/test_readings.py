@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.noise_floor import noise_as_read, noise_of
+from logger.lab.likelihood.noise_floor import sensor_noise_of, sensor_noise_with_rounding
 from logger.lab.likelihood.readings import BLURRED, Readings
 from logger.lab.likelihood.whittle import Bands
 from logger.runs import CLIPPED, NO_READING, READING, RecordFacts, Run
@@ -56,8 +56,8 @@ def information(noise: float, step: float = STEP) -> float:
 def test_what_bounds_leave_is_as_certain_as_their_information(noise: float) -> None:
     prediction = motion()
     run = rounded(prediction, noise)
-    read = Readings.of(run).beside(prediction)
-    left = read.left_by(prediction)[run.first:]
+    read = Readings.of(run).given(prediction)
+    left = read.residual(prediction)[run.first:]
     assert left.mean() == pytest.approx(0.0, abs=4 * left.std() / np.sqrt(len(left)))  # the offset is gone
     assert left.std() == pytest.approx(information(noise) ** -0.5, rel=0.03)
     assert read.share == pytest.approx(noise**2 * information(noise), rel=0.05)
@@ -69,7 +69,7 @@ def test_what_bounds_leave_follows_a_prediction_that_is_a_little_off(noise: floa
     prediction = motion()
     run = rounded(prediction, noise)
     off = 0.3 * noise * np.sin(np.arange(run.count) * 0.37)
-    left = Readings.of(run).beside(prediction - off).left_by(prediction - off)[run.first:]
+    left = Readings.of(run).given(prediction - off).residual(prediction - off)[run.first:]
     way = off[run.first:]
     error = (information(noise) * float(way @ way)) ** -0.5
     assert float(left @ way / (way @ way)) == pytest.approx(1.0, abs=4 * error + 0.1)
@@ -77,7 +77,7 @@ def test_what_bounds_leave_follows_a_prediction_that_is_a_little_off(noise: floa
 
 def test_a_model_that_is_far_off_leaves_what_was_read() -> None:
     run = rounded(motion(), 0.05)
-    assert Readings.of(run).beside(np.zeros(run.count)).as_read
+    assert Readings.of(run).given(np.zeros(run.count)).rounding_is_noise
 
 
 @pytest.mark.parametrize(("facts", "noise"), [
@@ -87,20 +87,20 @@ def test_a_model_that_is_far_off_leaves_what_was_read() -> None:
 def test_what_has_no_bounds_worth_it_stays_as_it_was_read(facts: RecordFacts, noise: float) -> None:
     prediction = motion()
     run = replace(rounded(prediction, noise), facts=facts)
-    assert Readings.of(run).beside(prediction).mps2 is run.measured_mps2
+    assert Readings.of(run).given(prediction).mps2 is run.measured_mps2
 
 
 def test_rounded_readings_that_were_filtered_stay_what_they_are() -> None:
     prediction = motion()
     run = rounded(prediction, 0.05)
     blended = measuring(run, 0.7 * run.measured_mps2 + 0.3 * np.roll(run.measured_mps2, 1))
-    assert Readings.of(replace(blended, facts=run.facts)).beside(prediction).as_read
+    assert Readings.of(replace(blended, facts=run.facts)).given(prediction).rounding_is_noise
 
 
 def test_readings_that_never_change_say_nothing() -> None:
     run = rounded(motion(0.001, 2000), 0.001)
     assert np.ptp(run.measured_mps2) == 0
-    assert Readings.of(run).beside(np.zeros(run.count)).as_read
+    assert Readings.of(run).given(np.zeros(run.count)).rounding_is_noise
 
 
 def test_noise_is_reported_without_rounding_and_as_it_was_read() -> None:
@@ -109,15 +109,16 @@ def test_noise_is_reported_without_rounding_and_as_it_was_read() -> None:
               for one in runs]
     posterior = posterior_of(coarse)
     state = posterior.start()
-    beside = posterior.beside(state)
-    assert noise_of(beside, state).deviation_mps2 == pytest.approx(0.1, rel=0.05)
-    assert noise_as_read(beside, state).deviation_mps2 == pytest.approx(np.hypot(0.1, STEP / np.sqrt(12)), rel=0.05)
+    beside = posterior.with_rounding_at(state)
+    assert sensor_noise_of(beside, state).deviation_mps2 == pytest.approx(0.1, rel=0.05)
+    with_rounding = sensor_noise_with_rounding(beside, state)
+    assert with_rounding.deviation_mps2 == pytest.approx(np.hypot(0.1, STEP / np.sqrt(12)), rel=0.05)
     assert beside.error(state) == posterior.error(state)
 
 
 def test_what_is_not_rounded_is_the_same_posterior() -> None:
     posterior = posterior_of(noisy_runs(lasts_s=8.0))
-    assert posterior.beside(posterior.start()) is posterior is posterior.as_read()
+    assert posterior.with_rounding_at(posterior.start()) is posterior is posterior.without_rounding()
 
 
 # --- clipped ones, and none ---
@@ -138,13 +139,13 @@ def marked(marks: dict[int, float], step: float | None = None) -> Run:
 def test_a_clipped_reading_counts_as_far_as_a_prediction_falls_short(at: int, prediction: float, left: float) -> None:
     run = marked({at: CLIPPED})
     flat = np.full(run.count, prediction)
-    assert run.left_by(flat)[at] == left
-    slopes = Readings.of(run).without_deaf(np.ones((2, run.count)), flat)
+    assert run.residual(flat)[at] == left
+    slopes = Readings.of(run).without_insensitive_samples(np.ones((2, run.count)), flat)
     assert (slopes[:, at] == (left != 0)).all() and slopes.sum() == slopes.size - 2 * (left == 0)
 
 
 def test_a_rounded_bound_lies_half_a_step_lower() -> None:
-    assert marked({300: CLIPPED}, step=0.5).left_by(np.zeros(800))[300] == pytest.approx(2.75)
+    assert marked({300: CLIPPED}, step=0.5).residual(np.zeros(800))[300] == pytest.approx(2.75)
 
 
 def garbled(runs: list[Run], seed: int) -> list[Run]:
@@ -180,5 +181,5 @@ def test_gaps_leave_the_level_and_take_their_share_of_the_freedom() -> None:
     whole, holed = (Bands(replace(measuring(run, noise), usable=usable)) for usable in (None, run.usable))
     share = run.read[run.first:].mean()
     assert holed.freedom == pytest.approx(whole.freedom * share)
-    left = run.left_by(np.zeros(run.count), noise)
+    left = run.residual(np.zeros(run.count), noise)
     assert float(holed.freedom @ holed.levels(left) / holed.freedom.sum()) == pytest.approx(0.04, rel=0.03)

@@ -14,9 +14,9 @@ from scipy.signal import butter, firwin, sosfilt, sosfiltfilt
 from logger.lab.likelihood.noise_floor import sensor_noise
 from logger.lab.likelihood.record_band import (
     compared_band,
+    detect_low_passes,
     is_steep,
-    seen_low_passes,
-    whole_below_hz,
+    pass_band_end_hz,
     with_pass_bands,
 )
 from logger.lab.likelihood.whittle import Bands
@@ -57,7 +57,7 @@ def through(run: Run, way: Callable[..., Array], order: int, cutoff_hz: float) -
 
 def low_passed(way: Callable[..., Array], order: int, cutoff_hz: float) -> LowPass | None:
     runs, predictions = driven()
-    return seen_low_passes([through(run, way, order, cutoff_hz) for run in runs], predictions)[0]
+    return detect_low_passes([through(run, way, order, cutoff_hz) for run in runs], predictions)[0]
 
 
 @pytest.mark.parametrize("level", [0.003, 0.03, 0.3])
@@ -68,7 +68,7 @@ def test_noise_alone_was_not_filtered(level: float, by_recorder: bool) -> None:
     rng = np.random.default_rng(7)
     taps = firwin(201, 44.0, fs=RATE_HZ) if by_recorder else [1.0]
     noisy = [replace(run, measured_mps2=np.convolve(rng.normal(0, level, run.count), taps, "same")) for run in runs]
-    assert seen_low_passes(noisy, [0.01 * one for one in predictions]) == [None, None]
+    assert detect_low_passes(noisy, [0.01 * one for one in predictions]) == [None, None]
 
 
 @pytest.mark.parametrize("effects", [
@@ -77,7 +77,7 @@ def test_noise_alone_was_not_filtered(level: float, by_recorder: bool) -> None:
     ("wheel_lift", "progressive_spring")])
 def test_what_a_car_does_is_no_filter(effects: tuple[str, ...]) -> None:
     runs, predictions = driven(effects)
-    assert not [one for one in seen_low_passes(runs, predictions) if one is not None and is_steep(one)]
+    assert not [one for one in detect_low_passes(runs, predictions) if one is not None and is_steep(one)]
     assert all(run.facts.pass_band_hz is None for run in with_pass_bands(runs, predictions))
 
 
@@ -88,7 +88,7 @@ def test_a_sensor_that_rings_is_no_filter_though_it_falls_as_steeply(frequency_h
                                                                      beside: Sequence[Chosen]) -> None:
     rings = hidden("sensor_mount_resonance", frequency_hz=frequency_hz, damping_ratio=0.11)
     runs, predictions = driven_with([*beside, rings])
-    assert not [one for one in seen_low_passes(runs, predictions) if one is not None and is_steep(one)]
+    assert not [one for one in detect_low_passes(runs, predictions) if one is not None and is_steep(one)]
 
 
 @pytest.mark.parametrize("cutoff_hz", [9.0, 15.0, 22.0, 30.0])
@@ -107,7 +107,7 @@ def test_a_filter_that_was_run_forth_and_back_is_found_without_delay(order: int,
     seen = low_passed(sosfiltfilt, order, cutoff_hz)
     assert seen is not None and is_steep(seen) and not seen.causal
     assert seen.cutoff_hz == pytest.approx(cutoff_hz, rel=0.12)
-    x = np.tan(np.pi * whole_below_hz(seen, RATE_HZ) / RATE_HZ) / np.tan(np.pi * cutoff_hz / RATE_HZ)
+    x = np.tan(np.pi * pass_band_end_hz(seen, RATE_HZ) / RATE_HZ) / np.tan(np.pi * cutoff_hz / RATE_HZ)
     assert 1 / (1 + x ** (2 * order)) > 0.9
 
 
@@ -122,7 +122,7 @@ def test_noise_behind_a_filter_hides_no_filter_of_a_car_that_shakes() -> None:
     rng = np.random.default_rng(3)
     behind = [through(run, sosfilt, 8, 12.0) for run in runs]
     behind = [replace(run, measured_mps2=run.measured_mps2 + rng.normal(0, NOISE, run.count)) for run in behind]
-    seen = seen_low_passes(behind, predictions)[0]
+    seen = detect_low_passes(behind, predictions)[0]
     assert seen is not None and seen.cutoff_hz == pytest.approx(12.0, rel=0.08)
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from logger.lab.compare import compare
-from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.repeats import repeats_among
+from logger.lab.likelihood.repeats import find_repeats
 from logger.profiles.excitation import Excitation
 from logger.report.comparison_text import as_json, headline
 from logger.runs import Run
@@ -39,7 +39,7 @@ def rig_runs(seeds: tuple[int, ...], level: float = LEVEL) -> list[Run]:
 
 
 def test_what_does_not_repeat_is_found() -> None:
-    found = repeats_among(rig_runs((2, 3, 4)))
+    found = find_repeats(rig_runs((2, 3, 4)))
     assert found is not None and found.names == ("run2", "run3", "run4")
     assert found.deviation_mps2 == pytest.approx(LEVEL, rel=0.1)
     assert found.freedom == 2 * (COUNT - 200)
@@ -48,7 +48,7 @@ def test_what_does_not_repeat_is_found() -> None:
 def test_it_is_the_noise_where_the_highest_frequencies_tell_of_less() -> None:
     for seeds, expected in (((2, 3, 4), LEVEL), ((2,), None)):
         posterior = Posterior(SimulatedRuns(rig_runs(seeds)), CAR, Tolerance())
-        noise = noise_of(posterior, posterior.start()).deviation_mps2
+        noise = sensor_noise_of(posterior, posterior.start()).deviation_mps2
         assert noise == pytest.approx(LEVEL, rel=0.1) if expected else noise < 0.2 * LEVEL
 
 
@@ -64,6 +64,6 @@ def test_drives_and_other_excitations_repeat_nothing() -> None:
     table = second.track
     assert isinstance(table, Excitation)
     other = replace(second, track=replace(table, elevation_m=2 * table.elevation_m))
-    assert repeats_among([first, other]) is None
+    assert find_repeats([first, other]) is None
     drive = a_run("drive", 10.0, 20.0, 1)
-    assert repeats_among([drive, replace(drive, name="again")]) is None
+    assert find_repeats([drive, replace(drive, name="again")]) is None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.likelihood.distance_error import rate_of_change
+from logger.lab.likelihood.distance_error import derivative
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.readings import Readings
@@ -52,9 +52,9 @@ def test_signals_hang_together_as_the_motions_do(run: Run, effects: tuple[object
         one, other = (part[kept] - part[kept].mean() for part in (one, other))
         assert one == pytest.approx(other, abs=1e-2 * float(np.abs(other).max()))
 
-    pitch = rate_of_change(found["pitch_rad_per_s"], run.rate_hz)
+    pitch = derivative(found["pitch_rad_per_s"], run.rate_hz)
     same(pitch, found["ahead_mps2"] - found["here_mps2"])
-    twice = rate_of_change(rate_of_change(found["travel_m"], run.rate_hz), run.rate_hz)
+    twice = derivative(derivative(found["travel_m"], run.rate_hz), run.rate_hz)
     same(twice, found["axle_mps2"] - found["wheel_mps2"])
     assert found["here_mps2"] == pytest.approx(found[""] - found[""].mean(), abs=1e-9)
 
@@ -124,10 +124,10 @@ def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:
     posterior = Posterior(SimulatedRuns([run], FINE_HZ), CAR, Tolerance())
     state = posterior.start()
     error = posterior.record_errors[0]
-    curve = slice(error.coefficients)
+    curve = slice(error.spline_count)
     record = np.zeros(error.count)
     record[curve] = 1e-3
-    there = posterior.at((), state.logs, [record]).predictions[0]
+    there = posterior.state_at((), state.logs, [record]).predictions[0]
     expected = (there - state.predictions[0]).reshape(-1, run.count) / 1e-3
     slopes = error.slopes(state.predictions[0])[curve].sum(axis=0).reshape(-1, run.count)
     for one, other in zip(slopes, expected, strict=True):

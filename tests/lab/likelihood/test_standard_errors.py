@@ -12,8 +12,8 @@ import pytest
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit
-from logger.lab.likelihood.standard_errors import standard_errors, with_errors
+from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.likelihood.standard_errors import standard_errors, with_standard_errors
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import moves_of
 from logger.vehicle.effect_sizes import grows_with_mass
@@ -29,7 +29,7 @@ SEEDS = 24
 @cache
 def found() -> LinearModel:
     posterior = posterior_of(noisy_runs([tire_damping(300.0)]))
-    return fit(aligned(posterior, posterior.start([tire_damping(200.0)])))
+    return fit(align(posterior, posterior.start([tire_damping(200.0)])))
 
 
 @pytest.mark.slow
@@ -38,7 +38,7 @@ def test_numbers_are_off_by_as_much_as_their_errors_say(size: ErrorSize) -> None
     cars, effects = [], []
     for seed in range(SEEDS):
         case = drawn([tire_damping(300.0)], seed, size)
-        one = fit(aligned(case.posterior, case.posterior.start([tire_damping(200.0)])))
+        one = fit(align(case.posterior, case.posterior.start([tire_damping(200.0)])))
         (tires,), deviations = standard_errors(one)
         cars.append((one.state.logs - case.logs) / deviations)
         effects.append((tires.values[NAME] - 300.0) / tires.standard_errors[NAME])
@@ -58,7 +58,7 @@ def test_no_number_is_less_certain_than_its_prior_and_what_the_runs_do_not_show_
 
 def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
     loud = posterior_of(noisy_runs([tire_damping(300.0)], noise_mps2=0.2))
-    there = fit(aligned(loud, loud.start([tire_damping(200.0)])))
+    there = fit(align(loud, loud.start([tire_damping(200.0)])))
     quiet, noisy = (standard_errors(one)[0][0].standard_errors[NAME] for one in (found(), there))
     assert 1.5 < noisy / quiet < 4.5  # of four times the noise: the priors of the car's numbers hold part of it
 
@@ -66,7 +66,7 @@ def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
 def test_errors_are_the_roots_of_the_inverse_information_whatever_the_units() -> None:
     """A cubic stiffness of 1e6 beside a ratio of 1: the plain inverse is right too, where it is well enough scaled."""
     (tires,), deviations = standard_errors(found())
-    linear, state = found().without_wall(), found().state
+    linear, state = found().without_soft_bounds(), found().state
     information = linear.information(state.logs)
     alone = np.sqrt(np.diag(np.linalg.inv(information)))
     assert (deviations >= alone * (1 - 1e-9)).all()
@@ -83,7 +83,7 @@ def test_a_number_that_changes_nothing_is_wholly_uncertain_and_leaves_the_others
             return np.ones_like(s)
 
     posterior, state = found().posterior, found().state
-    more = posterior.at([*state.effects, chosen(Nothing(), {"gain": 1.0})], state.logs, state.record, state.size)
+    more = posterior.state_at([*state.effects, chosen(Nothing(), {"gain": 1.0})], state.logs, state.record, state.size)
     one = fit(LinearModel(posterior, more), found().numbers, rounds=1)
     (tires, nothing), deviations = standard_errors(one)
     (before,), alone = standard_errors(found())
@@ -104,7 +104,7 @@ def test_an_error_at_a_bound_is_not_halved(name: str, key: str, value: float | N
     value = parameter.high if value is None else value
     error = 50.0 * parameter.high if error is None else error
     one = chosen(effect, {**effect.usual, key: value})
-    (with_error,) = with_errors((one,), moves_of((one,)), np.full(len(effect.parameters), 50.0))
+    (with_error,) = with_standard_errors((one,), moves_of((one,)), np.full(len(effect.parameters), 50.0))
     assert with_error.standard_errors[key] == pytest.approx(error, rel=1e-3)
 
 

@@ -8,7 +8,8 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import welch
 
-from logger.lab.likelihood.whittle import DISCREPANCY, Bands, deviance
+from logger.lab.likelihood.signals import deviance
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -37,7 +38,7 @@ def test_white_noise_has_its_variance_in_every_band_and_where_it_is_quiet(rate_h
     noise, bands = white(samples), Bands(run_of(samples, rate_hz))
     deviations = (bands.power(noise) / NOISE**2 - 1) / np.sqrt(2 / bands.freedom)
     assert np.abs(deviations).max() < 4.0  # of some twenty bands
-    power, freedom = bands.quiet(noise)
+    power, freedom = bands.noise_band_power(noise)
     assert abs(power / NOISE**2 - 1) < 4 * np.sqrt(2 / freedom)
 
 

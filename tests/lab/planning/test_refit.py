@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from logger.lab.planning.planned_drive import PlannedDrive
-from logger.lab.planning.refit import DrivesThere, refitted_gain
+from logger.lab.planning.refit import LinearisedDrives, refitted_gain
 from logger.runs import Array
 
 from .test_outlook import planned
 
 
-def there_of(drive: PlannedDrive) -> DrivesThere:
-    linear = drive.model().without_wall()
+def there_of(drive: PlannedDrive) -> LinearisedDrives:
+    linear = drive.model().without_soft_bounds()
     levels = [np.concatenate(drive.levels(drive.run, bands)) for bands in linear.posterior.bands]
-    return DrivesThere(linear, levels, linear.state.predictions)
+    return LinearisedDrives(linear, levels, linear.state.predictions)
 
 
 def change_of(drive: PlannedDrive, logs: Array) -> Array:
@@ -25,7 +25,7 @@ def change_of(drive: PlannedDrive, logs: Array) -> Array:
 
 
 def precision_of(drive: PlannedDrive) -> Array:
-    return drive.posterior.prior.without_wall().curvature(np.zeros(13))
+    return drive.posterior.prior.without_soft_bounds().curvature(np.zeros(13))
 
 
 @pytest.mark.parametrize("number", ["front.tire_stiffness_n_per_m", "sprung_mass_kg"])
@@ -37,7 +37,7 @@ def test_a_car_with_other_numbers_leaves_no_more_than_what_its_prior_costs(numbe
     gain = refitted_gain([there_of(drive)], [[change]], precision)
     costs = float(precision @ logs**2)
     assert 0 < gain < 1.01 * costs
-    linear = drive.model().without_wall()
+    linear = drive.model().without_soft_bounds()
     white = linear.whitened([change])
     mixed, own = linear.mixed(white)
     first_order = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
@@ -47,7 +47,7 @@ def test_a_car_with_other_numbers_leaves_no_more_than_what_its_prior_costs(numbe
 def test_what_is_small_leaves_what_first_order_says() -> None:
     drive, rng = planned(0.5), np.random.default_rng(4)
     change = 0.01 * rng.standard_normal(drive.run.count)
-    linear = drive.model().without_wall()
+    linear = drive.model().without_soft_bounds()
     mixed, own = linear.mixed(linear.whitened([change]))
     expected = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
     assert refitted_gain([there_of(drive)], [[change]], precision_of(drive)) == pytest.approx(expected, rel=0.05)

@@ -12,7 +12,7 @@ from logger.lab.likelihood.lag import drift, lags
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
-from logger.lab.residuals.road_coherence import with_road
+from logger.lab.residuals.road_coherence import coherence_with_road
 from logger.report.residual_text import sentence
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -75,7 +75,7 @@ def test_what_follows_the_road_is_distinguished_from_noise() -> None:
         return filtered / filtered.std() * NOISE_MPS2 + white(run, prediction, rng)
 
     residuals = beside_with(half)
-    share, p_value = with_road(residuals).explained(0.0, 50.0)
+    share, p_value = coherence_with_road(residuals).explained(0.0, 50.0)
     assert share == pytest.approx(0.5, abs=0.05)
     assert p_value < 1e-12
 

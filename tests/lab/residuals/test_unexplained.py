@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import refitted
+from logger.lab.diagnosis import refit
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import shape_of, spatial_line_of
@@ -75,10 +75,10 @@ def test_a_speed_that_swings_tells_them_too() -> None:
 
 def test_the_shape_of_a_fitted_model_is_that_of_its_residuals() -> None:
     posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)]))
-    state = refitted(posterior, posterior.start()).state
+    state = refit(posterior, posterior.start()).state
     removed = removed_from(posterior, posterior.start().predictions, state)
     found = shape_of(posterior, state, removed)
-    assert not removed.drifting
+    assert not removed.drifting_sensors
     residuals = found.residuals.residual
     for run, residual, whole in zip(posterior.runs.runs, residuals, posterior.residuals(state), strict=True):
         assert residual == pytest.approx(whole[run.first:])

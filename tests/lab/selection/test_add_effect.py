@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.likelihood.map_fit import aligned, fit
-from logger.lab.selection.add_effect import BIASED, AddedEffects, Number, add, moved_between
+from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, add, moved_between
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.runs import normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -55,7 +55,7 @@ def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedR
 
 def test_how_often_noise_would_gain_as_much_is_by_the_evidence_of_both_models(runs: SimulatedRuns) -> None:
     posterior, one = posterior_of(secret_runs(noise_mps2=0.3, lasts_s=12.0)), hidden("sensor_offset", offset_m=0.1)
-    without, there = (fit(aligned(posterior, posterior.start(some))) for some in ([], [one]))
+    without, there = (fit(align(posterior, posterior.start(some))) for some in ([], [one]))
     gain = without.score - there.score
     found = add(posterior, [], [one], candidates=3)
     assert found.p_value == pytest.approx(probability_by_chance(gain, 3), abs=1e-3)
@@ -106,7 +106,7 @@ def test_distances_are_reported_only_where_they_are_off_by_more_than_usual(runs:
 def test_a_shift_counts_standard_errors() -> None:
     number = Number("sprung_mass_kg", 875.0, 900.0, 9.0, 880.0, 8.0, 878.0)
     assert number.shift == -2.5 and number.biased
-    assert not replace(number, without=880.0 + 8.0 * BIASED).biased
+    assert not replace(number, without=880.0 + 8.0 * BIAS_SIGMA).biased
     assert replace(number, standard_error=0.0).shift == 0
 
 
@@ -127,7 +127,7 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     bent = max(abs(one.written / one.nominal - 1) for one in first.numbers)
     assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to its prior
     assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
-    second = add(posterior_of(runs, stands=first.vehicle), first.effects, [offset])
+    second = add(posterior_of(runs, start_vehicle=first.vehicle), first.effects, [offset])
     assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)
     found = {one.effect.name: one for one in second.effects}
     assert found["sensor_offset"].values["offset_m"] == pytest.approx(OFFSET_M, rel=0.08)

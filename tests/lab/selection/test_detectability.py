@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import refitted
+from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, undetectable_effects
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -20,7 +20,7 @@ from ...support.lab.secret_runs import EFFECTS, Dense, posterior_of, secret_runs
 def loud() -> LinearModel:
     """The right model beside runs so loud that much is hidden."""
     posterior = posterior_of(secret_runs(noise_mps2=1.0, lasts_s=12.0))
-    return refitted(posterior, posterior.start()).linear
+    return refit(posterior, posterior.start()).linear
 
 
 @pytest.mark.parametrize("name", ["sensor_offset", "sensor_gain", "tire_damping", "damper_asymmetry"])
@@ -45,7 +45,7 @@ def test_the_most_hidden_come_first_and_none_that_stands_out(loud: LinearModel) 
 
 def test_quieter_runs_hide_less(loud: LinearModel) -> None:
     quiet_runs = posterior_of(secret_runs(noise_mps2=0.02, lasts_s=12.0))
-    quiet = refitted(quiet_runs, quiet_runs.start()).linear
+    quiet = refit(quiet_runs, quiet_runs.start()).linear
     effects = [EFFECTS[name] for name in ("sensor_offset", "damper_asymmetry", "tire_damping", "wheel_lift")]
     before, after = ({one.effect.name: one.deviations for one in undetectable_effects(found, effects)}
                      for found in (loud, quiet))
@@ -67,7 +67,7 @@ def beside(runs: SimulatedRuns, patch: float = 0.0) -> LinearModel:
     """A car with a patch that is longer by a share, not fitted."""
     posterior = posterior_of(runs)
     logs = np.where(np.array(posterior.prior.names) == "contact_patch_m", patch, 0.0)
-    state = posterior.at((), logs)
+    state = posterior.state_at((), logs)
     numbers = posterior.number_slopes(state, posterior.prior.steps)
     return LinearModel(posterior, state, numbers)
 

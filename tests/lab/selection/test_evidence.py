@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.lab.selection.evidence import FALSE_ALARM, least_gain, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, min_gain, probability_by_chance
 
 GAINS = st.floats(-1e4, 1e4)
 COUNTS = st.integers(1, 500)
@@ -36,8 +36,8 @@ def test_the_best_of_fixed_alternatives_is_bounded_too() -> None:
 
 @given(COUNTS)
 def test_the_least_gain_is_just_what_makes_a_false_alarm(candidates: int) -> None:
-    assert probability_by_chance(least_gain(candidates), candidates) == pytest.approx(FALSE_ALARM)
-    assert probability_by_chance(least_gain(candidates) + 0.1, candidates) < FALSE_ALARM
+    assert probability_by_chance(min_gain(candidates), candidates) == pytest.approx(FALSE_ALARM)
+    assert probability_by_chance(min_gain(candidates) + 0.1, candidates) < FALSE_ALARM
 
 
 @given(GAINS, GAINS, COUNTS, COUNTS)

@@ -9,11 +9,11 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import least_squares
 
-from logger.lab.diagnosis import refitted
+from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, effect_slopes, fit
-from logger.lab.likelihood.whittle import deviance
-from logger.lab.selection.holdout import folds, held_out
+from logger.lab.likelihood.map_fit import align, effect_slopes, fit
+from logger.lab.likelihood.signals import deviance
+from logger.lab.selection.holdout import cross_validate, folds
 from logger.runs import Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
@@ -29,7 +29,7 @@ SETS = 3
 def plain() -> LinearModel:
     """The right model, fitted."""
     posterior = posterior_of(secret_runs(lasts_s=15.0))
-    return refitted(posterior, posterior.start()).linear
+    return refit(posterior, posterior.start()).linear
 
 
 def test_each_sample_that_counts_is_held_out_once_in_stretches_of_seconds(plain: LinearModel) -> None:
@@ -66,7 +66,7 @@ def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     def residuals(x: Array) -> list[Array]:
         there: tuple[Chosen, ...] = moved(state.effects, moves, x[p:])
         predicted = posterior.predict(there, x[:p], state.record)
-        return posterior.left_by(predicted)
+        return posterior.residuals_of(predicted)
 
     unseen = residuals(here)
     for held in range(SETS):
@@ -90,11 +90,11 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
     there = [hidden("sensor_offset", offset_m=0.3)] if model == "with one that is there" else []
     tried = [] if model == "right" else [hidden("sensor_offset", offset_m=0.2)]
     posterior = posterior_of(secret_runs(there, lasts_s=12.0))
-    linear = fit(aligned(posterior, posterior.start(tried)))
+    linear = fit(align(posterior, posterior.start(tried)))
     state = linear.state
     own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.record,
                         state.predictions) if tried else None
-    quick = held_out(linear, own)
+    quick = cross_validate(linear, own)
     error, lack = unseen_when_refitted(linear)
     seen_error, seen_lack = posterior.error(state), posterior.deviance(state)
     assert quick.error > seen_error and quick.deviance > seen_lack
@@ -108,18 +108,18 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
 def test_numbers_that_fit_noise_make_the_error_larger(plain: LinearModel) -> None:
     rng = np.random.default_rng(1)
     own = [rng.normal(size=(40, run.count)) for run in plain.posterior.runs.runs]
-    honest, vain = held_out(plain), held_out(plain, own)
+    honest, vain = cross_validate(plain), cross_validate(plain, own)
     assert vain.error > 1.005 * honest.error and vain.deviance > honest.deviance + 10
 
 
 def test_columns_that_do_nothing_change_nothing(plain: LinearModel) -> None:
     nothing = [np.zeros((2, run.count)) for run in plain.posterior.runs.runs]
-    there, here = held_out(plain, nothing), held_out(plain)
+    there, here = cross_validate(plain, nothing), cross_validate(plain)
     assert (there.error, there.deviance) == pytest.approx((here.error, here.deviance), rel=1e-9)
 
 
 def test_a_model_without_numbers_is_judged_as_it_is(plain: LinearModel) -> None:
     posterior, state = plain.posterior, plain.state
-    found = held_out(LinearModel(posterior, state))
+    found = cross_validate(LinearModel(posterior, state))
     assert found.error == pytest.approx(posterior.error(state))
     assert found.deviance == pytest.approx(posterior.deviance(state))

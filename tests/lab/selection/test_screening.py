@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import refitted
+from logger.lab.diagnosis import refit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.selection.candidate_fit import refined, roughly_fitted
-from logger.lab.selection.evidence import least_gain
+from logger.lab.selection.candidate_fit import fit_roughly, refine
+from logger.lab.selection.evidence import min_gain
 from logger.lab.selection.screening import (
     Baseline,
-    as_recorded,
     misalignment,
-    scaled_by,
-    screened,
-    shared_numbers,
-    taken_out,
+    scale_strength,
+    screen,
+    shared_parameters,
+    without_distance_trend,
+    without_effect,
 )
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Misalignment
@@ -30,21 +30,21 @@ STILL = Misalignment(1.0, 0.0)
 
 
 def fitted(posterior: Posterior) -> Baseline:
-    return refitted(posterior, posterior.start())
+    return refit(posterior, posterior.start())
 
 
 @pytest.fixture(scope="module")
 def slight() -> Baseline:
     """A plain car beside loud runs with a sensor that sits ahead, which do not bend it to the wall."""
     found = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], noise_mps2=0.5)))
-    assert not found.posterior.prior.at_the_wall(found.state.logs)
+    assert not found.posterior.prior.at_soft_bounds(found.state.logs)
     return found
 
 
 @pytest.mark.parametrize("name", ["sensor_offset", "tire_damping", "payload"])
 def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseline, name: str) -> None:
     dense = Dense(slight.linear)
-    found = screened(slight, EFFECTS[name], [STILL])
+    found = screen(slight, EFFECTS[name], [STILL])
     trial = found.trials[0]
     before, _ = dense.least(dense.residual, dense.here)
     after, there = dense.least(dense.residual, dense.here, dense.white(trial.change))
@@ -60,10 +60,10 @@ def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseli
 
 def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight: Baseline) -> None:
     names = ("sensor_offset", "sensor_gain", "tire_damping", "sensor_bandwidth", "cg_shift")
-    promises = {name: screened(slight, EFFECTS[name], [STILL]) for name in names}
+    promises = {name: screen(slight, EFFECTS[name], [STILL]) for name in names}
     assert max(promises, key=lambda name: promises[name].gain) == "sensor_offset"
-    rough = roughly_fitted(slight.score, slight, promises["sensor_offset"])[0]
-    fine = refined(slight.score, rough)
+    rough = fit_roughly(slight.score, slight, promises["sensor_offset"])[0]
+    fine = refine(slight.score, rough)
     assert fine.gain >= rough.gain - 1.0
     counted = np.log(slight.posterior.freedom)  # of the number that it has
     assert fine.gain == pytest.approx(promises["sensor_offset"].gain - counted, rel=0.3)
@@ -74,24 +74,24 @@ def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight
 
 def test_a_car_that_is_bent_to_the_wall_does_not_hide_what_bends_it() -> None:
     base = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)])))
-    assert base.posterior.prior.at_the_wall(base.state.logs)
-    found = screened(base, EFFECTS["sensor_offset"], [STILL])
+    assert base.posterior.prior.at_soft_bounds(base.state.logs)
+    found = screen(base, EFFECTS["sensor_offset"], [STILL])
     assert found.gain > 500
-    fine = refined(base.score, roughly_fitted(base.score, base, found)[0])
+    fine = refine(base.score, fit_roughly(base.score, base, found)[0])
     assert fine.chosen.values["offset_m"] == pytest.approx(0.4, abs=0.03)
 
 
 def test_each_choice_has_its_best_trial_and_the_most_promising_is_first(slight: Baseline) -> None:
-    found = screened(slight, EFFECTS["body_bending"], [STILL])
+    found = screen(slight, EFFECTS["body_bending"], [STILL])
     assert {one.one.values["ends_move"] for one in found.trials} == {0.0, 1.0}
     frequencies = {one.one.values["frequency_hz"] for one in found.trials}
     assert len(frequencies) * 2 >= len(found.trials)  # of one choice no two trials are of one frequency
     assert found.gain == max(one.gain for one in found.trials)
-    assert len(screened(slight, EFFECTS["tire_damping"], [STILL]).trials) == 1
+    assert len(screen(slight, EFFECTS["tire_damping"], [STILL]).trials) == 1
 
 
 def test_what_changes_nothing_promises_nothing(slight: Baseline) -> None:
-    no_wheel_lifts_here = screened(slight, EFFECTS["wheel_lift"], [STILL])
+    no_wheel_lifts_here = screen(slight, EFFECTS["wheel_lift"], [STILL])
     assert no_wheel_lifts_here.gain == pytest.approx(0, abs=1e-6)
 
 
@@ -100,8 +100,8 @@ def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too
     base = fitted(posterior_of(secret_runs([hidden("tire_enveloping", contact_patch_m=patch_m)])))
     place = base.posterior.prior.names.index("contact_patch_m")
     assert base.state.logs[place] < 0
-    found = screened(base, EFFECTS["tire_enveloping"], [STILL])
-    fine = refined(base.score, roughly_fitted(base.score, base, found)[0])
+    found = screen(base, EFFECTS["tire_enveloping"], [STILL])
+    fine = refine(base.score, fit_roughly(base.score, base, found)[0])
     assert fine.gain > 30
     assert fine.chosen.values["contact_patch_m"] == pytest.approx(patch_m, rel=0.1)
 
@@ -109,23 +109,23 @@ def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too
 def test_as_recorded_is_the_nominal_car_on_distances_without_their_trend() -> None:
     runs = SimulatedRuns([replace(one, distance_m=1.004 * one.distance_m + 0.1) for one in secret_runs().runs], 500.0)
     base = fitted(posterior_of(runs))
-    there = as_recorded(base)
+    there = without_distance_trend(base)
     assert there.state.effects == base.state.effects and not there.state.logs.any()
-    for run, moved_m, was_m in zip(runs.runs, base.posterior.moved_m(there.state.record),
-                                   base.posterior.moved_m(base.state.record), strict=True):
+    for run, distance_error_m, was_m in zip(runs.runs, base.posterior.distance_error_m(there.state.record),
+                                   base.posterior.distance_error_m(base.state.record), strict=True):
         assert abs(was_m).max() > 0.2
-        assert np.polyfit(run.distance_m, moved_m, 1) == pytest.approx(0, abs=0.02)
-        assert abs(moved_m).max() < 0.1 * abs(was_m).max()
+        assert np.polyfit(run.distance_m, distance_error_m, 1) == pytest.approx(0, abs=0.02)
+        assert abs(distance_error_m).max() < 0.1 * abs(was_m).max()
 
 
 def test_a_wrong_speed_is_tried_where_the_runs_then_lie() -> None:
     posterior = posterior_of(secret_runs([hidden("speed_scale", scale=1.02)]))
     base = fitted(posterior)
-    found = screened(base, EFFECTS["speed_scale"], [misalignment(posterior, posterior.start())])
+    found = screen(base, EFFECTS["speed_scale"], [misalignment(posterior, posterior.start())])
     best = found.trials[0]
     assert best.start is not None and best.start.effects[-1] == best.one
     assert best.one.values["scale"] == pytest.approx(1.02, abs=2e-3)
-    assert best.gain > 2 * least_gain(len(EFFECTS))
+    assert best.gain > 2 * min_gain(len(EFFECTS))
 
 
 # --- how the runs lie ---
@@ -157,37 +157,37 @@ def test_one_delay_of_all_accelerations_is_seen(late: int) -> None:
 def test_half_an_effect_is_half_way_to_where_it_does_nothing(
         name: str, parameter: str, value: float, half: float) -> None:
     one = hidden(name, **{parameter: value})
-    found, same = scaled_by(one, 0.5), scaled_by(one, 1.0)
+    found, same = scale_strength(one, 0.5), scale_strength(one, 1.0)
     assert found is not None and found.values[parameter] == pytest.approx(half)
     assert same is not None and same.values == pytest.approx(one.values)
 
 
 def test_an_effect_that_is_there_or_not_has_no_half() -> None:
-    assert scaled_by(hidden("wheel_lift"), 0.5) is None
-    assert scaled_by(hidden("tire_enveloping", contact_patch_m=0.2), 0.5) is None
+    assert scale_strength(hidden("wheel_lift"), 0.5) is None
+    assert scale_strength(hidden("tire_enveloping", contact_patch_m=0.2), 0.5) is None
 
 
 def test_a_sharp_resonance_promises_something_only_where_it_is() -> None:
     """Between two of the places at which it is tried; an effect with the same numbers has found the place."""
     sharp = hidden("sensor_mount_resonance", frequency_hz=18.2, damping_ratio=0.03)
     base = fitted(posterior_of(secret_runs([sharp])))
-    alone = screened(base, sharp.effect, [STILL])
-    near = screened(base, sharp.effect, [STILL], {"frequency_hz": 18.2, "damping_ratio": 0.03, "participation": -1.0})
+    alone = screen(base, sharp.effect, [STILL])
+    near = screen(base, sharp.effect, [STILL], {"frequency_hz": 18.2, "damping_ratio": 0.03, "participation": -1.0})
     assert near.gain > 1.5 * alone.gain
     assert near.trials[0].one.values == pytest.approx({"frequency_hz": 18.2, "damping_ratio": 0.03}, rel=0.05)
 
 
 def test_numbers_that_are_shared_stay_inside_the_range_of_the_effect_that_takes_them() -> None:
     bending = EFFECTS["body_bending"]
-    assert shared_numbers(bending, {"frequency_hz": 300.0, "mass_kg": 3.0}) == {"frequency_hz": 60.0}
-    assert shared_numbers(EFFECTS["sensor_gain"], {"frequency_hz": 300.0}) == {}
+    assert shared_parameters(bending, {"frequency_hz": 300.0, "mass_kg": 3.0}) == {"frequency_hz": 60.0}
+    assert shared_parameters(EFFECTS["sensor_gain"], {"frequency_hz": 300.0}) == {}
 
 
 def test_a_model_without_one_of_its_effects_has_all_else_as_it_was() -> None:
     there = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.1)]
     posterior = posterior_of(secret_runs(there))
-    now = refitted(posterior, posterior.start(there))
-    out = taken_out(now, "sensor_gain")
+    now = refit(posterior, posterior.start(there))
+    out = without_effect(now, "sensor_gain")
     assert out.state.names == ("sensor_offset",) and np.array_equal(out.state.logs, now.state.logs)
     assert out.state.effects[0].values == now.state.effects[0].values
-    assert screened(out, EFFECTS["sensor_gain"], [STILL]).gain > least_gain(len(EFFECTS))
+    assert screen(out, EFFECTS["sensor_gain"], [STILL]).gain > min_gain(len(EFFECTS))

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from logger.lab.diagnosis import diagnose, refitted
+from logger.lab.diagnosis import diagnose, refit
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, aligned, fit
-from logger.lab.selection.candidate_fit import refined, roughly_fitted
-from logger.lab.selection.evidence import IMITATION, least_gain
-from logger.lab.selection.screening import Baseline, misalignment, screened
+from logger.lab.likelihood.map_fit import MapFit, align, fit
+from logger.lab.selection.candidate_fit import fit_roughly, refine
+from logger.lab.selection.evidence import IMITATION, min_gain
+from logger.lab.selection.screening import Baseline, misalignment, screen
 from logger.lab.selection.stepwise import Round, Search, Selection
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, Misalignment, chosen
@@ -31,7 +31,7 @@ def search(names: Sequence[str], present: int = 0, workers: int = 2) -> Search:
 
 def base_of(runs: SimulatedRuns, present: Sequence[Chosen] = ()) -> Baseline:
     posterior = posterior_of(runs)
-    return refitted(posterior, posterior.start(present))
+    return refit(posterior, posterior.start(present))
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed: int) -> None:
     selection = search(FEW).run(base)
     assert selection.now is selection.before is base
     assert not selection.gains and not selection.rivals and not selection.steps
-    tried = [one.effect.name for one in (*selection.first.fits, *selection.first.promises)]
+    tried = [one.effect.name for one in (*selection.first.fits, *selection.first.unfitted)]
     assert sorted(tried) == sorted(FEW)
 
 
@@ -109,25 +109,25 @@ def test_of_two_that_explain_alike_the_one_with_fewer_numbers_is_taken() -> None
 
 def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Baseline) -> None:
     sought = search(FEW)
-    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
-    enough = least_gain(len(FEW))
+    one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
+    enough = min_gain(len(FEW))
     nearly_all = replace(offset_base, explanation=enough)
-    assert sought.accepted(nearly_all, replace(one, gain=enough + 0.1))
-    assert not sought.accepted(nearly_all, replace(one, gain=enough - 0.1))
+    assert sought.is_accepted(nearly_all, replace(one, gain=enough + 0.1))
+    assert not sought.is_accepted(nearly_all, replace(one, gain=enough - 0.1))
     more_is_left = replace(offset_base, explanation=2 * enough / IMITATION)
-    assert not sought.accepted(more_is_left, replace(one, gain=enough + 0.1))
-    assert sought.accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
+    assert not sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))
+    assert sought.is_accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
 
 
 def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> None:
     posterior = offset_base.posterior
     at_an_end = hidden("occupant", frequency_hz=EFFECTS["occupant"].parameters[1].high)
-    state = posterior.at([at_an_end], offset_base.state.logs)
-    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
-    model = refined(offset_base.score, one, rounds=1).found
+    state = posterior.state_at([at_an_end], offset_base.state.logs)
+    one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
+    model = refine(offset_base.score, one, rounds=1).found
     ended = replace(one, found=MapFit.of(fit(LinearModel(posterior, state), model.numbers, rounds=0)), gain=1e9)
     assert at_an_end.at_an_end and ended.effect.name == "occupant"
-    assert not search(FEW).accepted(offset_base, ended)
+    assert not search(FEW).is_accepted(offset_base, ended)
 
 
 def test_without_an_effect_the_model_is_what_it_was_before(offset_base: Baseline, found: Selection) -> None:
@@ -139,9 +139,9 @@ def test_without_an_effect_the_model_is_what_it_was_before(offset_base: Baseline
 def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) -> None:
     posterior = offset_base.posterior
     effects = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.0), hidden("tire_damping")]
-    now = Baseline.of(fit(aligned(posterior, posterior.start(effects))))
+    now = Baseline.of(fit(align(posterior, posterior.start(effects))))
     chosen_too_many = Selection(offset_base, now, {}, {}, Round((), ()), ())
-    rest = search(FEW).left_out(chosen_too_many, "tire_damping")
+    rest = search(FEW).without_effect(chosen_too_many, "tire_damping")
     assert rest.now.state.names == ("sensor_offset",) and [*rest.gains] == ["sensor_offset"]
     assert rest.before is offset_base
 

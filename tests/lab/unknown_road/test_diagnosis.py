@@ -12,10 +12,10 @@ import pytest
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
-from logger.lab.unknown_road.fisher_scoring import fitted as fit
+from logger.lab.unknown_road.fisher_scoring import fit
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
-from logger.lab.unknown_road.screening import trials
+from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
+from logger.lab.unknown_road.screening import screen
 from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.profiles.track import Track
 from logger.report.same_road_text import as_json
@@ -115,18 +115,18 @@ def test_gains_are_those_of_dense_likelihoods() -> None:
     logs = 0.02 * np.cos(np.arange(len(start.logs)))
     after = RoadFitState((), logs, start.roads, problem.response((), logs))
     own = deviance(problem, before) - deviance(problem, after)
-    found = problem.prepared(before).gain(before, after) * (1 + 1 / 8)
+    found = problem.preconditioned(before).gain(before, after) * (1 + 1 / 8)
     assert found == pytest.approx(own, abs=max(4.0, 0.15 * abs(own)))
 
 
 def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
     problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
     start = problem.start()
-    base = fit(problem.prepared(start), start)
-    gain, patch, damping = trials(base.problem, base, [
+    base = fit(problem.preconditioned(start), start)
+    gain, patch, damping = screen(base.problem, base, [
         named("sensor_gain", gain=1.1), named("tire_enveloping", contact_patch_m=0.4),
         named("tire_damping", tire_damping_n_s_per_m=300.0)])
-    assert gain.beside_road < 0.02 and patch.beside_road < 0.02 < 0.2 < damping.beside_road
+    assert gain.share_beyond_road < 0.02 and patch.share_beyond_road < 0.02 < 0.2 < damping.share_beyond_road
     assert 0.8 < base.state.noise_mps2 / NOISE_MPS2 < 1.2
     assert all(error < 0.5 for error in base.problem.errors(base.state))
 
@@ -144,10 +144,10 @@ def test_drives_over_other_roads_are_refused() -> None:
 def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
     here = run_of(effects, 9.0, 85.0, 1)
     one = SameRoad([here, run_of(effects, 15.0, 85.0, 2)], CAR, Tolerance())
-    assert all(found.seen for found in likenesses(one, one.start()))
+    assert all(found.is_significant for found in road_agreements(one, one.start()))
     two = SameRoad([here, run_of(effects, 15.0, 85.0, 2, OTHER)], CAR, Tolerance())
-    assert not any(found.seen for found in likenesses(two, two.start()))
-    assert surely_two_roads(likenesses(two, two.start())) == (0, 1)
+    assert not any(found.is_significant for found in road_agreements(two, two.start()))
+    assert certain_two_roads(road_agreements(two, two.start())) == (0, 1)
 
 
 def test_the_one_drive_over_another_road_is_named() -> None:
@@ -163,15 +163,15 @@ def test_two_roads_with_a_bump_each_at_about_one_place() -> None:
     roads = [Track(SPACING_M, road.elevation_m + high_m * np.exp(-0.5 * ((place_m - at_m) / wide_m) ** 2), road.start_m)
              for road, high_m, at_m, wide_m in ((LONG, 0.05, 40.0, 0.3), (OTHER, 0.03, 41.0, 0.6))]
     problem = SameRoad([run_of([], 9.0, 85.0, 1, roads[0]), run_of([], 15.0, 85.0, 2, roads[1])], CAR, Tolerance())
-    assert not any(found.seen for found in likenesses(problem, problem.start()))
+    assert not any(found.is_significant for found in road_agreements(problem, problem.start()))
 
 
 def test_drives_that_drown_in_noise_are_not_refused() -> None:
     problem = SameRoad([run_of([], speed, 85.0, seed, noise_mps2=8.0) for seed, speed in ((1, 9.0), (2, 15.0))], CAR,
                        Tolerance())
-    found = likenesses(problem, problem.start())
-    assert surely_two_roads(found) is None
-    assert maybe_two_roads(found) == [(0, 1)]
+    found = road_agreements(problem, problem.start())
+    assert certain_two_roads(found) is None
+    assert possible_two_roads(found) == [(0, 1)]
 
 
 def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
@@ -179,8 +179,8 @@ def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
     problem = SameRoad([run_of([soft], speed, 85.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))],
                        CAR, Tolerance())
     trials_of_it = [chosen(soft.effect, values) for values in soft.effect.trials()]
-    assert surely_two_roads(likenesses(problem, problem.start())) == (0, 1)
-    assert surely_two_roads(likenesses(problem, problem.start(), trials_of_it)) is None
+    assert certain_two_roads(road_agreements(problem, problem.start())) == (0, 1)
+    assert certain_two_roads(road_agreements(problem, problem.start(), trials_of_it)) is None
 
 
 def test_errors_and_floor_are_over_the_same() -> None:
@@ -192,10 +192,10 @@ def test_errors_and_floor_are_over_the_same() -> None:
 
 
 def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
-    stands = replace(CAR, sprung_mass_kg=1.05 * CAR.sprung_mass_kg, contact_patch_m=0.15)
-    problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance(), stands)
+    start_vehicle = replace(CAR, sprung_mass_kg=1.05 * CAR.sprung_mass_kg, contact_patch_m=0.15)
+    problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance(), start_vehicle)
     start = problem.start()
-    assert problem.prior.vehicle(problem.vehicle, start.logs) == stands
+    assert problem.prior.vehicle(problem.vehicle, start.logs) == start_vehicle
     assert problem.cost(start) == pytest.approx((np.log(1.05) / Tolerance().numbers) ** 2)
 
 
@@ -254,7 +254,7 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
     for own, shared in zip(problem._parts, problem.stretches, strict=True):
         there_m = np.array([off_m[order[run]] for run, _ in shared])
         assert first[own[2:-1]] == pytest.approx(there_m[0] - there_m[1:], abs=0.15)
-    assert all(one.seen for one in likenesses(problem, problem.start()))
+    assert all(one.is_significant for one in road_agreements(problem, problem.start()))
 
 
 def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:

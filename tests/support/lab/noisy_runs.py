@@ -66,7 +66,7 @@ def drawn(effects: Sequence[Chosen], seed: int, size: ErrorSize, lasts_s: float 
               for one in blank.record_errors]
     runs = [measuring(run, one + rng.normal(0, NOISE_MPS2, run.count))
             for run, one in zip(blank.runs.runs, blank.predict(effects, logs, record), strict=True)]
-    return Drawn(posterior_of(runs), logs, blank.moved_m(record))
+    return Drawn(posterior_of(runs), logs, blank.distance_error_m(record))
 
 
 def with_wrong_speed(run: Run, deviation_mps: float, lasts_s: float, seed: int) -> Run:

@@ -42,9 +42,9 @@ def secret_runs(effects: Sequence[Chosen] = (), car: Vehicle = CAR, lasts_s: flo
         plain, SimulatedRuns(plain).predict(compose(car, effects)), strict=True)], FINE_HZ)
 
 
-def posterior_of(runs: SimulatedRuns, stands: Vehicle | None = None) -> Posterior:
+def posterior_of(runs: SimulatedRuns, start_vehicle: Vehicle | None = None) -> Posterior:
     """Of the plain car, given runs."""
-    return Posterior(runs, CAR, Tolerance(), stands)
+    return Posterior(runs, CAR, Tolerance(), start_vehicle)
 
 
 class Dense:

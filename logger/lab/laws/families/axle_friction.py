@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 
 class AxleFriction(Family):
     name = "axle_friction"
     title = "dry friction in the suspensions of one axle"
-    akin = ("dry_friction", "hysteresis")
+    related_effects = ("dry_friction", "hysteresis")
     shown_by = "drive a smooth road slowly, so that the suspension of one axle sticks and that of the other does not"
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         one = Draft(
             family=self.name, kind="ForceEffect", title="dry friction", shown_by=self.shown_by,
             parameters=(Parameter("friction_force_n", 60.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (25.0, 100.0),
@@ -24,9 +24,9 @@ class AxleFriction(Family):
             method="def laws(self, p, laws):\n"
                    "    return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n)",
             at="loop")
-        return [one.of_axle(axle) for axle in look.axles]  # at both it is dry_friction of the list
+        return [one.of_axle(axle) for axle in context.axles]  # at both it is dry_friction of the list
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"dry friction, {say('friction_force_n')}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):
@@ -16,11 +16,11 @@ _METHOD = """def record(self, p, recording):
 class ChangingGain(Family):
     name = "changing_gain"
     title = "a gain that changes as a run goes on"
-    akin = ("sensor_gain",)
+    related_effects = ("sensor_gain",)
     shown_by = "drive one road at the beginning and at the end of a long run"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        lasts_s = max(run.count / run.rate_hz for run in context.runs)
         change = Parameter("change_ratio", 0.1, -0.95, 5.0, 0.0, Scale.LINEAR, (0.1, -0.1),
                            f"what is added to the gain over {lasts_s:g} s", step=0.01)
         first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "the gain as a run begins",
@@ -34,7 +34,7 @@ class ChangingGain(Family):
         return [Draft(parameters=(change,), method=from_one, variant="from_one", **common),
                 Draft(parameters=(change, first), method=_METHOD.format(lasts_s=lasts_s), variant="from_any", **common)]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         begins = f", from {say('gain_at_first_ratio')} on" if draft.variant == "from_any" else ""
         return f"a gain that changes by {say('change_ratio')} in the course of the longest run{begins}"
 

@@ -8,7 +8,7 @@ temperature.
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -29,15 +29,15 @@ class ChangingStiffness(Family):
     title = "a stiffness that changes as a run goes on"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        axles = [one for one in (look.vehicle.front, look.vehicle.rear) if one is not None]
-        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        axles = [one for one in (context.vehicle.front, context.vehicle.rear) if one is not None]
+        lasts_s = max(run.count / run.rate_hz for run in context.runs)
         # The softer axle's: no axle may be left without a stiffness.
         return [_draft(of, min(stiffness), lasts_s) for of, stiffness in (
             ("springs", [one.suspension_stiffness_n_per_m for one in axles]),
             ("tires", [one.tire_stiffness_n_per_m for one in axles]))]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"{draft.variant} whose stiffness changes by {say('changed_n_per_m', 0.001, 'N/mm')} as a run goes on, "
                 f"within about {say('time_s')}")
 

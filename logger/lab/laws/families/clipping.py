@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):
@@ -29,10 +29,10 @@ class Clipping(Family):
     title = "a record that goes no farther than a limit"
     shown_by = "drive a rougher road: the strongest readings stay where they are"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        greatest = max(float(np.abs(run.kept_mps2).max()) for run in look.runs)
-        predictions = look.state.predictions
-        reach = max(float(np.abs(run.main(one)).max()) for run, one in zip(look.runs, predictions, strict=True))
+    def drafts(self, context: LawContext) -> list[Draft]:
+        greatest = max(float(np.abs(run.kept_mps2).max()) for run in context.runs)
+        predictions = context.state.predictions
+        reach = max(float(np.abs(run.main(one)).max()) for run, one in zip(context.runs, predictions, strict=True))
         if reach < _AT_LIMIT[1] * greatest:
             return []
         limit = Parameter("limit_mps2", rounded(greatest, 4), rounded(0.1 * greatest), rounded(10 * greatest),
@@ -43,7 +43,7 @@ class Clipping(Family):
                       signature="strong motions are cut off at one acceleration, up and down alike",
                       shown_by=self.shown_by, method=_METHOD, variant="both")]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a record that is cut off at {say('limit_mps2')}"
 
 

@@ -8,7 +8,7 @@ away, g the gap either way.
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
@@ -39,10 +39,10 @@ def laws(self, p, laws):
 class DamperBacklash(Family):
     name = "damper_backlash"
     title = "play in the mounts of the dampers"
-    akin = ("top_mount_compliance",)
+    related_effects = ("top_mount_compliance",)
     shown_by = "drive a smooth road, so that the suspension moves by little more than the play"
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         return [Draft(
             family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
             parameters=(Parameter("gap_m", 0.001, 0.0, 0.05, 0.0, Scale.LINEAR, (0.0003, 0.001, 0.003),
@@ -52,7 +52,7 @@ class DamperBacklash(Family):
             functions=_FUNCTIONS,
             method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"), at="loop")]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"play in the dampers' mounts, {say('gap_m', 1000.0, 'mm')} either way"
 
 

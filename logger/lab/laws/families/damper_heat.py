@@ -7,7 +7,7 @@ s' = a c v^2 - s / T; the force of the linear damper is (1 - s) c v.
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
@@ -33,10 +33,10 @@ def laws(self, p, laws):
 class DamperHeat(Family):
     name = "damper_heat"
     title = "dampers that fade as they grow hot"
-    akin = ("damper_blow_off",)
+    related_effects = ("damper_blow_off",)
     shown_by = "drive a rough road for some minutes without a pause, and again after one"
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         return [Draft(
             family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
             parameters=(
@@ -48,7 +48,7 @@ class DamperHeat(Family):
             signature="the damping falls while a rough road is driven",
             functions=_FUNCTIONS, method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"))]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"dampers that fade as they grow hot, {say('lost_per_j', 1e5, '%')} lost for each kJ, back within "
                 f"{say('cooling_time_s')}")
 

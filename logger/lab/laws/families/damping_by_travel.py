@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.3  # of the damper's own force
@@ -12,15 +12,15 @@ _SHARE = 0.3  # of the damper's own force
 class DampingByTravel(Family):
     name = "damping_by_travel"
     title = "a damping that goes with the travel of the suspensions"
-    akin = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
+    related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
     shown_by = "drive a rough road slowly, so that the suspension travels far at different rates"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        travel_m, rate_mps = look.reach("travel_m", 0.95), look.reach("rate_mps", 0.95)
-        size_n = rounded(_SHARE * look.vehicle.front.suspension_damping_n_s_per_m * rate_mps)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        travel_m, rate_mps = context.reach("travel_m", 0.95), context.reach("rate_mps", 0.95)
+        size_n = rounded(_SHARE * context.vehicle.front.suspension_damping_n_s_per_m * rate_mps)
         functions = f"""
 def force_n(p, travel_m, rate_mps):
-    way = np.minimum(np.abs(travel_m), {rounded(2 * look.reach('travel_m', 0.9999))!r}) / {travel_m!r}
+    way = np.minimum(np.abs(travel_m), {rounded(2 * context.reach('travel_m', 0.9999))!r}) / {travel_m!r}
     return p.force_n * way**p.power_ratio * rate_mps / {rate_mps!r}
 """
         return [Draft(
@@ -35,7 +35,7 @@ def force_n(p, travel_m, rate_mps):
                    "    return laws.with_force(lambda travel_m, rate_mps: force_n(p, travel_m, rate_mps))",
             at="loop", reference=travel_m)]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a damping that grows with the travel to the power {say('power_ratio')}: "
                 f"{say('force_n')} at {draft.parameters[0].meaning.removeprefix('at ')}")
 

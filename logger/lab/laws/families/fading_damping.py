@@ -7,7 +7,7 @@ T (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7, on fade).
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -25,8 +25,8 @@ class FadingDamping(Family):
     title = "a damping that changes as a run goes on"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        lasts_s = max(run.count / run.rate_hz for run in context.runs)
         trials = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
         lost = Parameter("lost_ratio", 0.2, -2.0, 0.95, 0.0, Scale.LINEAR, (0.2, -0.2), "share of the damping that is "
                          "lost in the end", step=0.02)
@@ -38,7 +38,7 @@ class FadingDamping(Family):
                       shown_by=self.shown_by, method=_METHOD, functions=_FUNCTIONS, variant="settling",
                       imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"
 
 

@@ -1,4 +1,4 @@
-"""What a family of laws is to the search that learns one.
+"""The interface of a family of laws.
 
 A family is one file that offers ``FAMILY``: in the field's words what it is, the laws to be tried (``drafts``), given
 what the runs show of the car's motions, and the sentence with numbers for one that was found.
@@ -22,17 +22,17 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
-Say = Callable[..., str]
+FormatNumber = Callable[..., str]
 """A number of the law in words, with its standard error and unit, by its name: ``say("yield_force_n")`` is "161 ± 4 N";
 ``say("yield_travel_m", 1000.0, "mm")`` the number in another unit."""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """What is known before a law is drafted: the fitted model, and what it does on the runs.
+class LawContext:
+    """The fitted model without a law, from which laws are drafted.
 
-    posterior    what is fitted
-    state        the model as it was fitted without the law
+    posterior    of the runs
+    state        the fitted model
     """
 
     posterior: Posterior
@@ -40,12 +40,12 @@ class Look:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car, as it was fitted."""
+        """The fitted car."""
         return self.posterior.prior.vehicle(self.posterior.vehicle, self.state.logs)
 
     @property
     def runs(self) -> Sequence[Run]:
-        """Those that were measured."""
+        """The measured runs."""
         return self.posterior.runs.runs
 
     @cached_property
@@ -58,18 +58,18 @@ class Look:
     def responses(self) -> list[Response]:
         """Motions of the suspensions and tires in each run."""
         return self.posterior.runs.respond(self.posterior.car(self.state.effects, self.state.logs),
-                                           self.posterior.moved_m(self.state.record))
+                                           self.posterior.distance_error_m(self.state.record))
 
     def reach(self, what: str, share: float) -> float:
-        """Within which a motion stays for such a share of the time, of all wheels: ``travel_m``, ``rate_mps`` or
-        ``deflection_m``; rounded to two digits, as it stands in a file."""
+        """Quantile of the size of a motion of all wheels (``travel_m``, ``rate_mps`` or ``deflection_m``) for a share
+        of the time, rounded to two digits, as it stands in a file."""
         size = np.concatenate([np.abs(getattr(one, what)[run.first:]).ravel()
                                for run, one in zip(self.runs, self.responses, strict=True)])
         return rounded(float(np.quantile(size, share)))
 
     @property
     def axles(self) -> tuple[str, ...]:
-        """Axles that a law may be of alone."""
+        """Axles that a law may act on alone."""
         return () if self.vehicle.rear is None else ("front", "rear")
 
     @property
@@ -81,31 +81,31 @@ class Look:
 class Family(ABC):
     """A family of laws.
 
-    name        as the file's
-    title       in a few words
-    akin        names of effects of the list that one of its laws may nearly be
-    shown_by    the drive that shows it best, as an instruction
+    name               as the file's
+    title              in a few words
+    related_effects    names of effects of the list that one of its laws may nearly be
+    shown_by           the drive that shows it best, as an instruction
     """
 
     name: str
     title: str
-    akin: tuple[str, ...] = ()
+    related_effects: tuple[str, ...] = ()
     shown_by: str
 
     @abstractmethod
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         """Laws to be tried, simple ones first; none where such a law cannot be there."""
 
-    def narrower(self, draft: Draft, look: Look) -> list[Draft]:
+    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         """Variations of a law that promises something: a force at one axle alone."""
         if draft.kind != "ForceEffect" or draft.axle:
             return []
-        return [draft.of_axle(axle) for axle in look.axles]
+        return [draft.of_axle(axle) for axle in context.axles]
 
     @abstractmethod
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         """What it is, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm".
-        Which axle it is at is added by others."""
+        The axle is added by the caller."""
 
 
 def rounded(value: float, digits: int = 2) -> float:

@@ -6,13 +6,13 @@ A power of the rate, or a smooth curve through points, which may differ in bump 
 from __future__ import annotations
 
 from logger.lab.laws.curves import RATE, CurveFamily
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 
 class ForceByRate(CurveFamily):
     name = "force_by_rate"
     title = "a force by the rate of the suspensions"
-    akin = ("damper_blow_off", "damper_asymmetry", "dry_friction")
+    related_effects = ("damper_blow_off", "damper_asymmetry", "dry_friction")
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one"
     motion = RATE
     force = "damper force"
@@ -23,8 +23,8 @@ class ForceByRate(CurveFamily):
     powers, power_ends = (0.4, 2.0, 3.0), (0.1, 5.0)
     ends = ((-1, "at the fastest"),)
 
-    def usual_force_n(self, look: Look, usual: float) -> float:
-        return look.vehicle.front.suspension_damping_n_s_per_m * usual
+    def usual_force_n(self, context: LawContext, usual: float) -> float:
+        return context.vehicle.front.suspension_damping_n_s_per_m * usual
 
 
 FAMILY = ForceByRate()

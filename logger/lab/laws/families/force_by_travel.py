@@ -6,7 +6,7 @@ A power of the travel, or a smooth curve through points, which may differ in com
 from __future__ import annotations
 
 from logger.lab.laws.curves import TRAVEL, CurveFamily
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 _SHARE = 0.3  # of the spring's own force
 
@@ -14,7 +14,7 @@ _SHARE = 0.3  # of the spring's own force
 class ForceByTravel(CurveFamily):
     name = "force_by_travel"
     title = "a force by the travel of the suspensions"
-    akin = ("progressive_spring", "bump_stop")
+    related_effects = ("progressive_spring", "bump_stop")
     shown_by = "drive a rough road, or over obstacles, so that the suspension travels far"
     motion = TRAVEL
     force = "spring force"
@@ -22,8 +22,8 @@ class ForceByTravel(CurveFamily):
     signature = "large motions meet another spring than small ones"
     ends = ((0, "in deep compression"), (-1, "in extension"))
 
-    def usual_force_n(self, look: Look, usual: float) -> float:
-        return _SHARE * look.vehicle.front.suspension_stiffness_n_per_m * usual
+    def usual_force_n(self, context: LawContext, usual: float) -> float:
+        return _SHARE * context.vehicle.front.suspension_stiffness_n_per_m * usual
 
 
 FAMILY = ForceByTravel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -24,10 +24,10 @@ BETWEEN = ("from logger.vehicle.laws import Between",)
 class FrictionWithMemory(Family):
     name = "friction_with_memory"
     title = "friction with memory in the suspensions"
-    akin = ("hysteresis", "dry_friction")
+    related_effects = ("hysteresis", "dry_friction")
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         return [Draft(
             family=self.name, kind="ForceEffect", title="friction that gives before it slides", shown_by=self.shown_by,
             parameters=(
@@ -42,7 +42,7 @@ class FrictionWithMemory(Family):
             signature="small motions meet a stiffer spring, larger ones friction",
             functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"friction with memory, {say('yield_force_n')} over {say('yield_travel_m', 1000.0, 'mm')}"
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.own_phases import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run
-from logger.lab.laws.repeating import along_the_way, tone_in_time
+from logger.lab.laws.repeating import spatial_frequency, tone_in_time
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):
@@ -40,11 +40,11 @@ class Hum(Family):
     title = "a hum that the road does not cause"
     shown_by = "stand with the engine running, and drive one road in two gears"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        hz = (_LOWEST_HZ, 0.37 * look.runs[0].rate_hz)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        hz = (_LOWEST_HZ, 0.37 * context.runs[0].rate_hz)
         drafts = []
         for wanders in (False, True):
-            tone = tone_in_time(look, hz, wanders)
+            tone = tone_in_time(context, hz, wanders)
             if tone is None:
                 continue
             numbers = [_shape("frequency_hz", tone.frequency_hz, "mean frequency", step=_STEP)]
@@ -55,19 +55,20 @@ class Hum(Family):
                     Parameter("early_sin_s", tone.wander_sin_s, -20.0, 20.0, None, Scale.LINEAR, (tone.wander_sin_s,),
                               "by how much it is early a quarter of a period later", step=_STEP_S),
                     _shape("period_s", tone.period_s, "in which its frequency goes up and down", step=10 * _STEP)]
-            drafts += self._drafts(look, numbers, _WANDERS if wanders else _STEADY, "wanders" if wanders else "steady",
+            cycles, variant = (_WANDERS, "wanders") if wanders else (_STEADY, "steady")
+            drafts += self._drafts(context, numbers, cycles, variant,
                                    "a tone that is there whatever the speed and the road")
-        per_m = along_the_way(look, _PER_M) if look.is_driven else None
+        per_m = spatial_frequency(context, _PER_M) if context.is_driven else None
         if per_m is not None:
-            drafts += self._drafts(look, [_shape("cycles_per_m", per_m, "cycles in a metre of the way", step=_STEP)],
+            drafts += self._drafts(context, [_shape("cycles_per_m", per_m, "cycles in a metre of the way", step=_STEP)],
                                    _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
                                    words=("needs_road = True",))
         return drafts
 
-    def _drafts(self, look: Look, numbers: list[Parameter], cycles: str, variant: str, signature: str,
+    def _drafts(self, context: LawContext, numbers: list[Parameter], cycles: str, variant: str, signature: str,
                 **more: Any) -> list[Draft]:
-        """A tone that begins in all runs alike, and one that begins in each elsewhere."""
-        size = rounded(float(np.std(np.concatenate(look.residuals))))
+        """A tone of one phase at the beginning of all runs, and one of another phase in each."""
+        size = rounded(float(np.std(np.concatenate(context.residuals))))
 
         def draft(runs: Sequence[str], variant: str) -> Draft:
             strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -_MOST_MPS2, _MOST_MPS2, 0.0, Scale.LINEAR,
@@ -80,10 +81,10 @@ class Hum(Family):
                          shown_by=self.shown_by, method=_METHOD.format(cycles=cycles, pick=pick), variant=variant,
                          **more)
 
-        ways = ((ALL_ALIKE, variant), (each_run(look), f"{variant}{EACH}"))
+        ways = ((ALL_ALIKE, variant), (each_run(context), f"{variant}{EACH}"))
         return [draft(runs, name) for runs, name in ways if runs]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         size, begins = _strength(found.values), BEGINS * draft.variant.endswith(EACH)
         if draft.variant.startswith("by_way"):
             return (f"a hum of {size:.2g} m/s2 r.m.s. with {say('cycles_per_m')} cycles{begins}, that the road does "

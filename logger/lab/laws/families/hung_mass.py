@@ -7,7 +7,7 @@ the list.
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE, _MOST = 0.05, 1.0  # of the sprung mass: tried, and what may be
@@ -24,11 +24,11 @@ def structure(self, p, structure):
 class HungMass(Family):
     name = "hung_mass"
     title = "a mass on a spring on the body"
-    akin = ("occupant", "body_bending", "payload", "cg_shift")
+    related_effects = ("occupant", "body_bending", "payload", "cg_shift")
     shown_by = "drive with it and without it, or put a second sensor where it hangs"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        car = look.vehicle
+    def drafts(self, context: LawContext) -> list[Draft]:
+        car = context.vehicle
         if car.rear is None:
             return []  # a car that does not pitch has one place, and a mass there is on the list
         mass_kg = rounded(_SHARE * car.sprung_mass_kg)
@@ -48,7 +48,7 @@ class HungMass(Family):
             signature="around its own frequency the body moves less than the model says, and beside it more",
             imports=("from logger.vehicle.structure import hung",), method=_METHOD)]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         way = "ahead of" if found.values["ahead_m"] > 0 else "behind"
         place = say("ahead_m", 1.0 if found.values["ahead_m"] > 0 else -1.0, "m").replace("± -", "± ")
         return (f"a mass of {say('mass_kg')} on a spring, {say('frequency_hz')} with a damping ratio of "

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _POLE = """def factor(self, p, s):
@@ -26,10 +26,10 @@ _HZ = (2.0, 5.0, 10.0, 18.0, 28.0)
 class RecordFactor(Family):
     name = "record_factor"
     title = "a correction between body and record"
-    akin = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
+    related_effects = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
     shown_by = "shake the sensor, in its place, beside another one"
 
-    def drafts(self, look: Look) -> list[Draft]:
+    def drafts(self, context: LawContext) -> list[Draft]:
         added = Parameter("added_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1, -0.1), "what is added at rest",
                           step=0.01)
         rate = Parameter("rate_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1,), "what is added by the rate",
@@ -45,7 +45,7 @@ class RecordFactor(Family):
                 *(Draft(parameters=(added, rate, _begun(frequency, one), damping), method=_PAIR,
                         variant=f"pair_{one:g}", **common) for one in _HZ)]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "pole":
             return f"a record to which {say('added_ratio')} of it is added below {say('frequency_hz')}"
         return (f"a record that something rings into at {say('frequency_hz')} with a damping of "

@@ -4,7 +4,7 @@ branch)."""
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
@@ -23,11 +23,11 @@ def rates(p, seen):
 class SpringWithMemory(Family):
     name = "spring_with_memory"
     title = "a spring with memory in the suspensions: rubber that creeps"
-    akin = ("top_mount_compliance", "hysteresis")
+    related_effects = ("top_mount_compliance", "hysteresis")
     shown_by = "drive the same road slowly and fast: quick motions meet a stiffer spring than slow ones"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        stiffness = rounded(_SHARE * look.vehicle.front.suspension_stiffness_n_per_m)
+    def drafts(self, context: LawContext) -> list[Draft]:
+        stiffness = rounded(_SHARE * context.vehicle.front.suspension_stiffness_n_per_m)
         return [Draft(
             family=self.name, kind="ForceEffect", title="rubber parallel to the springs that creeps",
             shown_by=self.shown_by,
@@ -41,7 +41,7 @@ class SpringWithMemory(Family):
             signature="the suspension is stiffer for quick motions than for slow ones",
             functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a spring with memory, {say('stiffness_n_per_m', 0.001, 'N/mm')} that creeps within "
                 f"{say('creep_time_s', 1000.0, 'ms')}")
 

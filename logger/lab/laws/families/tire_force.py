@@ -7,7 +7,7 @@ let go.
 from __future__ import annotations
 
 from logger.lab.laws.curves import DEFLECTION, CurveFamily
-from logger.lab.laws.families.family import Look
+from logger.lab.laws.families.family import LawContext
 
 _SHARE = 0.3  # of the tire's own force
 
@@ -15,7 +15,7 @@ _SHARE = 0.3  # of the tire's own force
 class TireForce(CurveFamily):
     name = "tire_force"
     title = "a force by the deflection of the tires"
-    akin = ("bump_stop", "progressive_spring", "wheel_lift")
+    related_effects = ("bump_stop", "progressive_spring", "wheel_lift")
     shown_by = "drive a rough road, or over obstacles, fast, so that the tires are pressed far"
     motion = DEFLECTION
     force = "tire force"
@@ -23,8 +23,8 @@ class TireForce(CurveFamily):
     signature = "wheels hop at another frequency where the road is rough"
     ends = ((0, "where it is pressed most"), (-1, "where it is let go"))
 
-    def usual_force_n(self, look: Look, usual: float) -> float:
-        return _SHARE * look.vehicle.front.tire_stiffness_n_per_m * usual
+    def usual_force_n(self, context: LawContext, usual: float) -> float:
+        return _SHARE * context.vehicle.front.tire_stiffness_n_per_m * usual
 
 
 FAMILY = TireForce()

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.lab.laws.own_phases import ALL_ALIKE, BEGINS, EACH, each_run, of_run
-from logger.lab.laws.repeating import along_the_way
+from logger.lab.laws.repeating import spatial_frequency
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -40,15 +40,16 @@ class WheelTurns(Family):
     title = "a force that comes round with the wheels' turns"
     shown_by = "drive a smooth road at two steady speeds"
 
-    def drafts(self, look: Look) -> list[Draft]:
-        if not look.is_driven:
+    def drafts(self, context: LawContext) -> list[Draft]:
+        if not context.is_driven:
             return []
-        per_m = along_the_way(look, (1 / (2 * np.pi * _RADII_M[1]), 1 / (2 * np.pi * _RADII_M[0])), speed_power=2)
+        per_m = spatial_frequency(context, (1 / (2 * np.pi * _RADII_M[1]), 1 / (2 * np.pi * _RADII_M[0])),
+                                  speed_power=2)
         if per_m is None:
             return []
         radius_m = 1 / (2 * np.pi * per_m)
-        return [self._draft(look.axles or ("",), runs, radius_m, variant)
-                for runs, variant in ((ALL_ALIKE, "imbalance"), (each_run(look), f"imbalance{EACH}")) if runs]
+        return [self._draft(context.axles or ("",), runs, radius_m, variant)
+                for runs, variant in ((ALL_ALIKE, "imbalance"), (each_run(context), f"imbalance{EACH}")) if runs]
 
     def _draft(self, axles: Sequence[str], runs: Sequence[str], radius_m: float, variant: str) -> Draft:
         strengths = [
@@ -69,10 +70,10 @@ class WheelTurns(Family):
             imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"),
             words=("needs_road = True",))
 
-    def narrower(self, draft: Draft, look: Look) -> list[Draft]:
+    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         return []
 
-    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         axles = ("front", "rear") if any(name.startswith("front") for name in found.values) else ("",)
         each_m, radius = 2 * np.pi * found.values["turn_radius_m"], say("turn_radius_m")
         if draft.variant.endswith(EACH):
