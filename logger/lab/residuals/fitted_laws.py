@@ -58,18 +58,19 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
     for motion, name in ((RATE, "rate_mps"), (TRAVEL, "travel_m")):
         size = np.concatenate([np.abs(getattr(one, name)[run.first:]) for run, one in zip(
             posterior.runs.runs, responses, strict=True)])
-        for axle, number in _axles(after):
-            reach = float(np.quantile(size[:, number], CURVE_REACH))
+        for axle, wheel in _wheels(after).items():
+            reach = float(np.quantile(size[:, wheel], CURVE_REACH))
             at = np.linspace(-reach, reach, CURVE_POINTS)
-            old, new = (_force_n(car, number, motion, at) for car in (before, after))
+            # An effect such as roll turns two wheels into four: the same axle, another number.
+            old, new = (_force_n(car, _wheels(car)[axle], motion, at) for car in (before, after))
             curves.append(ForceCurve(axle, motion, at, old, new))
     return FittedCar(moved, tuple(curves))
 
 
-def _axles(car: Car) -> list[tuple[str, int]]:
-    """Axles and the number of one of their wheels."""
+def _wheels(car: Car) -> dict[str, int]:
+    """The number of one wheel of each axle."""
     rear = next((number for number, one in enumerate(car.laws) if one.rear), None)
-    return [("front", 0)] if rear is None else [("front", 0), ("rear", len(car.laws) - 1)]
+    return {"front": 0} if rear is None else {"front": 0, "rear": rear}
 
 
 def _force_n(car: Car, number: int, motion: str, at: Array) -> Array:
