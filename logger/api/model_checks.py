@@ -117,16 +117,16 @@ class _Followed:
 
 
 def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
-    from logger.lab.road_match import below_bounce_band_hz, bounce_band_hz, road_match
+    from logger.lab.road_match import bounce_band_hz, match_below_bounce, road_match
     from logger.vehicle.models import structure_of
     from logger.vehicle.modes import undamped_frequencies_hz
 
     structure = structure_of(car.vehicle)
     body_hz = undamped_frequencies_hz(structure)[: -len(structure.wheels)]
     band_hz = bounce_band_hz(body_hz)
-    around, below = ([road_match(run, run.main(one), hz) for run, one in zip(runs.runs, predictions, strict=True)]
-                     for hz in (band_hz, below_bounce_band_hz(body_hz)))
-    return _Followed(around, below, band_hz)
+    mains = [(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)]
+    return _Followed([road_match(run, one, band_hz) for run, one in mains],
+                     [match_below_bounce(run, one, body_hz) for run, one in mains], band_hz)
 
 
 def _moves(run: Run, prediction: Array) -> bool:

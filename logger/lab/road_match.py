@@ -30,7 +30,7 @@ _MOST_LAG_S = 1.0
 class RoadMatch:
     """Correlation of a run with a prediction, around the body's bounce.
 
-    correlation    the largest within a second of lag
+    correlation    the largest within the lags that a run may have
     turned         the same of the run with its sign reversed
     gain           measured / model at the larger of these, above 0
     chance         quantile of the largest correlation by chance, exceeded in one case of a thousand
@@ -87,13 +87,20 @@ def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
     return 0.4 * float(body_hz.min()), 3.0 * float(body_hz.max())
 
 
-def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
-    """Frequency band below the bounce of a body, by its natural frequencies (b,) [Hz]: it moves with the road there,
-    even if dry friction blocks the suspension, which may reverse and multiply the motion around the bounce."""
-    return bounce_band_hz(body_hz)[0], float(body_hz.min())
+def match_below_bounce(run: Run, prediction: Array, body_hz: Array) -> RoadMatch:
+    """Correlation of a run with a prediction (n,) below the bounce of a body, by its natural frequencies (b,) [Hz].
+
+    The lag is at most a quarter of the bounce's period: farther off, the sign is that of another half wave.
+
+    The body moves with the road there, even if dry friction blocks the suspension, or the sensor is far from where the
+    model has it: either may reverse and multiply the motion around the bounce.
+    """
+    lowest_hz = float(body_hz.min())
+    return road_match(run, prediction, (bounce_band_hz(body_hz)[0], lowest_hz), most_lag_s=0.25 / lowest_hz)
 
 
-def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0) -> RoadMatch:
+def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0,
+               most_lag_s: float = _MOST_LAG_S) -> RoadMatch:
     """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance
     error grows along the way, of its parts, each at a lag of its own.
 
@@ -103,7 +110,7 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s
     expected = _expected(run, band_hz)
 
     def of(part: slice) -> RoadMatch:
-        return _match(run.measured_mps2[part], prediction[part], run.rate_hz, band_hz, expected)
+        return _match(run.measured_mps2[part], prediction[part], run.rate_hz, band_hz, expected, most_lag_s)
 
     whole = of(slice(run.first, None))
     size = round(part_s * run.rate_hz)
@@ -115,7 +122,7 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s
 
 
 def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tuple[float, float],
-           expected: float, false_alarm: float = FALSE_ALARM) -> RoadMatch:
+           expected: float, most_lag_s: float, false_alarm: float = FALSE_ALARM) -> RoadMatch:
     """Correlation of samples (n,) of a measurement with a model's."""
     measured, model = (_spectrum(one, rate_hz, band_hz) for one in (measured_mps2, model_mps2))
     count = len(measured_mps2)
@@ -125,7 +132,7 @@ def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tup
     padded = 2 * count
     correlation = np.fft.irfft(measured * model.conj(), padded) * padded / (2 * power)
     lag = np.abs(np.fft.fftfreq(padded, 1 / padded))
-    reach = _MOST_LAG_S * rate_hz
+    reach = most_lag_s * rate_hz
     upright, turned = (float((sign * correlation[lag <= reach]).max()) for sign in (1, -1))
     gain = max(upright, turned) * float(np.sqrt((np.abs(measured) ** 2).sum() / (np.abs(model) ** 2).sum()))
     far = (lag > reach) & (lag < 0.5 * count)
@@ -133,7 +140,7 @@ def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tup
         return RoadMatch(upright, turned, gain, 1.0, 1.0, 0.0)
     deviation = float(np.sqrt(np.mean(correlation[far] ** 2 * count / (count - lag[far]))))
     # Maxima of as many independent values as a band of this width has within these lags.
-    values = max(1.0, 4 * _MOST_LAG_S * (band_hz[1] - band_hz[0]))
+    values = max(1.0, 4 * most_lag_s * (band_hz[1] - band_hz[0]))
     chance, mean_chance = (deviation * float(np.sqrt(2 * np.log(one))) for one in (values / false_alarm, values))
     return RoadMatch(upright, turned, gain, chance, mean_chance, expected)
 

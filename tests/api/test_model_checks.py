@@ -1,5 +1,6 @@
 """Right input is not refused, whatever is missing from the model: a suspension that sticks shakes the body two to three
-times as much as a free one, and above its bounce the other way."""
+times as much as a free one, and above its bounce the other way; a sensor far behind the centre of gravity feels a pitch
+that may be stronger than the bounce, half a swing later."""
 
 from __future__ import annotations
 
@@ -9,28 +10,50 @@ from pathlib import Path
 import pytest
 
 from logger.api.bench import silent
-from logger.api.model_checks import check_model
+from logger.api.model_checks import check_model, predicted
 from logger.api.run_checks import lab_runs
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.lab.road_match import match_below_bounce
 from logger.shipped import vehicle_file
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.vehicle_file import read_model
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
 
 
 def stuck(tmp_path: Path, road: str, friction_n: int) -> SimulatedRuns:
     """A drive at walking pace over a smooth road, in a car whose suspension rubs so much that it hardly moves."""
+    return driven(tmp_path, road, 6, f"dry_friction:friction_force_n={friction_n}")
+
+
+def driven(tmp_path: Path, road: str, speed_mps: float, effect: str) -> SimulatedRuns:
+    """A drive of a car with one effect."""
     folder = tmp_path / "run"
     folder.mkdir()
     main(["road", "generate", "--class", road, "--length", "250", "--seed", "5", "--out", str(folder / "profile.csv")])
-    main(["simulate", "--vehicle", "rav4-2009", "--profile", str(folder / "profile.csv"), "--speed", "6",
-          "--effect", f"dry_friction:friction_force_n={friction_n}", "--out", str(folder / "drive.csv")])
+    main(["simulate", "--vehicle", "rav4-2009", "--profile", str(folder / "profile.csv"), "--speed", f"{speed_mps:g}",
+          "--effect", effect, "--out", str(folder / "drive.csv")])
     return lab_runs([folder])
 
 
 @pytest.mark.parametrize(("road", "friction_n"), [("A", 200), ("A", 300), ("B", 500)])
 def test_a_suspension_that_sticks_is_no_wrong_input(tmp_path: Path, road: str, friction_n: int) -> None:
     check_model("rav4-2009", read_model(vehicle_file("rav4-2009")), stuck(tmp_path, road, friction_n), silent)
+
+
+@pytest.mark.parametrize("effect", ["sensor_offset:offset_m=-1.2", "cg_shift:shift_m=0.47", "cg_shift:shift_m=-0.47"])
+@pytest.mark.parametrize("speed_mps", [4.5, 5.5, 6.2])
+def test_a_sensor_far_from_the_centre_of_gravity_is_no_wrong_input(tmp_path: Path, effect: str,
+                                                                   speed_mps: float) -> None:
+    """Below the bounce the sign is that of the wave at hand, not of the next half wave."""
+    model, runs = read_model(vehicle_file("rav4-2009")), driven(tmp_path, "A", speed_mps, effect)
+    check_model("rav4-2009", model, runs, silent)
+    prediction, = predicted("rav4-2009", model, runs, ())
+    body_hz = undamped_frequencies_hz(structure_of(model.vehicle))[:2]
+    for run, sign in ((runs.runs[0], 1), (replace(runs.runs[0], measured_mps2=-runs.runs[0].measured_mps2), -1)):
+        found = match_below_bounce(run, run.main(prediction), body_hz)
+        assert sign * (found.correlation - found.turned) > 0.25
 
 
 def test_a_free_one_in_feet_or_upside_down_is_refused(tmp_path: Path) -> None:
