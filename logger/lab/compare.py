@@ -80,7 +80,7 @@ class Comparison:
 
     @cached_property
     def repeats(self) -> Repeats | None:
-        """What runs that repeat each other differ by; None where none does."""
+        """Repeatability of runs of one excitation; None where none repeats another."""
         return find_repeats(self.plain.residuals.runs)
 
     @property

@@ -67,7 +67,7 @@ class Draft:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return "_".join([LEARNED + self.family, *([self.axle] if self.axle else [])])
 
     @property
@@ -98,7 +98,7 @@ class Draft:
 
     @cached_property
     def effect(self) -> Effect:
-        """What the text makes."""
+        """The effect that the text defines."""
         place = {"__name__": f"ridelog_{self.name}"}
         exec(compile(self.text(), f"<{self.name}>", "exec"), place)
         effect: object = place["EFFECT"]
@@ -106,12 +106,11 @@ class Draft:
         return effect
 
     def of_axle(self, axle: str) -> Draft:
-        """The same at one axle alone."""
+        """The draft at one axle alone."""
         return replace(self, axle=axle, title=f"{self.title}, {axle} axle only")
 
     def force_n(self, values: Mapping[str, float], at: Array, damping_n_s_per_m: float) -> Array:
-        """What it adds over what a picture draws it over (n,) [m, or m/s] [N]; a loop over a travel in time has its own
-        function, ``loop_n``."""
+        """Force of the law (n,) [N] at motions (n,) of the kind ``at`` [m, or m/s]."""
         from logger.vehicle.effect import ForceEffect
         from logger.vehicle.laws import linear
 

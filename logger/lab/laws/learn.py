@@ -281,8 +281,8 @@ class _LawChoice:
                 and not one.fit.hold_out.is_worse_than(one.base.hold_out))
 
     def _simplest(self, fits: Sequence[LawFit]) -> LawFit:
-        """Of laws, best first, that cannot be distinguished from the best one, that with the fewest effects besides it,
-        and then the fewest numbers."""
+        """The law with the fewest effects besides it, and then the fewest numbers, of those that cannot be
+        distinguished from the first."""
         near = [one for one in fits if one.score < fits[0].score + INDISTINGUISHABLE]
         return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
 

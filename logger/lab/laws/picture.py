@@ -24,7 +24,7 @@ _LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 400
 
 
 def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawContext) -> Curves | None:
-    """What a law adds, over the motions of the runs; None where it is no force that a picture shows."""
+    """The force of a law over the motions of the runs; None where it is no force that a picture shows."""
     if draft.at == "loop":
         return _loops(draft, found, context)
     if draft.at not in _AXES:
@@ -54,7 +54,7 @@ def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping:
 
 
 def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
-    """Its force while the suspension goes to and fro, by small and large ways, at the pace of a car's bounce."""
+    """Force of a law in sinusoidal travel of small and large amplitude, at the frequency of a car's bounce."""
     assert isinstance(draft.effect, ForceEffect)
     before = linear(context.vehicle.front.suspension_damping_n_s_per_m, draft.axle == "rear")
     laws = draft.effect.laws(SimpleNamespace(**found.values), before)

@@ -86,7 +86,7 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 
 @dataclass(frozen=True, eq=False)
 class RecordError:
-    """How the record of one run may be off, by numbers k: those of its distance (coefficients of the spline, the delay
+    """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
     of the receiver if its places are a receiver's, the scale, the share of its roughness), then two of its recorder
     (gain, droop).
 
@@ -114,12 +114,12 @@ class RecordError:
 
     @property
     def count(self) -> int:
-        """How many numbers there are."""
+        """Number of the numbers k."""
         return len(self.basis) + 2
 
     @property
     def spline_count(self) -> int:
-        """How many of them, the first ones, are coefficients of the spline."""
+        """Number of coefficients of the spline, the first of k."""
         return len(self.basis) - (2 if self.delay_std_s is None else 3)
 
     def precision(self, size: ErrorSize) -> Array:
@@ -171,8 +171,8 @@ class RecordError:
         return csr_array(self.basis.T)
 
     def without_trend(self, k: Array) -> Array:
-        """The same error (k,) without its start and its scale error: a straight line along the way is subtracted. A
-        receiver's delay is described by the spline then."""
+        """The numbers (k,) without start and scale error: a straight line along the way is subtracted. A receiver's
+        delay is described by the spline then."""
         moved, way = self.distance_error_m(k), self.run.distance_m - self.run.distance_m[0]
         trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
         found = self.coefficients_of(moved - trend)
@@ -210,7 +210,7 @@ class RecordError:
 
 
 class RigRecordError(RecordError):
-    """How the record of a run on a rig may be off: numbers k of its recorder (gain, droop) alone. What moves a rig is
+    """Errors of the record of a run on a rig: numbers k of its recorder (gain, droop) alone. What moves a rig is
     recorded by the same clock as what the rig does, so that there is no distance error; one that was fitted
     nevertheless would absorb physics. Methods as of ``RecordError``."""
 
@@ -242,7 +242,7 @@ class RigRecordError(RecordError):
 
 
 def record_error(run: Run, tolerance: Tolerance) -> RecordError:
-    """How the record of a run may be off, on a road or on a rig."""
+    """The record error of a run, on a road or on a rig."""
     return RigRecordError(run, np.empty((0, run.count)), tolerance, 1.0) if run.timed else (
         RecordError.of(run, tolerance))
 

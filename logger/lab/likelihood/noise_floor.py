@@ -128,8 +128,8 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
 
 
 def gain_of_full_explanation(posterior: Posterior, state: State) -> float:
-    """By how much minus twice the log-likelihood would fall if the residuals were just small enough to count as
-    explained; at least 0. Bands that are quiet make up for those that are not."""
+    """Decrease of minus twice the log-likelihood if the residuals were just small enough to count as explained; at
+    least 0. Bands that are quiet make up for those that are not."""
     found = 0.0
     for signal in _by_signal(posterior, state):
         noise = ((1 + UNEXPLAINED) * _noise_of(signal).deviation_mps2) ** 2

@@ -145,8 +145,8 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
 
 
 def _without_its_end(run: Run) -> Array:
-    """What each sample is (n,), of a run whose band is cut: at its end a record that was filtered before and a model
-    that was not are cut differently, because neither filter knows how the drive went on."""
+    """The use of each sample (n,) of a run whose band is cut, without its end: there a record that was filtered before
+    and a model that was not are cut differently, because neither filter knows how the drive went on."""
     found = np.full(run.count, READING) if run.usable is None else run.usable.copy()
     found[max(run.first, run.count - reach(run.rate_hz)):] = NO_READING
     return found

@@ -65,7 +65,7 @@ def _values_of(effect: Effect) -> list[dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """What some drives could show, in standard deviations.
+    """Detectability and isolability of effects in some drives, in standard deviations.
 
     detectability    expected significance of each effect (e,)
     pairwise         what remains of it after another one is fitted (e, e); its detectability on the diagonal

@@ -50,7 +50,7 @@ _LEAST_GAIN_SIGMA = 1.0
 
 @dataclass(frozen=True, eq=False)
 class NextDrive:
-    """What one more drive would add.
+    """A next drive and its gains.
 
     gains         of isolability, by effect: first those that it makes likelier to be named, then the relatively largest
     more_named    how many more effects a search would name, were each the only one
@@ -63,7 +63,7 @@ class NextDrive:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What some drives could show.
+    """The effects that some drives could show, and next drives.
 
     drives       names and seconds of the runs and the planned drives
     noise        of the accelerometers; ``measured``: whether it is that of the runs
@@ -100,7 +100,7 @@ class Plan:
 def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
          progress: Progress = lambda words: None, workers: int = 2) -> Plan:
-    """What runs and planned drives could show of ``effects``.
+    """Analyse what runs and planned drives could show of ``effects``.
 
     there          the car; its numbers are fitted to the runs first
     planned        drives to be, their records empty
@@ -134,7 +134,7 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
         columns = representatives(settings, total, analysis.precision)
         now = outlook(settings, total, analysis.precision, columns)
         progress("what a refit would leave of each effect")
-        refitted = analysis.refitted(parts, total, columns, now)
+        refitted = analysis.by_refit(parts, total, columns, now)
         following: list[NextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
@@ -191,7 +191,7 @@ class _Analysis:
         drives = LinearisedDrives(fitted.without_soft_bounds(), levels, here)
         return _DriveSet(drives, changes, information(fitted, changes))
 
-    def refitted(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:
+    def by_refit(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:
         """The outlook with detectabilities by a refit of the car without each effect."""
         which, costs = most_likely_sizes(total, self.precision, columns)
         with_size = {size: [one.there.with_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
@@ -208,7 +208,7 @@ class _Analysis:
 
 
 def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:
-    """What an option adds, by the outlooks without and with it."""
+    """The gains of an option, by the outlooks without and with it."""
     gained, likelier = then.isolability - now.isolability, then.chances - now.chances
     order = np.lexsort((now.isolability / np.maximum(then.isolability, 1.0), -likelier.round(2)))
     gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _LEAST_GAIN_SIGMA}

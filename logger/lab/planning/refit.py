@@ -84,7 +84,7 @@ def refitted_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[
                [list(some) for some in changes], np.inf)
     slopes = list(there)
     for _ in range(_MOST_SLOPES):
-        found, hold = _fitted(there, slopes, changes, precision, now)
+        found, hold = _fit_chord(there, slopes, changes, precision, now)
         if not found.gain < (1 - _SMALL) * now.gain:
             return min(found.gain, now.gain)
         now = found
@@ -94,8 +94,8 @@ def refitted_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[
     return now.gain
 
 
-def _fitted(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDrives], changes: Sequence[Sequence[Array]],
-            precision: Array, now: _Fit) -> tuple[_Fit, bool]:
+def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDrives],
+               changes: Sequence[Sequence[Array]], precision: Array, now: _Fit) -> tuple[_Fit, bool]:
     """The best of some steps with the same derivatives, and whether these hold."""
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
     information = np.diag(precision) + sum(

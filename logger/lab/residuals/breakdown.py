@@ -187,7 +187,7 @@ def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
 
 
 def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
-    """In so many steps of a round speed at most, or one more; not at all on rigs."""
+    """Parts by speed, in so many round steps at most, or one more; none on rigs."""
     if all(run.timed for run in residuals.runs):
         return ()
     speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
@@ -197,7 +197,7 @@ def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
 
 
 def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
-    """In quarters, by the r.m.s. of the model in a block around each sample."""
+    """Parts by amplitude: quarters by the r.m.s. of the model in a block around each sample."""
     size = round(INDEPENDENT_S * residuals.rate_hz)
     level = np.concatenate([_running_rms(one, size) for one in residuals.model])
     edges = np.unique(np.quantile(level, np.linspace(0, 1, 5)))
@@ -214,7 +214,7 @@ def _running_rms(signal: Array, samples: int) -> Array:
 
 
 def _by_place(residuals: ModelResiduals, place_s: float = 0.6) -> tuple[Part, ...]:
-    """In stretches of a round length, about what a car drives in so long or somewhat more; not on rigs."""
+    """Parts by place: stretches of a round length, of about this time or somewhat more; none on rigs."""
     usual_mps = float(np.median(np.concatenate(residuals.kept(lambda run: run.speed_mps))))
     length = next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step >= place_s * usual_mps), 50.0)
     whole = sum(float(one @ one) for one in residuals.residual)
@@ -244,6 +244,6 @@ def _parts(values: Array, edges: Array, residual: Array, measured: Array, whole:
 
 def _part(low: float, high: float, power: float, of: float, whole: float, mean: float, samples: int,
           name: str) -> Part:
-    """By its powers: of the residual in it, of the measurement in it, of all residuals, and the mean of the first."""
+    """A part by its powers: of its residual, of its measurement, of all residuals, and the mean of the first."""
     return Part(low, high, float(np.sqrt(power / of)) if of > 0 else float("nan"),
                 float(power / whole) if whole > 0 else 0.0, float(np.sqrt(mean)), samples, name)

@@ -77,7 +77,7 @@ def force_map(residuals: ModelResiduals) -> ForceMap:
     regression = _Regression.of(residuals)
 
     def term(shape: Shape) -> Term:
-        coefficients, covariance, p_value, share = regression.fitted(_responses_at_sensor(residuals, [shape]))
+        coefficients, covariance, p_value, share = regression.fit(_responses_at_sensor(residuals, [shape]))
         return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
 
     return ForceMap(_curve(regression, residuals, of_rate=True), _curve(regression, residuals, of_rate=False),
@@ -116,7 +116,7 @@ class _Regression:
         nuisance = [np.column_stack(one) for one in zip(dampers, springs, residuals.model, rates, strict=True)]
         return _Regression(residuals.residual, nuisance, _whitening(residuals.residual))
 
-    def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
+    def fit(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
         """Regression on columns (n, k) per run: coefficients (k,), their covariance (k, k), the p-value of all together
         (these by whitened residuals), and the share of the residual that they explain."""
         from scipy.stats import f
@@ -163,7 +163,7 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     driven = np.concatenate([(one.rate_mps if of_rate else one.travel_m).ravel() for one in residuals.responses])
     knots = _KNOTS * (float(np.sqrt(np.mean(driven**2))) or 1.0)
     used = np.flatnonzero(_KNOTS)
-    coefficients, covariance, p_value, share = regression.fitted(
+    coefficients, covariance, p_value, share = regression.fit(
         _responses_at_sensor(residuals, [_hat(knots, int(index), of_rate) for index in used]))
     # A straight line through 0 cannot be distinguished from a spring or damper a little off: it is projected out, each
     # knot weighted by how often it is reached.

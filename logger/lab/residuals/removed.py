@@ -27,7 +27,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Removed:
-    """What was removed.
+    """Sensor drift, distance error and filtering that were removed.
 
     drifts                                       of the runs' sensors, one each
     drift_share, distance_share, filter_share    of the residual power of the model as it stands, at all frequencies
@@ -53,7 +53,7 @@ class Removed:
 
 
 def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> Removed:
-    """What is removed from the residuals of a fitted state.
+    """Sensor drift, distance error and filtering of a fitted state.
 
     plain    predictions (n,) per run of the model as it stands
     """

@@ -52,7 +52,7 @@ class Drift:
         return self.form != NONE
 
     def nothing_found(self) -> Drift:
-        """The same run without a drift."""
+        """No drift, of the same run."""
         return replace(self, form=NONE, size_mps2=0.0, time_s=None, curve_mps2=np.zeros(len(self.curve_mps2)))
 
 

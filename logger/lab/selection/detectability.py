@@ -52,7 +52,7 @@ class _Sensitivity:
     def __init__(self, found: LinearModel) -> None:
         self._linear, self._state = found.without_soft_bounds(), found.state
         self._covariance = np.linalg.inv(self._linear.information(self._state.logs))
-        self._here = self._predicted(self._state.effects)
+        self._here = self._predictions(self._state.effects)
 
     def of(self, effect: Effect) -> float:
         """Expected significance at the usual strength; where there is none, or the vehicle has it already, the largest
@@ -63,11 +63,11 @@ class _Sensitivity:
         return found
 
     def _deviations(self, one: Chosen) -> float:
-        there = self._predicted((*self._state.effects, one))
+        there = self._predictions((*self._state.effects, one))
         white = self._linear.whitened([new - old for new, old in zip(there, self._here, strict=True)])
         mixed, own = self._linear.cross_products(white)
         return float(np.sqrt(max(own - float(mixed @ self._covariance @ mixed), 0.0)))
 
-    def _predicted(self, effects: tuple[Chosen, ...]) -> list[np.ndarray]:
+    def _predictions(self, effects: tuple[Chosen, ...]) -> list[np.ndarray]:
         state = self._state
         return self._linear.posterior.predict(effects, state.logs, state.record, rough=True)

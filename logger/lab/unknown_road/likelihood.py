@@ -182,7 +182,7 @@ class SameRoad:
         return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
 
     def gain(self, before: RoadFitState, after: RoadFitState) -> float:
-        """By how much minus twice the log-posterior falls from one state to another: the integral of the score between
+        """Decrease of minus twice the log-posterior from one state to another: the integral of the score between
         them."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
         total = 0.0

@@ -104,10 +104,10 @@ class Family(ABC):
 
     @abstractmethod
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        """What it is, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm".
-        The axle is added by the caller."""
+        """The law in words, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2
+        mm". The axle is added by the caller."""
 
 
 def rounded(value: float, digits: int = 2) -> float:
-    """A number to so many digits."""
+    """A number rounded to so many significant digits."""
     return float(f"{value:.{digits}g}")
