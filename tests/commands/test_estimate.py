@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,8 @@ from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import write_profile
 from logger.store.formats.profile_file import read_profile
 from logger.store.formats.run_file import write_run_facts
+
+from ..support.command import called
 
 ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 800, 0.05, 12), 100.0)
 CAR = "rav4-2009"
@@ -192,11 +193,10 @@ def test_a_distance_that_goes_back_a_little_is_computed_from_the_speed(
 
 
 def test_the_screen_says_what_was_assumed_and_what_is_possible(
-    folder: Path, tmp_path: Path, ridelog: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = reported(capsys, folder)
-    done = subprocess.run([ridelog, "estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out",
-                           tmp_path / "p.csv"], capture_output=True, text=True, check=False)
+    done = called("estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out", tmp_path / "p.csv")
     assert (done.returncode, done.stderr) == (0, "")
     assert "noise of 0.05 m/s2 in a reading (--noise), not rounded (--step)" in done.stdout
     assert f"IRI {result['iri_m_per_km']:.2f} m/km on the mean" in done.stdout
