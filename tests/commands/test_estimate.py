@@ -134,7 +134,9 @@ def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixtur
     assert result["limit"]["std_m_per_km"] == pytest.approx(reported(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
 
 
-@pytest.mark.parametrize(("noise", "step", "rate"), [(0.2, 0.613, 100), (0.11, 0.0, 100), (0.15, 0.0, 208)])
+@pytest.mark.parametrize(("noise", "step", "rate"), [
+    (0.11, 0.0, 100), pytest.param(0.2, 0.613, 100, marks=pytest.mark.slow),
+    pytest.param(0.15, 0.0, 208, marks=pytest.mark.slow)])
 def test_the_noise_is_learnt_from_the_drive(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, step: float, rate: int
 ) -> None:

@@ -200,6 +200,7 @@ def with_signals(folder: Path, rig: Rig, lasts_s: float, seed: int, declared: st
     return folder
 
 
+@pytest.mark.slow
 def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = with_signals(tmp_path / "run", Rig(), 12.0, 1)
     found = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", run)

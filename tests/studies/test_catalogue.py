@@ -14,6 +14,9 @@ from logger.studies.study import DISSERTATION, Effort, Item, Result, alike, stud
 
 from ..support.study_results import STUDIES, study_result
 
+SLOW = ("section-7-2-input", "table-6-3")
+"""Studies that take seconds with the least effort."""
+
 
 def stands_alone(text: str, pictures: int) -> None:
     assert text.startswith("<!doctype html>")
@@ -21,7 +24,9 @@ def stands_alone(text: str, pictures: int) -> None:
     assert text.count("<svg") == pictures
 
 
-@pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if not study.data])
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name, study in STUDIES.items()
+    if not study.data])
 def test_a_study_runs_and_is_whole(name: str) -> None:
     study = STUDIES[name]
     result = study_result(name)
