@@ -40,8 +40,6 @@ from ..support.accelerometer_ride import Ride, core_of, rough
 NAMES = list(accelerometers())
 VARIANTS = [pytest.param(name, settings, id=f"{name}{number or ''}")
             for name, fake in fakes().items() for number, settings in enumerate(fake.variants)]
-USUAL = [one if one.id in NAMES else pytest.param(*one.values, id=one.id, marks=pytest.mark.slow) for one in VARIANTS]
-"""The same, but for the usual settings of each marked as slow."""
 
 
 @pytest.fixture
@@ -164,7 +162,7 @@ def test_settings_that_a_device_has_lost_are_set_again(name: str, settings: Any,
     lost_settings_are_noticed(name, settings, tmp_path)
 
 
-@pytest.mark.parametrize(("name", "settings"), USUAL)
+@pytest.mark.parametrize(("name", "settings"), VARIANTS)
 def test_a_recording_alone_gives_the_same_rows_again(name: str, settings: Any, tmp_path: Path) -> None:
     live = recording_alone_gives_the_same_rows(name, settings, tmp_path)
     known = [record for record in live.records if record.iri_m_per_km is not None]
