@@ -60,6 +60,7 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert len(read_model(first).effects) == 1  # what was read stays as it is
 
 
+@pytest.mark.slow
 def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     runs = write_runs(tmp_path / "runs", named("sensor_offset", offset_m=0.4))
     own, out = tmp_path / "bracket.py", tmp_path / "mine.yaml"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,14 @@ def car(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path.parent.mkdir()
     path.write_text(TEXT.replace("name: rav4-2009", "name: my car"), encoding="utf-8")
     return path
+
+
+@pytest.fixture
+def few_roads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sixth of the roads, where it is tested what is kept and not what is computed."""
+    computed = rms_calibration.calibrate
+    monkeypatch.setattr(rms_calibration, "calibrate", lambda car, gain, settings: computed(
+        car, gain, replace(settings, roads=rms_calibration.ROADS // 6)))
 
 
 class Call:
@@ -69,6 +78,7 @@ def test_json_is_the_contract_and_the_service_s_relation(car: Path, capsys: pyte
     assert result["sprung_mass_kg"] == 875
 
 
+@pytest.mark.usefixtures("few_roads")
 def test_the_second_time_it_is_found(
     car: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,6 +94,7 @@ def test_the_second_time_it_is_found(
     assert Call(capsys, renamed, "--json").json()["vehicle"] == "her car"
 
 
+@pytest.mark.usefixtures("few_roads")
 @pytest.mark.parametrize("more", [["--recompute"], ["--window", "30.48"], ["--seed", "2"], ["--low-pass", "15"]])
 def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
     first = Call(capsys, car, "--json")
@@ -93,6 +104,7 @@ def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.Capture
     assert "found in" in Call(capsys, car, "--json").err  # and the first is still there
 
 
+@pytest.mark.usefixtures("few_roads")
 def test_a_changed_vehicle_and_a_damaged_file_are_computed_again(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = Call(capsys, car, "--json")
     stored = car.with_name("mine.calibration.json")
@@ -107,6 +119,7 @@ def test_a_changed_vehicle_and_a_damaged_file_are_computed_again(car: Path, caps
     assert heavier.json()["speeds"][0]["iri_per_accel_rms"] > slope
 
 
+@pytest.mark.usefixtures("few_roads")
 def test_a_folder_that_cannot_be_written_to(
     car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -122,6 +135,7 @@ def test_a_folder_that_cannot_be_written_to(
     assert nowhere.json()["speeds"]
 
 
+@pytest.mark.usefixtures("few_roads")
 def test_a_vehicle_of_the_program_is_kept_in_the_cache(
     car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

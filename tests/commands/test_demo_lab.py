@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -14,16 +13,13 @@ from logger.commands import demo_lab
 from logger.demo import lab_drives
 from logger.store.formats.drive_file import read_run
 
+from ..support.command import called
+
 DOC = Path(__file__).parents[2] / "docs" / "lab.md"
 
 
-@pytest.fixture
-def unpack(ridelog: Path, tmp_path: Path) -> Callable[[], subprocess.CompletedProcess[str]]:
-    def run() -> subprocess.CompletedProcess[str]:
-        return subprocess.run([ridelog, "demo", "--lab", "--unpack", "--out", str(tmp_path / "lab")],
-                              capture_output=True, text=True, check=False)
-
-    return run
+def unpack(folder: Path) -> CompletedProcess[str]:
+    return called("demo", "--lab", "--unpack", "--out", folder / "lab")
 
 
 def files_in(folder: Path) -> dict[str, bytes]:
@@ -42,11 +38,11 @@ def test_the_drives_are_on_two_streets_and_the_texts_say_so(tmp_path: Path) -> N
         assert not re.search(r"\bstreet\b|\btwice along", words)
 
 
-def test_the_same_drives_again_are_fine(unpack: Callable[[], subprocess.CompletedProcess[str]], tmp_path: Path) -> None:
-    assert unpack().returncode == 0
+def test_the_same_drives_again_are_fine(tmp_path: Path) -> None:
+    assert unpack(tmp_path).returncode == 0
     (tmp_path / "lab" / "brisk" / "drive.csv").unlink()
     before = files_in(tmp_path)
-    done = unpack()
+    done = unpack(tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert files_in(tmp_path).items() > before.items()
 
@@ -55,13 +51,11 @@ def test_the_same_drives_again_are_fine(unpack: Callable[[], subprocess.Complete
     ("slow/drive.csv", "another folder"), ("brisk/profile.csv", "another folder"), ("brisk", "expected a folder"),
     ("slow/profile.csv/mine.txt", "another folder"),
 ])
-def test_a_file_of_the_users_own_stays(
-    kept: str, words: str, unpack: Callable[[], subprocess.CompletedProcess[str]], tmp_path: Path
-) -> None:
+def test_a_file_of_the_users_own_stays(kept: str, words: str, tmp_path: Path) -> None:
     mine = tmp_path / "lab" / kept
     mine.parent.mkdir(parents=True)
     mine.write_text("t_s,mine\n", "utf-8")
-    done = unpack()
+    done = unpack(tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert f"{tmp_path / 'lab' / '/'.join(kept.split('/')[:2])}: " in done.stderr and words in done.stderr
     assert files_in(tmp_path) == {f"lab/{kept}": b"t_s,mine\n"}

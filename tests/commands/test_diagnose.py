@@ -113,6 +113,7 @@ def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.Cap
     assert "What repeats along the way" in page.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_users_own_that_is_like_another(offset_runs: list[str], tmp_path: Path,
                                                          capsys: pytest.CaptureFixture[str]) -> None:
     own = tmp_path / "bracket.py"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
 
+from ..support.command import called
 from ..support.drives.records import at, held, ride, rounded, write_record
 
 SECONDS = 40
@@ -17,14 +18,12 @@ EVEN_S = np.arange(1, SECONDS, 0.01)
 
 
 @pytest.fixture
-def comfort(ridelog: Path, tmp_path: Path):
+def comfort(tmp_path: Path):
     """Exit status, JSON or none, and lines on stderr of ``ridelog comfort`` on a record."""
 
     def run(t_s: np.ndarray, accel: np.ndarray, *arguments: str) -> tuple[int, dict, list[str]]:
         path = write_record(tmp_path / "ride.csv", t_s, accel_z_mps2=accel)
-        done = subprocess.run([ridelog, "comfort", path, "--json", *arguments], capture_output=True, text=True,
-                              check=False)
-        assert "Traceback" not in done.stderr
+        done = called("comfort", path, "--json", *arguments)
         return done.returncode, json.loads(done.stdout or "{}"), done.stderr.splitlines()
 
     return run
@@ -87,8 +86,8 @@ def test_a_record_of_zeros_is_refused(comfort) -> None:
     assert "found 0 m/s2 all along" in complaints[0]
 
 
-def test_a_file_behind_the_bare_option_is_no_rate(ridelog: Path) -> None:
-    done = subprocess.run([ridelog, "comfort", "--resample", "ride.csv"], capture_output=True, text=True, check=False)
+def test_a_file_behind_the_bare_option_is_no_rate() -> None:
+    done = called("comfort", "--resample", "ride.csv")
     assert done.returncode == 2
     assert "expected a rate in Hz, found 'ride.csv'; a file goes before --resample" in done.stderr
 
@@ -134,16 +133,14 @@ def test_what_cannot_be_mended_is_refused_all_the_same(comfort) -> None:
     assert comfort(EVEN_S, at(EVEN_S, FINE), "--resample", "3")[0] == 2
 
 
-def test_estimate_refuses_and_mends_as_well(ridelog: Path, tmp_path: Path) -> None:
+def test_estimate_refuses_and_mends_as_well(tmp_path: Path) -> None:
     road, drive = tmp_path / "road.csv", tmp_path / "drive.csv"
-    subprocess.run([ridelog, "road", "generate", "--class", "B", "--length", "400", "--out", road], check=True,
-                   capture_output=True)
-    subprocess.run([ridelog, "simulate", "--vehicle", "rav4-2009", "--profile", road, "--speed", "15", "--noise",
-                    "0.05", "--out", drive], check=True, capture_output=True)
+    called("road", "generate", "--class", "B", "--length", "400", "--out", road).check_returncode()
+    called("simulate", "--vehicle", "rav4-2009", "--profile", road, "--speed", "15", "--noise", "0.05", "--out",
+           drive).check_returncode()
 
-    def estimate(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([ridelog, "estimate", drive, "--vehicle", "rav4-2009", "--json", *arguments],
-                              capture_output=True, text=True, check=False)
+    def estimate(*arguments: str) -> CompletedProcess[str]:
+        return called("estimate", drive, "--vehicle", "rav4-2009", "--json", *arguments)
 
     right = json.loads(estimate().stdout)
     assert right["doubts"] == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,8 @@ from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import write_profile
 from logger.store.formats.profile_file import read_profile
 from logger.store.formats.run_file import write_run_facts
+
+from ..support.command import called
 
 ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 800, 0.05, 12), 100.0)
 CAR = "rav4-2009"
@@ -133,7 +134,9 @@ def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixtur
     assert result["limit"]["std_m_per_km"] == pytest.approx(reported(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
 
 
-@pytest.mark.parametrize(("noise", "step", "rate"), [(0.2, 0.613, 100), (0.11, 0.0, 100), (0.15, 0.0, 208)])
+@pytest.mark.parametrize(("noise", "step", "rate"), [
+    (0.11, 0.0, 100), pytest.param(0.2, 0.613, 100, marks=pytest.mark.slow),
+    pytest.param(0.15, 0.0, 208, marks=pytest.mark.slow)])
 def test_the_noise_is_learnt_from_the_drive(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, step: float, rate: int
 ) -> None:
@@ -192,11 +195,10 @@ def test_a_distance_that_goes_back_a_little_is_computed_from_the_speed(
 
 
 def test_the_screen_says_what_was_assumed_and_what_is_possible(
-    folder: Path, tmp_path: Path, ridelog: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = reported(capsys, folder)
-    done = subprocess.run([ridelog, "estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out",
-                           tmp_path / "p.csv"], capture_output=True, text=True, check=False)
+    done = called("estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out", tmp_path / "p.csv")
     assert (done.returncode, done.stderr) == (0, "")
     assert "noise of 0.05 m/s2 in a reading (--noise), not rounded (--step)" in done.stdout
     assert f"IRI {result['iri_m_per_km']:.2f} m/km on the mean" in done.stdout

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from dataclasses import replace
 from functools import reduce
 from operator import xor
@@ -20,6 +19,8 @@ from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+
+from ..support.command import called
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
@@ -55,17 +56,13 @@ def line(drive: Drive, mirrored: bool = False) -> str:
     return "\n".join(["distance_m,elevation_m,lat_deg,lon_deg", *rows]) + "\n"
 
 
-def call(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(["ridelog", "extract", *map(str, words)], capture_output=True, text=True, timeout=300)
-
-
 def columns(run: Path) -> dict[str, np.ndarray]:
     table = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
     return {name: table[name] for name in table.dtype.names}
 
 
 def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Drive, tmp_path: Path) -> None:
-    done = call(place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv", "--json")
+    done = called("extract", place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv", "--json")
     assert done.returncode == 0, done.stderr
     (said,) = json.loads(done.stdout)["runs"]
     assert said["run"] == str(tmp_path / "town")
@@ -88,16 +85,15 @@ def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Dri
 
 @pytest.mark.slow
 def test_the_lab_reads_what_was_extracted(place: Path, tmp_path: Path) -> None:
-    assert call(place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
-    done = subprocess.run(["ridelog", "compare", "--json", "--vehicle", "rav4-2009", str(tmp_path / "town")],
-                          capture_output=True, text=True, timeout=300)
+    assert called("extract", place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
+    done = called("compare", "--json", "--vehicle", "rav4-2009", tmp_path / "town")
     assert done.returncode == 0, done.stderr
     assert 0.2 < json.loads(done.stdout)["error"] < 0.8  # of a sensor with steps as large as the ride
 
 
 def test_without_a_line_the_distance_begins_anywhere_and_the_way_is_right(
         place: Path, drive: Drive, tmp_path: Path) -> None:
-    done = call(place / "town.dump", "--out", tmp_path)
+    done = called("extract", place / "town.dump", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert "taken out: a receiver's delay" in done.stdout
     found = columns(tmp_path / "town")
@@ -107,15 +103,15 @@ def test_without_a_line_the_distance_begins_anywhere_and_the_way_is_right(
 
 
 def test_extracting_again_leaves_nothing_of_before(place: Path, tmp_path: Path) -> None:
-    assert call(place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
-    assert call(place / "town.dump", "--out", tmp_path).returncode == 0
+    assert called("extract", place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
+    assert called("extract", place / "town.dump", "--out", tmp_path).returncode == 0
     assert sorted(one.name for one in (tmp_path / "town").iterdir()) == ["drive.csv", "run.yaml"]
 
 
 def test_the_run_of_another_dump_is_never_written_over(place: Path, tmp_path: Path) -> None:
     (tmp_path / "town").mkdir()
     (tmp_path / "town" / "drive.csv").write_text("mine")
-    done = call(place / "town.dump", "--out", tmp_path)
+    done = called("extract", place / "town.dump", "--out", tmp_path)
     assert done.returncode == 2
     assert "expected an empty folder" in done.stderr
     assert (tmp_path / "town" / "drive.csv").read_text() == "mine"
@@ -123,7 +119,7 @@ def test_the_run_of_another_dump_is_never_written_over(place: Path, tmp_path: Pa
 
 def test_of_two_dumps_the_good_one_is_done(place: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.dump").write_text("no dump\n")
-    done = call(tmp_path / "bad.dump", place / "town.dump", "--out", tmp_path / "runs")
+    done = called("extract", tmp_path / "bad.dump", place / "town.dump", "--out", tmp_path / "runs")
     assert done.returncode == 1
     assert "bad.dump:1" in done.stderr
     assert (tmp_path / "runs" / "town" / "drive.csv").exists()
@@ -161,11 +157,11 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, t
         ((changed(place, tmp_path / "b", lambda one: one.source == GPS),), "expected readings of the accelerometer"),
         ((dump, dump), "dumps of different names"),
     ):
-        done = call(*words, "--out", tmp_path / "runs")
+        done = called("extract", *words, "--out", tmp_path / "runs")
         assert done.returncode == 2, done.stdout
         assert said in done.stderr
         assert len(done.stderr.splitlines()) == 1
-    assert call(dump, "--out", tmp_path / "file").returncode == 2
+    assert called("extract", dump, "--out", tmp_path / "file").returncode == 2
 
 
 def without_speeds(data: bytes) -> bytes:
@@ -199,7 +195,7 @@ def test_dumps_without_speeds_or_with_three_readings_are_refused_in_one_line(pla
         for event in sorted(kept, key=lambda one: one.t_us):
             writer.write(event)
         writer.close()
-        done = call(tmp_path / f"{name}.dump", "--out", tmp_path / "runs")
+        done = called("extract", tmp_path / f"{name}.dump", "--out", tmp_path / "runs")
         assert done.returncode == 2, done.stdout
         assert said in done.stderr and len(done.stderr.splitlines()) == 1
 
@@ -212,7 +208,7 @@ def test_of_a_line_that_is_shorter_than_the_drive_the_part_on_it_is_used(
 ) -> None:
     header, *rows = line(drive).splitlines()
     (tmp_path / "short.csv").write_text("\n".join([header, *rows[2800 : 2801 + round(length_m / SPACING_M)]]) + "\n")
-    done = call(place / "town.dump", "--out", tmp_path / "runs", "--profile", tmp_path / "short.csv")
+    done = called("extract", place / "town.dump", "--out", tmp_path / "runs", "--profile", tmp_path / "short.csv")
     assert done.returncode == status
     assert said in done.stdout + done.stderr
     assert len(done.stderr.splitlines()) == (status != 0)
@@ -226,7 +222,7 @@ def test_a_serial_sensor_and_a_car_that_halts_for_long(tmp_path: Path) -> None:
     plan = replace(PLAN, sensor="lines", noise_mps2=0.02, speed_knots=(
         (0, 0), (3, 0), (12, 12), (35, 12), (45, 0), (380, 0), (390, 12), (420, 12), (425, 12)))
     record(simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009"))), tmp_path / "halt.dump")
-    done = call(tmp_path / "halt.dump", "--out", tmp_path / "runs", "--json")
+    done = called("extract", tmp_path / "halt.dump", "--out", tmp_path / "runs", "--json")
     assert done.returncode == 0, done.stderr
     assert [Path(one["run"]).name for one in json.loads(done.stdout)["runs"]] == ["halt", "halt-2"]
 
@@ -236,7 +232,7 @@ def test_what_stands_where_nothing_was_read_does_not_matter(place: Path, tmp_pat
     said = []
     for seed in (1, 2):
         out = tmp_path / str(seed)
-        assert call(place / "town.dump", "--out", out, "--profile", place / "line.csv").returncode == 0
+        assert called("extract", place / "town.dump", "--out", out, "--profile", place / "line.csv").returncode == 0
         file = out / "town" / "drive.csv"
         header, *rows = file.read_text().splitlines()
         cells = [row.split(",") for row in rows]
@@ -246,8 +242,7 @@ def test_what_stands_where_nothing_was_read_does_not_matter(place: Path, tmp_pat
             for row in cells[at : at + 1 + at % 17]:
                 row[level], row[usable] = f"{rng.normal(0, 3):.4f}", "0"
         file.write_text("\n".join([header, *map(",".join, cells)]) + "\n")
-        done = subprocess.run(["ridelog", "compare", "--json", "--vehicle", "rav4-2009", str(out / "town")],
-                              capture_output=True, text=True, timeout=300)
+        done = called("compare", "--json", "--vehicle", "rav4-2009", out / "town")
         assert done.returncode == 0, done.stderr
         found = json.loads(done.stdout)
         assert len(found["runs"]) == 1

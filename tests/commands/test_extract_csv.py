@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
+from ..support.command import called
 from ..support.drives.phones import LAYOUTS, Phone, phone_in, phyphox, rotation, table
 
 PLAN = DrivePlan(
@@ -45,18 +46,12 @@ def line(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
                  at_m[inside] - FROM_M, drive.road.elevation_m[inside], lat, lon, form="%.8f")
 
 
-def call(*words: object) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(["ridelog", "extract", *map(str, words)], capture_output=True, text=True, timeout=300)
-    assert "Traceback" not in done.stderr
-    return done
-
-
 def columns(run: Path) -> dict[str, np.ndarray]:
     read = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
     return {name: read[name] for name in read.dtype.names}
 
 
-def run_of(done: subprocess.CompletedProcess[str]) -> Path:
+def run_of(done: CompletedProcess[str]) -> Path:
     assert done.returncode == 0, done.stderr
     (one,) = json.loads(done.stdout)["runs"]
     return Path(one["run"])
@@ -68,7 +63,7 @@ def truth(drive: Drive, time_s: np.ndarray) -> np.ndarray:
 
 
 def refused(*words: object) -> str:
-    done = call(*words)
+    done = called("extract", *words)
     assert done.returncode == 2, done.stdout
     assert len(done.stderr.splitlines()) == 1
     return done.stderr
@@ -78,7 +73,7 @@ def refused(*words: object) -> str:
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_at_any_angle_gives_what_the_car_did(
         layout: str, drive: Drive, phone: Phone, tmp_path: Path) -> None:
-    done = call("--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--json")
+    done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--json")
     run = run_of(done)
     found = columns(run)
     assert set(found) == {"t_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg", "usable"}
@@ -95,8 +90,8 @@ def test_every_layout_at_any_angle_gives_what_the_car_did(
 @pytest.mark.parametrize("layout", ["phyphox", "own_names"])
 def test_the_lab_finds_the_same_error_as_on_the_true_drive(
         layout: str, drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
-    done = call("--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--profile", line,
-                "--json")
+    done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs",
+                  "--profile", line, "--json")
     run = run_of(done)
     assert json.loads(done.stdout)["runs"][0]["by_road"]
     found = columns(run)
@@ -112,8 +107,7 @@ def test_the_lab_finds_the_same_error_as_on_the_true_drive(
     for vehicle, within in (("sedan-2015", 0.02), ("rav4-2009", 0.05)):
         errors = []
         for one in (run, exact):
-            reported = subprocess.run(["ridelog", "compare", "--json", "--vehicle", vehicle, str(one)],
-                                  capture_output=True, text=True, timeout=300)
+            reported = called("compare", "--json", "--vehicle", vehicle, one)
             assert reported.returncode == 0, reported.stderr
             errors.append(json.loads(reported.stdout)["error"])
         assert abs(errors[0] - errors[1]) < within, (vehicle, errors)
@@ -126,7 +120,7 @@ def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: Drive, phone:
     force[slipped] = force[slipped] @ np.array(
         [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     words = phyphox(Phone(**{**vars(phone), "force_mps2": force}), tmp_path / "ride")
-    done = call("--csv", *words, "--out", tmp_path / "runs", "--json")
+    done = called("extract", "--csv", *words, "--out", tmp_path / "runs", "--json")
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert [Path(one["run"]).name for one in said["runs"]] == ["ride", "ride-2"]
@@ -143,7 +137,7 @@ def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: Drive
     time_s = np.arange(taken.time_s[0], taken.time_s[-1], 1 / 200)
     last = np.searchsorted(taken.time_s, time_s, side="right") - 1
     held = Phone(**{**vars(taken), "time_s": time_s, "force_mps2": taken.force_mps2[last]})
-    done = call("--csv", *phyphox(held, tmp_path / "ride"), "--out", tmp_path / "runs", "--json")
+    done = called("extract", "--csv", *phyphox(held, tmp_path / "ride"), "--out", tmp_path / "runs", "--json")
     found = columns(run_of(done))
     assert any("102 Hz were taken" in note for note in json.loads(done.stdout)["notes"])
     off = found["accel_z_mps2"] - truth(drive, found["t_s"] - 0.0025)  # half of a row late, on average
@@ -153,7 +147,7 @@ def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: Drive
 @pytest.mark.slow
 def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
-    done = call("--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
+    done = called("extract", "--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
                 "--out", tmp_path / "runs")
     assert done.returncode == 0, done.stderr
     assert "shows nothing above 23 Hz" in done.stdout
@@ -169,7 +163,8 @@ def test_holes_and_clipped_samples_are_marked(drive: Drive, phone: Phone, tmp_pa
     up = phone.gravity_mps2[0] / np.linalg.norm(phone.gravity_mps2[0])
     largest = np.abs(kept.force_mps2).max(axis=0)[int(np.argmax(np.abs(up)))]
     words = phyphox(kept, tmp_path / "ride")
-    run = run_of(call("--csv", *words, "--out", tmp_path / "runs", "--json", "--range", f"{0.97 * largest / 9.80665}"))
+    run = run_of(called("extract", "--csv", *words, "--out", tmp_path / "runs", "--json",
+                        "--range", 0.97 * largest / 9.80665))
     found = columns(run)
     inside = (found["t_s"] > 30.02) & (found["t_s"] < 30.28)
     assert (found["usable"][inside] == 0).all()
@@ -190,9 +185,9 @@ def test_gravity_taken_out_needs_the_axis_that_points_up(drive: Drive, phone: Ph
     words = ("--csv", tmp_path / "ride", "--out", tmp_path / "runs")
     assert "--up z" in refused(*words)
     for up, sign in (("--up=z", 1.0), ("--up=-z", -1.0)):
-        found = columns(run_of(call(*words, up, "--json")))
+        found = columns(run_of(called("extract", *words, up, "--json")))
         assert (found["accel_z_mps2"] - sign * truth(drive, found["t_s"])).std() < 0.05
-    found = columns(run_of(call(*words, "--up=z", "--sign=-", "--json")))
+    found = columns(run_of(called("extract", *words, "--up=z", "--sign=-", "--json")))
     assert (found["accel_z_mps2"] + truth(drive, found["t_s"])).std() < 0.05
     assert "leave out --up" in refused("--csv", tmp_path / "other" / "Accelerometer.csv", "--location",
                                        tmp_path / "ride" / "Location.csv", "--out", tmp_path / "runs", "--up", "z")
@@ -202,7 +197,7 @@ def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) ->
     time_s = np.arange(10, 60, 0.01)
     accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
     path = table(tmp_path / "phone.csv", "t,az", time_s, accel + 9.81)
-    found = columns(run_of(call("--csv", path, "--columns", "t=t:s,up=az:m/s2", "--speed", "4.5", "--out",
+    found = columns(run_of(called("extract", "--csv", path, "--columns", "t=t:s,up=az:m/s2", "--speed", "4.5", "--out",
                                 tmp_path / "runs", "--json")))
     assert set(found) == {"t_s", "accel_z_mps2", "speed_mps", "distance_m", "usable"}
     assert np.allclose(found["speed_mps"], 4.5, atol=1e-6)
@@ -256,7 +251,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(drive: Drive, phone: Phone, 
 def test_of_two_recordings_the_good_one_is_done(phone: Phone, tmp_path: Path) -> None:
     phyphox(phone, tmp_path / "good")
     (tmp_path / "bad.csv").write_text("a,b\n1,2\n")
-    done = call("--csv", tmp_path / "bad.csv", tmp_path / "good", "--out", tmp_path / "runs")
+    done = called("extract", "--csv", tmp_path / "bad.csv", tmp_path / "good", "--out", tmp_path / "runs")
     assert done.returncode == 1
     assert "bad.csv" in done.stderr
     assert (tmp_path / "runs" / "good" / "drive.csv").exists()

@@ -286,6 +286,7 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
         assert "TX on RX" in command.PlayedDrive(False, None, found).text()
 
 
+@pytest.mark.slow
 def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_since(
         short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

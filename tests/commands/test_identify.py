@@ -129,7 +129,7 @@ def test_another_road_than_the_one_that_was_driven(runs: list[str], tmp_path: Pa
     assert "explains nothing of what was measured" in reported["cannot_tell"][0]
 
 
-@pytest.mark.parametrize("more", [(), ("--bump", "height_m=0.15,width_m=2.6")])
+@pytest.mark.parametrize("more", [(), pytest.param(("--bump", "height_m=0.15,width_m=2.6"), marks=pytest.mark.slow)])
 def test_a_sensor_upside_down(runs: list[str], tmp_path: Path, more: tuple[str, ...]) -> None:
     run = other_run(runs[0], tmp_path / "turned", np.negative)
     place = ",bump.start_m,speed_scale" if more else ""
@@ -206,6 +206,7 @@ def rubbing_run(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder)
 
 
+@pytest.mark.slow
 def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_path: Path,
                                                        capsys: pytest.CaptureFixture[str]) -> None:
     vehicle, out = rubbing_vehicle(tmp_path, 50.0), tmp_path / "fitted.yaml"

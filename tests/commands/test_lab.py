@@ -109,6 +109,7 @@ def test_for_a_program_where_nothing_is_missing(tmp_path: Path, capsys: pytest.C
     assert reported["vehicles"] == [] and Path(reported["story"]).read_text("utf-8").startswith("<!doctype html>")
 
 
+@pytest.mark.slow
 def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
                               answering: Callable[..., list[str]]) -> None:
     asked = answering("rust", "no")

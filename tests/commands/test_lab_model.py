@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_run, write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle
 
+from ..support.command import called
 from ..support.lab.runs_with_effects import OWN, named, write_runs
 
 SHAKES = """\
@@ -259,10 +259,6 @@ def test_a_record_too_slow_to_show_the_wheels(rate_hz: float, runs: list[str], t
         main(["diagnose", "--same-road", "--vehicle", "rav4-2009", str(tmp_path), runs[1]])
 
 
-def command_line(ridelog: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([ridelog, *arguments], check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-
-
 @pytest.mark.parametrize("rate_hz", [49.8, 50.0])
 def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], tmp_path: Path,
                                    capsys: pytest.CaptureFixture[str]) -> None:
@@ -279,8 +275,8 @@ def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], 
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
-def test_a_disk_that_is_full_is_named(command: str, ridelog: Path, runs: list[str], tmp_path: Path) -> None:
-    done = command_line(ridelog, *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", runs[0], "--out", "/dev/full")
+def test_a_disk_that_is_full_is_named(command: str, fits: None, runs: list[str], tmp_path: Path) -> None:
+    done = called(*COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", runs[0], "--out", "/dev/full")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "ridelog: /dev/full: No space left on device\n"
 
@@ -311,7 +307,7 @@ PRINTS = OWN.replace("class Bracket", "print('HELLO from the file')\n\n\nclass B
 EFFECT =""")
 
 
-def test_what_an_own_effect_prints_is_no_json(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+def test_what_an_own_effect_prints_is_no_json(fits: None, runs: list[str], tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(PRINTS, "utf-8")
     new = tmp_path / "new.yaml"
     car = car_with(tmp_path, "{name: long_bracket, file: own.py, offset_m: 0.1}")
@@ -320,25 +316,25 @@ def test_what_an_own_effect_prints_is_no_json(ridelog: Path, runs: list[str], tm
         ["add-effect", str(tmp_path / "own.py"), "--vehicle", "rav4-2009", runs[0], "--out", str(new)],
         ["simulate", "--vehicle", car, "--flat", "30", "--speed", "10", "--out", str(tmp_path / "drive.csv")],
     ):
-        done = command_line(ridelog, *arguments, "--json")
+        done = called(*arguments, "--json")
         assert done.returncode == 0
         assert isinstance(json.loads(done.stdout), dict)
         assert "HELLO from the file" in done.stderr and "HELLO while it runs" in done.stderr
 
 
-def test_an_own_effects_file_that_is_not_there(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+def test_an_own_effects_file_that_is_not_there(fits: None, runs: list[str], tmp_path: Path) -> None:
     car = car_with(tmp_path, "{name: long_bracket, file: own.py, offset_m: 0.1}")
     line = Path(car).read_text("utf-8").splitlines().index(
         "effects: [{name: long_bracket, file: own.py, offset_m: 0.1}]") + 1
-    done = command_line(ridelog, "compare", "--vehicle", car, runs[0])
+    done = called("compare", "--vehicle", car, runs[0])
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (f"ridelog: {car}:{line}: {tmp_path / 'own.py'}: expected a readable file (No such file or "
                            "directory)\n")
 
 
-def test_a_centre_of_gravity_beyond_an_axle(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
-    done = command_line(ridelog, "add-effect", "cg_shift:shift_m=0.9", "--vehicle", "ford-escort", runs[0],
-                        "--out", str(tmp_path / "new.yaml"))
+def test_a_centre_of_gravity_beyond_an_axle(fits: None, runs: list[str], tmp_path: Path) -> None:
+    done = called("add-effect", "cg_shift:shift_m=0.9", "--vehicle", "ford-escort", runs[0], "--out",
+                  tmp_path / "new.yaml")
     assert done.returncode == 2
     assert done.stderr == ("ridelog: cg_shift: expected the centre of gravity between the axles, found it 0.0161 m "
                            "beyond the front axle\n")

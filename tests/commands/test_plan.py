@@ -57,6 +57,7 @@ def test_for_a_program_and_as_a_page(road: Path, tmp_path: Path, capsys: pytest.
     assert html.count("<svg") == 1 and html.count("<rect") == len(names) ** 2
 
 
+@pytest.mark.slow
 def test_in_words_a_louder_sensor_names_less(road: Path, capsys: pytest.CaptureFixture[str]) -> None:
     drive = ("--profile", road, "--speed", 10)
     assert plan(*drive, "--noise", 0.02) == 0
@@ -68,6 +69,7 @@ def test_in_words_a_louder_sensor_names_less(road: Path, capsys: pytest.CaptureF
     assert loud.count("can be named") < quiet.count("can be named")
 
 
+@pytest.mark.slow
 def test_runs_that_were_driven_bring_their_own_noise_and_effects(road: Path, tmp_path: Path) -> None:
     car = ridelog.read_vehicle("rav4-2009").with_effect("sensor_gain", gain=1.1)
     run = ridelog.simulate(car, road, 9.0, noise_mps2=0.08, name="driven")

@@ -13,6 +13,8 @@ import pytest
 
 from drivers.dump import DumpHeader, DumpWriter, Event
 
+from ..support.command import called
+
 PATIENCE_S = 60
 CONTRACT = (
     "segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,iri_std_m_per_km,"
@@ -134,25 +136,25 @@ def test_an_unverified_profile_is_named_in_every_log(ridelog: Path, tmp_path: Pa
         ),
     ],
 )
-def test_bad_recordings_are_refused_in_one_line(ridelog: Path, tmp_path: Path, content: bytes, said: str) -> None:
+def test_bad_recordings_are_refused_in_one_line(tmp_path: Path, content: bytes, said: str) -> None:
     dump = tmp_path / "bad.dump"
     dump.write_bytes(content)
-    done = call(ridelog, "replay", dump, "--out", tmp_path / "out")
+    done = called("replay", dump, "--out", tmp_path / "out")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert said in done.stderr
     assert not done.stdout
 
 
-def test_no_such_recording(ridelog: Path, tmp_path: Path) -> None:
-    done = call(ridelog, "replay", tmp_path / "none.dump", "--out", tmp_path / "out")
+def test_no_such_recording(tmp_path: Path) -> None:
+    done = called("replay", tmp_path / "none.dump", "--out", tmp_path / "out")
     assert done.returncode == 2
     assert "none.dump" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
-def test_a_report_never_replaces_a_device(ridelog: Path, replayed: tuple[Path, str], tmp_path: Path) -> None:
+def test_a_report_never_replaces_a_device(replayed: tuple[Path, str], tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
-    done = call(ridelog, "report", replayed[0], "--out", tmp_path / "folder")
+    done = called("report", replayed[0], "--out", tmp_path / "folder")
     assert done.returncode == 2
     assert "expected the name of a file" in done.stderr

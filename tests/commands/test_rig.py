@@ -3,6 +3,7 @@ an integrator that shares nothing with ridelog (``support.drives.bench_rig``).""
 
 import json
 import shutil
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,14 @@ import ridelog
 from logger.commands.main import main
 from logger.errors import BadInput
 
-from ..support.drives.bench_rig import RATE_HZ, Rig, random_table, shaken, swept_table, write_run
+from ..support.drives.bench_rig import RATE_HZ, Recorded, Rig, random_table, shaken, swept_table, write_run
 
 NOISE_MPS2 = 0.01
+
+
+@cache
+def randomly_shaken(rig: Rig, lasts_s: float, seed: int) -> Recorded:
+    return shaken(rig, random_table(lasts_s, seed))
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +30,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bench")
     (folder / "rig.yaml").write_text(Rig().vehicle_yaml(1.02))
     (folder / "true.yaml").write_text(Rig().vehicle_yaml())
-    for name, table in (("random", random_table(12.0, 1)), ("sweep", swept_table(12.0))):
-        seen = shaken(Rig(), table)
+    for name, seen in (("random", randomly_shaken(Rig(), 12.0, 1)), ("sweep", shaken(Rig(), swept_table(12.0)))):
         write_run(folder / name, seen, NOISE_MPS2, 2)
     return folder
 
@@ -102,7 +107,7 @@ def test_a_record_that_was_low_passed_is_compared_below(bench: Path, tmp_path: P
     leaves next to nothing (the filter takes 5 % where the band ends, and less below); other signals were not filtered.
     """
     if more:
-        with_signals(tmp_path / "run", Rig(), random_table(12.0, 1))
+        with_signals(tmp_path / "run", Rig(), 12.0, 1)
     else:
         shutil.copytree(bench / "random", tmp_path / "run")
     path, sections = tmp_path / "run" / "drive.csv", butter(8, 15.0, fs=RATE_HZ, output="sos")
@@ -127,7 +132,7 @@ def test_a_simulated_rig_is_what_the_integrator_says(bench: Path, tmp_path: Path
                 "--rate", RATE_HZ, "--output", "travel", "--out", run / "drive.csv")
     assert made["more_columns"] == ["travel_front_m"]
     assert (run / "drive.csv").read_text().startswith("t_s,accel_z_mps2,travel_front_m\n")
-    seen = shaken(Rig(), random_table(12.0, 1))
+    seen = randomly_shaken(Rig(), 12.0, 1)
     drive = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)
     kept = slice(500, len(drive) - 50)
     assert drive[kept, 1] == pytest.approx(seen.body_mps2[kept], abs=2e-3 * float(seen.body_mps2.std()))
@@ -184,10 +189,10 @@ SIGNALS = ("signals:\n  wheel_accel_mps2: {measures: acceleration, of: front_whe
            "  front_travel_m: {measures: travel, of: front_suspension}\n")
 
 
-def with_signals(folder: Path, rig: Rig, table: np.ndarray, declared: str = SIGNALS) -> Path:
+def with_signals(folder: Path, rig: Rig, lasts_s: float, seed: int, declared: str = SIGNALS) -> Path:
     """A run with the wheel's acceleration (noise of 0.02 m/s2) and the suspension's travel (20 um, and no known zero)
     as well."""
-    seen, rng = shaken(rig, table), np.random.default_rng(9)
+    seen, rng = randomly_shaken(rig, lasts_s, seed), np.random.default_rng(9)
     n = len(seen.time_s)
     write_run(folder, seen, NOISE_MPS2, 8, {"wheel_accel_mps2": seen.wheel_mps2 + rng.normal(0, 0.02, n),
                                             "front_travel_m": 0.03 + seen.travel_m + rng.normal(0, 2e-5, n)})
@@ -195,8 +200,9 @@ def with_signals(folder: Path, rig: Rig, table: np.ndarray, declared: str = SIGN
     return folder
 
 
+@pytest.mark.slow
 def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = with_signals(tmp_path / "run", Rig(), random_table(12.0, 1))
+    run = with_signals(tmp_path / "run", Rig(), 12.0, 1)
     found = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", run)
     drive = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)[1000:]
     floors = dict(zip(("wheel_accel_mps2", "front_travel_m"), (0.02, 2e-5) / drive[:, 2:].std(axis=0), strict=True))
@@ -210,7 +216,7 @@ def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: py
 
 
 def test_signals_come_back_from_python(tmp_path: Path) -> None:
-    run = ridelog.read_run(with_signals(tmp_path / "run", Rig(), random_table(6.0, 1)))
+    run = ridelog.read_run(with_signals(tmp_path / "run", Rig(), 6.0, 1))
     assert list(run.more) == ["wheel_accel_mps2", "front_travel_m"]
     ridelog.write_run(tmp_path / "again", run)
     again = ridelog.read_run(tmp_path / "again")
@@ -229,7 +235,7 @@ def test_signals_come_back_from_python(tmp_path: Path) -> None:
 ])
 def test_signals_that_cannot_be_are_refused_in_one_line(bench: Path, tmp_path: Path, declared: str,
                                                         complaint: str) -> None:
-    run = with_signals(tmp_path / "run", Rig(), random_table(6.0, 1), declared)
+    run = with_signals(tmp_path / "run", Rig(), 6.0, 1, declared)
     with pytest.raises(BadInput, match=complaint):
         main(["compare", "--vehicle", str(bench / "rig.yaml"), str(run)])
 
@@ -237,7 +243,7 @@ def test_signals_that_cannot_be_are_refused_in_one_line(bench: Path, tmp_path: P
 @pytest.mark.slow
 def test_two_more_signals_name_and_measure_the_friction(bench: Path, tmp_path: Path,
                                                         capsys: pytest.CaptureFixture[str]) -> None:
-    run = with_signals(tmp_path / "run", Rig(friction_n=0.5), random_table(20.0, 7))
+    run = with_signals(tmp_path / "run", Rig(friction_n=0.5), 20.0, 7)
     found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", run)
     assert found["verdict"] == ["dry_friction"]
     added = reported(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", run,

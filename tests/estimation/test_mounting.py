@@ -28,6 +28,7 @@ def test_an_axis_that_was_named_wrongly_is_reported() -> None:
     assert words.startswith("gravity is felt along +z, not along -x")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("loose_deg", "words"), [((0.0, 12.0), "tilted by 1"), ((50.0, 0.0), "turned by")])
 def test_a_sensor_that_came_loose_is_reported(loose_deg: tuple[float, float], words: str) -> None:
     seen = drive("town", 1800.0, Mounting(30.0, loose_at_s=700.0, loose_deg=loose_deg), Receiver(), FINE, seed=3)

@@ -28,6 +28,7 @@ def test_what_nobody_says_of_a_record_changes_nothing() -> None:
     assert "rounded" not in found.text and "Places" not in found.text
 
 
+@pytest.mark.slow
 def test_coarse_readings_are_bounds_where_the_file_says_so() -> None:
     """Noise of an eighth of a step: taken as noise, rounding makes 2.3 times of it (0.613 / sqrt(12) = 0.177 m/s2)."""
     run = drive(2, STEP_MPS2, 0.08, 0.0)

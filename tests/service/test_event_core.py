@@ -84,6 +84,7 @@ def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expe
     assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
@@ -108,6 +109,7 @@ def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[s
     assert rows.rows == expected
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(

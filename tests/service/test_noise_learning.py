@@ -152,6 +152,7 @@ def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader
     assert abs(learnt.belief.log_mean - log(DRIVEN_MPS2)) < 2 * learnt.belief.log_std  # the belief is log-normal
 
 
+@pytest.mark.slow
 def test_a_recording_replays_with_what_its_drive_began_with(recorded: tuple[DumpHeader, list[Event]]) -> None:
     header, events = recorded[0], recorded[1][:20000]
     loud = KnownNoise(NoiseBelief(log(0.4), 0.02), 5)

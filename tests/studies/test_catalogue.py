@@ -12,7 +12,10 @@ from logger.report.study_page import page
 from logger.studies.checks import Statement, Value, Word, about, word_of
 from logger.studies.study import DISSERTATION, Effort, Item, Result, alike, studies, study_of
 
-STUDIES = studies()
+from ..support.study_results import STUDIES, study_result
+
+SLOW = ("section-7-2-input", "table-6-3")
+"""Studies that take seconds with the least effort."""
 
 
 def stands_alone(text: str, pictures: int) -> None:
@@ -21,10 +24,12 @@ def stands_alone(text: str, pictures: int) -> None:
     assert text.count("<svg") == pictures
 
 
-@pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if not study.data])
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name, study in STUDIES.items()
+    if not study.data])
 def test_a_study_runs_and_is_whole(name: str) -> None:
     study = STUDIES[name]
-    result = study.run(Effort(0.01))
+    result = study_result(name)
     if name.split("-")[0] in ("fig", "table"):
         assert study.where.split()[1].rstrip(",") == ".".join(name.split("-")[1:])
     assert not study.differs(result)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -14,17 +13,12 @@ from logger.estimation.rms_relation import rms_relation
 from logger.roads.iri import iri
 from logger.studies.dissertation import fig_5_22, fig_6_23
 from logger.studies.drives import PS_2119, Conditions, drive_over, places_m, random_road, rav4
-from logger.studies.study import Cell, Effort, Result, studies
+from logger.studies.study import Cell
 from logger.studies.windows import comfort_shares, per_window, whole_road_by_rms
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import known_vehicle
 
-STUDIES = studies("dissertation")
-
-
-@cache
-def result(name: str, share: float = 0.01) -> Result:
-    return STUDIES[name].run(Effort(share))
+from ..support.study_results import study_result as result
 
 
 def numbers(rows: Sequence[tuple[Cell, ...]], column: int) -> list[float]:

@@ -21,6 +21,7 @@ from logger.studies.study import DISSERTATION, Effort, studies
 
 from ..benchmarks.weightings import BURSTS, THIRDS
 from ..roads.test_iri import RUNNING_IRI, golden_response
+from ..support.study_results import study_result
 
 
 def test_the_shelf_is_whole() -> None:
@@ -50,7 +51,7 @@ def test_the_bursts_are_those_of_the_benchmark_and_agree() -> None:
     assert wave[first[0]] > 0
     ten_s = wave[: len(wave) // 6]
     assert np.mean(ten_s**2) == pytest.approx(4 * (2 * np.pi / 100) / 3 / 10, rel=0.01)  # four teeth's mean square, 1/3
-    assert max(abs(one.ours / one.printed - 1) for one in iso_8041_bursts.run(Effort()).values) < 0.015
+    assert max(abs(one.ours / one.printed - 1) for one in study_result("iso-8041-bursts").values) < 0.015
 
 
 def test_the_gain_is_that_of_the_transfer_function() -> None:

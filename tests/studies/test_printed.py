@@ -16,9 +16,8 @@ from logger.studies.dissertation import (
     table_6_3,
 )
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of, until, without_profile
-from logger.studies.study import Effort, studies
 
-STUDIES = studies()
+from ..support.study_results import study_result
 
 
 def test_the_tables_of_25_starts() -> None:
@@ -31,10 +30,10 @@ def test_the_tables_of_25_starts() -> None:
 
 
 def test_all_starts_end_alike() -> None:
-    rows = STUDIES["table-4-4"].run(Effort(0.01)).tables[0].rows
+    rows = study_result("table-4-4").tables[0].rows
     ours = np.array([row[2::2] for row in rows], dtype=float)
     assert np.ptp(ours) < 1e-4
-    wide = np.array([row[2] for row in STUDIES["fig-4-22"].run(Effort(0.01)).tables[0].rows], dtype=float)
+    wide = np.array([row[2] for row in study_result("fig-4-22").tables[0].rows], dtype=float)
     assert np.ptp(wide) < 1e-4
     assert wide[0] == pytest.approx(875, rel=0.03)
 
@@ -59,7 +58,7 @@ def test_other_printed_values() -> None:
 
 def test_vibrations_agree_with_the_print() -> None:
     for name, hz, damping in (("table-4-1", (1.2, 11.0), 0.40), ("table-4-2", (1.1, 11.0), 0.30)):
-        rows = STUDIES[name].run(Effort()).tables[0].rows
+        rows = study_result(name, 1.0).tables[0].rows
         ours = [row for row in rows if row[1] is not None]
         assert [row[1] for row in ours] == list(hz)
         assert [float(f"{row[2]:.2g}") for row in ours] == list(hz)
@@ -67,7 +66,7 @@ def test_vibrations_agree_with_the_print() -> None:
 
 
 def test_a_step_that_is_taken_for_higher_makes_the_car_heavier() -> None:
-    rows = STUDIES["fig-4-31"].run(Effort(0.01)).tables[0].rows
+    rows = study_result("fig-4-31").tables[0].rows
     assert [row[1] for row in rows] == pytest.approx([583.3, 875.0, 1166.7], abs=0.1)
     ours = [row[3] for row in rows]
     assert ours == sorted(ours)
@@ -75,14 +74,14 @@ def test_a_step_that_is_taken_for_higher_makes_the_car_heavier() -> None:
 
 
 def test_the_valley_of_wrong_bumps_slants() -> None:
-    field = STUDIES["fig-4-27"].run(Effort(0.4)).pictures[0].chart
+    field = study_result("fig-4-27", 0.4).pictures[0].chart
     assert isinstance(field, Field)
     best = field.x[field.values.argmin(axis=1)]
     assert best[0] < best[-1]
 
 
 def test_estimating_the_bump_mends_the_mass() -> None:
-    rows = STUDIES["table-6-1"].run(Effort(0.01)).tables[2].rows
+    rows = study_result("table-6-1").tables[2].rows
     assert rows[2][1] < 0.5 * rows[1][1] + 1
 
 

@@ -143,6 +143,7 @@ def test_more_than_a_good_recorder_is_off_by_is_reported_and_no_less() -> None:
 # --- sizes that are found ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [ErrorSize(0.004, 0.004, 0.0003), ErrorSize(0.004, 0.03, 0.0003),
                                   ErrorSize(0.02, 0.015, 0.0003)])
 def test_the_size_of_a_walk_is_found(size: ErrorSize) -> None:

@@ -97,6 +97,7 @@ def test_what_explains_as_well_is_named() -> None:
     assert {name, *rivals} == {"sensor_offset", "cg_shift"}
 
 
+@pytest.mark.slow
 def test_of_two_that_explain_alike_the_one_with_fewer_numbers_is_taken() -> None:
     base = base_of(secret_runs([hidden("sensor_mount_resonance", frequency_hz=29.6, damping_ratio=0.05)]))
     selection = search(("body_bending", "sensor_mount_resonance")).run(base)

@@ -119,6 +119,7 @@ def test_gains_are_those_of_dense_likelihoods() -> None:
     assert found == pytest.approx(own, abs=max(4.0, 0.15 * abs(own)))
 
 
+@pytest.mark.slow
 def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
     problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
     start = problem.start()
@@ -220,6 +221,7 @@ def test_no_noise_at_all_breaks_nothing() -> None:
     assert problem.least_mps2 <= found.noise_mps2 < 0.01 * problem.size_mps2
 
 
+@pytest.mark.slow
 def test_noise_that_went_through_the_recorders_filter_is_noise_all_the_same() -> None:
     rng = np.random.default_rng(5)
 
@@ -257,6 +259,7 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
     assert all(one.is_significant for one in road_agreements(problem, problem.start()))
 
 
+@pytest.mark.slow
 def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:
     """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be estimated."""
     rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)

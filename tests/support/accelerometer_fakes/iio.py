@@ -9,6 +9,7 @@ import json
 import os
 import select
 import shutil
+import struct
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -100,9 +101,15 @@ class FakeIio(Fake):
         return Machine(self.clock, self.clock.sleep, wait_readable=self._wait_readable, root=self.root)
 
     def text(self, name: str) -> str:
-        with suppress(OSError):
-            return (self.device / name).read_text().strip()
-        return ""
+        """Of a file of the tree; it is asked for at every sample, so by the shortest way."""
+        try:
+            descriptor = os.open(f"{self.device}/{name}", os.O_RDONLY)
+        except OSError:
+            return ""
+        try:
+            return os.read(descriptor, 4096).decode().strip()
+        finally:
+            os.close(descriptor)
 
     def advance(self, now_us: int) -> None:
         if not self.is_there:
@@ -120,7 +127,7 @@ class FakeIio(Fake):
 
     def packed(self, counts: list[int], time_ns: int) -> bytes:
         """x, y, z in the upper 12 of 16 bits, 2 bytes of nothing, the time where it is asked for."""
-        data = (np.array(counts, dtype="<i2") << SHIFT).astype("<i2").tobytes()
+        data = struct.pack("<3h", *(count << SHIFT for count in counts))
         if self.text("scan_elements/in_temp_en") == "1":
             data += b"\x07\x00"
         if self.text("scan_elements/in_timestamp_en") == "1":
@@ -170,7 +177,7 @@ class FakeIio(Fake):
     def _counts(self, t_us: int) -> list[int]:
         scale = float(self.text("in_accel_scale") or SCALE)
         most = 1 << (BITS - 1)
-        return [int(np.clip(round(value / scale), -most, most - 1)) for value in self.accel(t_us)]
+        return [min(max(round(value / scale), -most), most - 1) for value in self.accel(t_us).tolist()]
 
     def _scan(self, t_us: int) -> None:
         offset_ns = 0 if self.text("current_timestamp_clock") == "monotonic" else self.wall_offset_ns
