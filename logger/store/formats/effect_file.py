@@ -37,8 +37,8 @@ def own_effect(path: Path) -> Effect:
     with blamed_on(path):
         effect = watched(look_through(effect), partial(blamed_on, path))
     if effect.name in shipped_effects():
-        raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}; rename yours, or "
-                       "name ridelog's own without a file")
+        raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}; rename yours, "
+                       "or name ridelog's own without a file")
     return effect
 
 
