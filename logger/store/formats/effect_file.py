@@ -51,7 +51,7 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
         return own_effect(Path(text)), text
     if text not in shipped_effects():
         raise BadInput(f"no effect {text!r}: expected one of {', '.join(shipped_effects())}, or a file of your own "
-                       "(with a / or .py in its name)")
+                       f"(with a / or .py in its name){did_you_mean(text, shipped_effects())}")
     return shipped_effects()[text], None
 
 
