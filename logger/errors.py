@@ -32,13 +32,19 @@ class CheckFailed(RidelogError):
     exit_status = EXIT_CHECK_FAILED
 
 
+_LEAST_PART = 4
+"""Letters of a word that is looked for inside others: shorter ones stand in too many."""
+_MOST_GUESSES = 3
 _NEARLY = 0.7  # of the letters are the same, in the same order: one is missing, wrong or in another place
 """Of ``difflib``: at its usual 0.6 "vehicle" would be nearly "hil"."""
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:
-    """``; did you mean X?`` where a word is nearly one that is known; else nothing."""
+    """``; did you mean X?`` where a word is nearly one that is known, or stands in some; else nothing."""
     from difflib import get_close_matches
 
-    near = get_close_matches(found, list(known), 1, _NEARLY)
-    return f"; did you mean {near[0]}?" if near else ""
+    words = list(known)
+    near = get_close_matches(found, words, 1, _NEARLY)
+    if not near and len(found) >= _LEAST_PART:
+        near = [word for word in words if found in word][:_MOST_GUESSES]
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -1,4 +1,4 @@
-"""The documents: their links lead somewhere."""
+"""The documents: their links lead somewhere, and what a folder has stands in its table."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+
+from logger.exchange.format import formats
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -33,3 +35,8 @@ def test_every_document_is_linked_from_another() -> None:
     linked = {(page.parent / link.partition("#")[0]).resolve()
               for page in PAGES for link in LINK.findall(page.read_text("utf-8"))}
     assert not set(PAGES[1:]) - linked
+
+
+def test_each_format_of_convert_has_a_row_in_the_page_about_logs() -> None:
+    page = (ROOT / "docs" / "reading-a-log.md").read_text("utf-8")
+    assert set(re.findall(r"^\| `\.(\w+)` \|", page, re.MULTILINE)) == set(formats())

@@ -57,8 +57,13 @@ class Readings:
     """What single readings are.
 
     noise_mps2    r.m.s. noise on the 100 Hz grid, before it is rounded [m/s2], above 0
-    step_mps2     step that they are rounded to [m/s2]; 0: finer than the noise, or not known
-    oversample    the source looks this many times 100 a second; 1 where the decoder finds out the rate by itself
+    step_mps2     one count of a reading at the rate at which it is read [m/s2]; 0: below twice the noise, which blurs
+                  it, or not known
+    oversample    readings a second over 100, for a source that is read by the host's clock; 1 for one that samples by
+                  its own: its decoder finds the rate
+
+    The BMA220 at +-2 g has counts of 0.61 m/s2 and a noise of 0.1: its step is 0.61, whatever its ``oversample``. The
+    ADXL345 has counts of 0.038 and a noise of 0.042: its step is 0.
     """
 
     noise_mps2: float

@@ -50,8 +50,8 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str, smoothness:
     """Write the intact rows of segment logs for other programs, in the format that the file's ending asks for.
 
     logs    folders at any depth, or files, of segment logs; open ones too
-    to      ``.csv``, ``.geojson`` (RFC 7946), ``.gpkg`` (OGC 12-128), ``.gpx`` (1.1), ``.kml`` (2.2) or ``.parquet``
-            (GeoParquet 1.1); GeoPackage and Parquet need the ``maps`` extra. Written whole, or not at all.
+    to      file with one of the endings that ``ridelog convert --help`` lists; GeoPackage and Parquet need the ``maps``
+            extra. Written whole, or not at all.
     smoothness    GeoJSON with ways of OpenStreetMap: instead of the rows, each way that was driven, with the value of
                   the key ``smoothness`` that its IRI suggests, for a person to review
 

@@ -128,27 +128,24 @@ def comfort(
     >>> found.comfort, round(found.a_w_mps2, 2)
     ('a_little_uncomfortable', 0.32)
     """
+    from logger.api.weightings import weighting_named, weightings
     from logger.comfort.ride_comfort import ride_comfort
-    from logger.plugins import catalogue
     from logger.report.comfort_text import as_json, lines
     from logger.report.record_checks_text import checks_json, checks_lines
 
-    weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
-    if weighting not in weightings:
-        raise BadInput(f"comfort: expected one of {', '.join(weightings)}, found {weighting!r}")
+    used = weighting_named(weighting)
     if daily_hours is not None and not 0.0 < daily_hours <= 24.0:
         raise BadInput(f"comfort: expected more than 0 and at most 24 hours a day, found {daily_hours:g}")
     name = "record" if isinstance(record, Record) else str(record.path if isinstance(record, Run) else record)
     ride = _even(record, name, Asked(unit, resample_hz))
     axes = {axis: ride.accel_mps2.get(f"accel_{axis}_mps2") for axis in "zxy"}
     taken_hz = None if ride.resampled is None else ride.resampled.from_hz
-    used = weightings[weighting]
     try:
-        found = ride_comfort(axes, ride.rate_hz, used, weightings.get(used.horizontal), daily_hours, taken_hz)
+        found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal), daily_hours, taken_hz)
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
-    return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, weighting,
+    return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, used.name,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
                    summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))

@@ -20,13 +20,13 @@ from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
 
 USUAL = "wk"
-_WEIGHTINGS = ("logger.dsp.weightings", "WEIGHTING")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    known = names("logger.dsp.weightings", "WEIGHTING")
     parser.add_argument("file", type=Path, metavar="FILE", help="CSV with t_s,accel_z_mps2[,accel_x_mps2,accel_y_mps2]")
     parser.add_argument("--weighting", default=USUAL, metavar="NAME",
-                        help=f"weighting of accel_z_mps2: one of {', '.join(names(*_WEIGHTINGS))} (default: {USUAL}). "
+                        help=f"weighting of accel_z_mps2: one of {', '.join(known)} (default: {USUAL}). "
                              "With wk, accel_x_mps2 and accel_y_mps2 are weighted by wd and combined with it")
     parser.add_argument("--daily-hours", type=float, metavar="H",
                         help="hours a day of such riding, for the health values (default: the length of the record)")
@@ -39,9 +39,6 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog comfort``."""
     from logger.api.rides import comfort
 
-    weightings = names(*_WEIGHTINGS)
-    if args.weighting not in weightings:
-        raise BadInput(f"--weighting: expected one of {', '.join(weightings)}, found {args.weighting!r}")
     if args.daily_hours is not None and not 0.0 < args.daily_hours <= 24.0:
         raise BadInput(f"--daily-hours: expected more than 0 and at most 24 hours, found {args.daily_hours:g}")
     check_picture(args.out, [args.file])

@@ -1,5 +1,5 @@
-"""Write logs as a file for other programs, by its ending: .geojson, .gpkg and .kml are maps, .gpx is tracks, .csv and
-.parquet are tables.
+"""Write logs as a file for other programs, by its ending: maps such as .geojson, tracks such as .gpx, tables such as
+.csv.
 
 Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
 neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
@@ -18,6 +18,7 @@ import argparse
 import json
 from pathlib import Path
 
+from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
 
 
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
                         help="folder of segment logs, exported stick, or log file")
     parser.add_argument("--to", metavar="FILE", type=Path, required=True,
-                        help="file to write; its ending says what: .csv .geojson .gpkg .gpx .kml .parquet")
+                        help=f"file to write; its ending says what: {table_endings()}")
     parser.add_argument("--smoothness", metavar="WAYS.geojson", type=Path,
                         help="suggest OpenStreetMap's smoothness for the ways of this extract (with @id and highway)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -60,6 +60,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         config = _settings(args.config, args.logs)
         logs = args.logs if args.logs is not None else config.log.directory
+        if args.logs is None and args.to.is_dir() and not logs.is_dir():
+            raise BadInput(f"{logs}: expected a folder with the logs; --from LOGDIR names another")
         result = export(logs, args.to, args.dumps, board.progress, config.pairing, by_hand=not args.mounted)
     except RidelogError as error:
         board.tell("unmounting", False, str(error))

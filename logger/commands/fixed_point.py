@@ -23,12 +23,10 @@ if TYPE_CHECKING:
     from logger.dsp.fixed_scaling import FixedCascade
     from logger.dsp.weightings.weighting import Sections, Weighting
 
-_WEIGHTINGS = "logger.dsp.weightings"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the verb."""
-    parser.add_argument("--weighting", default="wk", metavar="NAME", help="weighting of ISO 2631 (default: wk)")
+    parser.add_argument("--weighting", default="wk", metavar="NAME", help="such as wd (default: wk)")
     parser.add_argument("--rate", type=int, default=100, metavar="HZ", help="its sampling rate (default: 100)")
     parser.add_argument("--full-scale-g", type=float, default=16.0, metavar="G",
                         help="range of the accelerometer; a smaller one has finer steps (default: 16)")
@@ -87,20 +85,18 @@ class _Header:
 
 
 def _weighting(args: argparse.Namespace) -> _Header:
+    from logger.api.weightings import weighting_named
     from logger.dsp.weightings.weighting import DELAY_SAMPLES
-    from logger.plugins import catalogue
     from logger.units import STANDARD_GRAVITY_MPS2
 
     if not 0.01 <= args.full_scale_g <= 1000:
         raise BadInput(f"--full-scale-g {args.full_scale_g:g}: expected 0.01 to 1000 g")
-    weightings = catalogue(_WEIGHTINGS, "WEIGHTING")
-    if args.weighting not in weightings:
-        raise BadInput(f"--weighting {args.weighting}: expected one of {', '.join(weightings)}")
-    sections = _sections(weightings[args.weighting], args.rate)
+    weighting = weighting_named(args.weighting)
+    sections = _sections(weighting, args.rate)
     cascade = _cascade(f"--rate {args.rate}", sections, args.full_scale_g * STANDARD_GRAVITY_MPS2, args.data_bits)
     return _Header(
-        f"ridelog_{args.weighting}",
-        f"{args.weighting.capitalize()} of ISO 2631 at {args.rate} Hz for inputs within +-{args.full_scale_g:g} g",
+        f"ridelog_{weighting.name}",
+        f"Weighting {weighting.name.capitalize()} at {args.rate} Hz for inputs within +-{args.full_scale_g:g} g",
         "m/s2",
         (f"The output runs {DELAY_SAMPLES} samples behind the standard's formula: output k + {DELAY_SAMPLES} belongs",
          "to the instant of input k."),

@@ -16,6 +16,7 @@ from pathlib import Path
 from logger.api.fleet import BY, CARS, TRIM
 from logger.api.outputs import check_out
 from logger.commands.numbers import add_number
+from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
 
 
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tell.add_argument("--by", choices=BY, default=BY[0],
                       help="segment (66 ft, one direction), section (0.1 mi), cell (0.8 mi), route (default: segment)")
     tell.add_argument("--out", metavar="FILE", type=Path,
-                      help="write all rows as .csv .geojson .gpkg .gpx .kml .parquet (GeoParquet)")
+                      help=f"write all rows as {table_endings()}")
     draw = verbs.add_parser("report", help="a map in a folder", allow_abbrev=False, description=(
         "Write a folder that opens without a server: a page with a map and lists, tiles of the map, and the segments "
         "and sections of 0.1 mi as GeoParquet and CSV."))

@@ -28,8 +28,9 @@ def add_lab_options(parser: argparse.ArgumentParser) -> None:
     """Those of ``add_model_and_runs``, but for RUN..., and --effect-file."""
     _add_options(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
-                        help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
-                             "tried only where they are named; may repeat")
+                        help="a Python file with an effect of your own, to be tried as well; may repeat. The names "
+                             "hysteresis and frame_friction are taken too: ridelog has these effects, and tries them "
+                             "only where they are asked for")
 
 
 def add_model_and_runs(parser: argparse.ArgumentParser) -> None:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import re
 import sys
+import textwrap
 from typing import NoReturn
 
 from drivers.errors import DriverError
@@ -54,10 +56,29 @@ EXIT_INTERRUPTED = 130
 EXIT_PIPE_CLOSED = 141
 
 
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Help whose long words, such as the columns of a file, stay whole."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(" ".join(text.split()), width, break_long_words=False, break_on_hyphens=False)
+
+
+_SAID = (
+    (r"argument (\S+): invalid float value: '(.*)'", r"\1 \2: expected a number"),
+    (r"argument (\S+): invalid int value: '(.*)'", r"\1 \2: expected a whole number"),
+    (r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", r"\1 \2: expected one of \3"),
+    (r"the following arguments are required: (.*)", r"expected \1 as well"),
+    (r"unrecognized arguments: (.*)", r"expected no \1"),
+)
+"""Complaints of argparse, and how all others here are worded."""
+
+
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line."""
+    """A parser whose complaint is one line, worded as all others."""
 
     def error(self, message: str) -> NoReturn:
+        for theirs, ours in _SAID:
+            message = re.sub(theirs, ours, message)
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {printable(message)} (try '{self.prog} --help')\n")
 
 
@@ -72,7 +93,7 @@ def main(arguments: list[str]) -> int:
     verb = arguments[0]
     module = importlib.import_module(f"logger.commands.{verb.replace('-', '_')}")
     parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__,
-                     formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+                     formatter_class=_Help, allow_abbrev=False)
     module.add_arguments(parser)
     status: int = module.run(parser.parse_args(arguments[1:]))
     return status

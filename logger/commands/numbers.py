@@ -17,17 +17,22 @@ def add_number(
     """Add an option whose number lies from ``low`` to ``high`` (infinity: no end). BadInput, which names the option,
     for another one; ``rest`` as ``add_argument`` takes it."""
     def number(text: str) -> float:
-        value = kind(text)
+        try:
+            value = kind(text)
+        except ValueError:
+            what = ("a whole number" if kind is int else "a number") + (f" in {unit}" if unit else "")
+            raise BadInput(f"{option} {text}: expected {what}, without its unit") from None
         Range(low, high, unit).check(option, value)
         return value
 
-    number.__name__ = kind.__name__  # argparse names it when a text is no number at all
     parser.add_argument(option, type=number, **rest)
 
 
 def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
     """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
     name, _, rest = text.partition(":")
+    if "=" in name and "/" not in name:
+        raise BadInput(f"{option} {text}: expected NAME:PARAM=VALUE, with a colon after the name")
     found: dict[str, float] = {}
     for piece in rest.split(",") if rest else ():
         parameter, _, value = piece.partition("=")

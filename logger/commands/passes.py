@@ -20,6 +20,7 @@ from logger.api.outputs import check_out
 from logger.api.passes import ROUGH_M_PER_KM, USUAL
 from logger.commands.numbers import add_number
 from logger.commands.pictures import PAGE, parted, write_picture
+from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
 
 
@@ -36,10 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--above", 0.01, 100.0, "m/km", metavar="M_PER_KM", default=ROUGH_M_PER_KM,
                help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490.313)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
-                        help="write the means as .csv .geojson .gpkg .gpx .kml .parquet, or a page with map and curves "
-                             "(.html) or picture (.png .svg .pdf); once for each")
+                        help=f"write the means as {table_endings()}, or a page with map and curves (.html) or picture "
+                             "(.png .svg .pdf); once for each")
     parser.add_argument("--visit", metavar="FILE", type=Path,
-                        help="write the places to visit: waypoints (.gpx), table (.csv), map (.geojson .kml .gpkg)")
+                        help="write the places to visit: waypoints (.gpx), or one of --out's other endings")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import replace_bytes
 from logger.printable import counted
+from logger.report.drawing import ENDINGS
 from logger.report.maps import Way
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
@@ -37,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog report``."""
     _check_tiles(args.tiles)
+    if args.out.suffix.lower() in ENDINGS:
+        raise BadInput(f"--out {args.out}: expected the name of a web page, such as {args.out.stem}.html")
     base = [] if args.base is None else [Way("", *line) for line in read_road_lines(args.base)]
     files = write_report(find_logs_in(args.logs), args.out, base=base,
                          base_name="" if args.base is None else args.base.name, tiles_from=args.tiles)

@@ -22,6 +22,7 @@ from logger.api.outputs import check_out
 from logger.api.sections import SYSTEMS
 from logger.commands.numbers import add_number
 from logger.commands.pictures import parted, write_picture
+from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
 
 _USUAL = "100m"
@@ -39,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                help="list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)")
     parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
-                        help="write the sections as .csv .geojson .gpkg .gpx .kml .parquet (in SI units), or a page or "
-                             "picture of them (.html .png .svg .pdf); once for each")
+                        help=f"write the sections as {table_endings()} (in SI units), or a page or picture of them "
+                             "(.html .png .svg .pdf); once for each")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

@@ -43,7 +43,13 @@ WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", 
 OUTPUTS = ("wheels", "travel", "tires", "body")
 
 
+USAGE = """ridelog simulate --vehicle NAME|FILE (--profile FILE | --flat M | --excitation FILE)
+                        (--speed MPS | --speed-file FILE) --out FILE [OPTIONS]
+       ridelog simulate --list-effects [--json]"""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.usage = USAGE
     parser.add_argument("--vehicle", metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     road = parser.add_mutually_exclusive_group()

@@ -14,6 +14,10 @@ Geometry = tuple[Line, ...]
 """Lines in the order driven; a line of one place is a point; nothing where no place is known."""
 
 
+DECIMALS = 6
+"""Of a degree in files of text: 0.1 m (RFC 7946, section 11.2)."""
+
+
 def half_way(one: Place, other: Place) -> Place:
     """The middle between two near places."""
     return _wrapped(one[0] + east_deg(one[0], other[0]) / 2), (one[1] + other[1]) / 2

@@ -50,8 +50,8 @@ def _axis_json(figures: AxisFigures) -> dict[str, Any]:
 
 
 def _word(result: RideComfort, a_w_mps2: float) -> str | None:
-    """Table 2.5 has no words for motion sickness."""
-    return None if result.weighting.is_sickness else comfort_word(a_w_mps2)
+    """None where the words for comfort are not of such a value."""
+    return comfort_word(a_w_mps2) if result.weighting.comfort_words else None
 
 
 def _sickness_dose(figures: AxisFigures) -> float:
@@ -123,6 +123,8 @@ def _conclusions(result: RideComfort) -> list[str]:
     lines = []
     if result.weighting.is_sickness:
         lines.append(f"Motion sickness dose: {_sickness_dose(result.vertical):.3f} m/s1.5.")
+    elif not result.weighting.comfort_words:
+        lines.append(f"Comfort: {result.weighting.name.capitalize()} is not a weighting of comfort.")
     elif len(result.axes) > 1:
         totals = _totals(result)
         lines.append(f"Feels {_spoken(totals['total_comfort'])}: {totals['total_a_w_mps2']:.3f} m/s2 over three axes.")

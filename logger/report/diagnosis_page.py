@@ -86,9 +86,10 @@ def _candidates(found: Diagnosis) -> Html:
     bars = Bars("The error with each candidate", "error", tuple(
         (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
         (found.baseline_error, "as it stands"))
-    return (chart(bars) + grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
-            + hint("Each tried alone on the model of its round, those that are missing first, then the least likely to "
-                   f"be chance. The error is on {JUDGED_ON}; the chance holds for all candidates together."))
+    return (chart(bars) + grid(("Effect", "Error", "p-value", "Numbers"), table(found), words=(0, 3))
+            + hint("One effect at a time on the model of its round, those that are missing first, then by p-value: how "
+                   "probable it is that noise looks like any of the candidates. The error is on "
+                   f"{JUDGED_ON}."))
 
 
 def car_sections(found: Diagnosis) -> Html:

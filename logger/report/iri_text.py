@@ -33,6 +33,12 @@ def unit_doubt(result: ProfileIri) -> str:
         f"Elevation in mm? An IRI of {iri:.4g} m/km is more than any road has; expected elevation_m in metres.")
 
 
+def _cut_short(result: ProfileIri) -> list[str]:
+    """What is to be said of a profile that no window fits into."""
+    return ["The profile is shorter than one window (--window): its IRI is of all there is.", ""] if (
+        all(window.partial for window in result.windows)) else []
+
+
 def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
     whole = result.row(0)
@@ -46,7 +52,7 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     printed += [
         "", ", ".join(f"{_HEADS[key]} {value:.3f}" for key, value in whole.items()) + " m/km",
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
-        f"Ride: {ride_words(roughness)}", "",
+        f"Ride: {ride_words(roughness)}", "", *_cut_short(result),
         f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + "  m/km",
     ]
     for number, window in enumerate(result.windows, start=1):

@@ -174,7 +174,7 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
 def _tests(found: Comparison) -> Html:
     rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error), _chance(test.p_value),
              "found" if test in found.tests_found else "") for test in found.tests.tests]
-    return section("All tests of the residual", grid(("Test", "Value", "Standard error", "Chance in noise", ""), rows,
+    return section("All tests of the residual", grid(("Test", "Value", "Standard error", "p-value", ""), rows,
                                                                 words=(0, 4))
                    + hint("A test is found when it is improbable in noise and large enough to matter."))
 

@@ -60,9 +60,9 @@ def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:
     shown = [paragraphs(summary(found))]
     if described := looks_like(found):
         shown += ["", "What it looks like:", paragraphs(described, "- ")]
-    rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
+    rows = [("Effect", "Error", "p-value", "Numbers"), *table(found, most)]
     more = len(found.candidates) - len(rows) + 1
-    shown += ["", "Each tried by itself, those of the verdict first, then the least likely to be chance:",
+    shown += ["", "One effect at a time, those of the verdict first; p-values are for all candidates together:",
               *columns(rows)]
     if more > 0:
         shown.append(f"and {more} more (ridelog diagnose --all)")

@@ -62,10 +62,10 @@ def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:
 
 
 def chance(p_value: float) -> str:
-    """How probable, for a sentence."""
+    """A probability, such as a p-value."""
     if p_value < _RARE:
         return "below 1e-9"
-    return f"{p_value:.2g}" if p_value < 0.1 else f"{p_value:.0%}"
+    return f"{p_value:.2g}"
 
 
 def percent(share: float) -> str:

@@ -147,13 +147,11 @@ def _side(curve: Curve, both: str) -> str:
 def _ends(curve: Curve, factor: float, unit: str) -> str:
     """What a curve does to body and wheel at both its ends."""
     words = []
-    for index, way in ((0, "compression"), (-1, "extension")):
+    for index, side in ((0, "compression"), (-1, "extension")):
         force, error = float(curve.force_n[index]), float(curve.error_n[index])
-        size = (f"{abs(force):.0f} ± {error:.0f} N {'pulling' if force > 0 else 'pushing'} body and wheel "
-                f"{'together' if force > 0 else 'apart'}")
-        words.append(f"{size if abs(force) > 2 * error else 'about zero'} at {abs(curve.at[index]) * factor:.2g} "
-                     f"{unit} of {way}")
-    return " and ".join(words)
+        size = f"{force:+.0f} ± {error:.0f} N" if abs(force) > 2 * error else "about zero"
+        words.append(f"{size} at {abs(curve.at[index]) * factor:.2g} {unit} of {side}")
+    return f"{' and '.join(words)} (positive pulls body and wheel together)"
 
 
 def _direction(test: ResidualTest, share: float, damping: float) -> str:

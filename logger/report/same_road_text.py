@@ -57,14 +57,16 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
 
 def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
     """What a person reads; ``most`` so many candidates, None: all."""
-    rows = [("Effect", "Error", "Chance", "Numbers")]
+    rows = [("Effect", "Error", "p-value", "Numbers")]
     rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
               numbers_of(one.one)) for one in found.candidates[:most]]
     by_run = [("Run", "Error before", "after"),
               *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
                 zip(runs, found.by_run, strict=True))]
-    return [paragraphs(summary(found)), "", "Each tried by itself, those that are missing first:", *columns(rows), "",
-            *columns(by_run), "", "What these drives cannot tell:", paragraphs(cannot_tell(found), "- ")]
+    return [paragraphs(summary(found)), "",
+            "One effect at a time, those that are missing first; p-values are for all candidates together:",
+            *columns(rows), "", *columns(by_run), "",
+            "What these drives cannot tell:", paragraphs(cannot_tell(found), "- ")]
 
 
 def as_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.errors import did_you_mean
 from logger.vehicle.vehicle import Axle, Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -197,4 +198,5 @@ def _axle(vehicle: Vehicle, name: str) -> Axle:
 
 def _check(vehicle: Vehicle, name: str) -> None:
     if name not in (known := _names(vehicle)):
-        raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}")
+        raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}"
+                         f"{did_you_mean(name, known)}")

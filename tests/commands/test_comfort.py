@@ -128,7 +128,7 @@ def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pyte
 @pytest.mark.parametrize(
     ("arguments", "rate_hz", "seconds", "complaint"),
     [
-        (["--weighting", "wx"], 100, 2, f"expected one of {WEIGHTINGS}, found 'wx'"),
+        (["--weighting", "wx"], 100, 2, f"weighting 'wx': expected one of {WEIGHTINGS}"),
         (["--daily-hours", "25"], 100, 2, "at most 24 hours, found 25"),
         (["--daily-hours", "nan"], 100, 2, "at most 24 hours, found nan"),
         ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50"),

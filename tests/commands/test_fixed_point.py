@@ -116,7 +116,7 @@ def test_json_names_files_and_scales(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
-    (["--weighting", "wx"], r"--weighting wx: expected one of .*wk"),
+    (["--weighting", "wx"], r"weighting 'wx': expected one of .*wk"),
     (["--rate", "50"], r"--rate 50: .*from 80 Hz"),
     (["--spacing", "0.5"], r"--spacing 0.5: expected samples at most 0.3 m"),
     (["--spacing", "0.001"], r"--spacing 0.001: expected sections that 32-bit coefficients can hold"),

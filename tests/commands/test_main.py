@@ -17,7 +17,7 @@ from logger.errors import BadInput, CheckFailed
 def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file() -> None:
     files = {module.name for module in pkgutil.iter_modules(logger.commands.__path__)}
     helpers = {"main", "lab_runs", "diagnose_same_road", "lab_model", "demo_lab", "demo_field", "numbers",
-               "record_options", "pictures"}
+               "record_options", "pictures", "table_files"}
     assert files - helpers == {verb.replace("-", "_") for verb in main.VERBS}
 
 

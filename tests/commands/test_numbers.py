@@ -7,7 +7,7 @@ from math import inf
 
 import pytest
 
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_number, named_numbers
 from logger.errors import BadInput
 
 
@@ -34,8 +34,13 @@ def test_others_are_refused_by_name(parser: argparse.ArgumentParser, arguments: 
         parser.parse_args(arguments)
 
 
-def test_what_is_no_number_is_said_as_argparse_says_it(parser: argparse.ArgumentParser) -> None:
-    with pytest.raises(argparse.ArgumentError, match="argument --rate: invalid float value: 'fast'"):
-        parser.parse_args(["--rate", "fast"])
-    with pytest.raises(argparse.ArgumentError, match=r"argument --tries: invalid int value: '1\.5'"):
+def test_what_is_no_number_is_said_with_the_unit(parser: argparse.ArgumentParser) -> None:
+    with pytest.raises(BadInput, match=r"^--rate 30mph: expected a number in Hz, without its unit$"):
+        parser.parse_args(["--rate", "30mph"])
+    with pytest.raises(BadInput, match=r"^--tries 1\.5: expected a whole number, without its unit$"):
         parser.parse_args(["--tries", "1.5"])
+
+
+def test_an_equals_sign_in_place_of_the_colon_is_told() -> None:
+    with pytest.raises(BadInput, match="--effect dry_friction=3: expected NAME:PARAM=VALUE"):
+        named_numbers("dry_friction=3", "--effect")

@@ -296,7 +296,7 @@ def test_a_half_car_that_rolls_has_four_wheels(folder: Path) -> None:
 def test_an_effect_of_ones_own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As docs/own-effect.md has it, on the command line and in the vehicle's file."""
     page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
-    (folder / "quadratic_damping.py").write_text(page.split("```python\n")[1].split("```")[0])
+    (folder / "my_orifice.py").write_text(page.split("```python\n")[1].split("```")[0])
     monkeypatch.chdir(folder)
     command = page.split("    ridelog simulate ")[1].split("drive.csv")[0].replace("\\\n", " ").split()
     assert main(["simulate", *command, "asked.csv"]) == 0

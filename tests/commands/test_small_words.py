@@ -23,6 +23,35 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
         main(["vehicle"])
     assert "did you mean" not in capsys.readouterr().err
     assert did_you_mean("zzz", ["report"]) == ""
+    assert did_you_mean("friction", ["dry_friction", "tire_damping"]) == "; did you mean dry_friction?"
+    masses = ["sprung_mass_kg", "front.unsprung_mass_kg", "pitch_inertia_kg_m2"]
+    assert did_you_mean("mass", masses) == "; did you mean sprung_mass_kg or front.unsprung_mass_kg?"
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["iri", "p.csv", "--window", "3ft"], "--window 3ft: expected a number (try"),
+    (["iri", "p.csv", "--windows", "3"], "expected no --windows 3 (try"),
+    (["sections", "logs", "--units", "uk"], "--units uk: expected one of 'si', 'us' (try"),
+    (["convert", "logs"], "expected --to as well (try"),
+])
+def test_wrong_use_is_said_as_everything_else(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert f"ridelog {arguments[0]}: {said}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("command", "header", "said"), [
+    ("iri", "t_s,accel_z_mps2,speed_mps,distance_m", "; this is a drive: ridelog estimate takes it"),
+    ("iri", "t_s,accel_z_mps2", "; this is an acceleration record: ridelog comfort takes it"),
+    ("comfort", "distance_m,elevation_m", "; this is a profile: ridelog iri takes it"),
+])
+def test_a_file_of_another_command_is_recognised(command: str, header: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text(header + "\n" + ",".join("0" for _ in header.split(",")) + "\n")
+    with pytest.raises(BadInput) as caught:
+        main([command, str(tmp_path / "one.csv")])
+    assert str(caught.value).endswith(said)
 
 
 def test_settings_name_the_key_and_guess_it(tmp_path: Path) -> None:

@@ -44,6 +44,22 @@ def test_formula_gives_the_printed_factor(name: str, f_hz: str, text: str) -> No
     assert abs(1000 * abs(WEIGHTINGS[name].response(float(f_hz))) - float(text)) < 0.75 * last_digit
 
 
+@pytest.mark.parametrize("name", WEIGHTINGS)
+def test_formula_gives_the_factors_that_its_file_has_from_the_standard(name: str) -> None:
+    """Three of a table (ISO 2631-1 Tables 3 and 4), or the one of ISO 8041-1 Table 1, to three digits."""
+    printed = WEIGHTINGS[name].printed
+    assert len(printed) >= 3 or 15.915 in printed
+    for f_hz, factor in printed.items():
+        last_digit = 10.0 ** (np.floor(np.log10(factor)) - 2)
+        assert abs(abs(WEIGHTINGS[name].response(f_hz)) - factor) < 0.75 * last_digit, f_hz
+
+
+def test_a_part_without_its_quality_factor_is_refused() -> None:
+    for missing in ({"f4_hz": 2.0}, {"f5_hz": 2.0, "f6_hz": 3.0, "q6": 0.9}, {"f5_hz": 2.0, "q5": 0.9, "f6_hz": 3.0}):
+        with pytest.raises(ValueError, match=r"wx: expected q[456], as there is f[456]_hz"):
+            Weighting("wx", 0.4, 100.0, **missing)
+
+
 def closed_form(weighting: Weighting, f: np.ndarray) -> np.ndarray:
     """Magnitude by the right sides of Eq 2.13-2.16, f6 and Q6 in the denominator of the last."""
 
@@ -150,6 +166,7 @@ def test_each_says_itself_what_its_values_stand_for() -> None:
     assert {name: one.health_factor for name, one in WEIGHTINGS.items() if one.health_factor is not None} == {
         "wk": HEALTH_FACTORS[2], "wd": HEALTH_FACTORS[0]}
     assert [name for name, one in WEIGHTINGS.items() if one.is_sickness] == ["wf"]
+    assert [name for name, one in WEIGHTINGS.items() if not one.comfort_words] == ["we", "wf"]
     assert {name: one.counts_up_to_hz for name, one in WEIGHTINGS.items() if one.counts_up_to_hz != 80.0} == {"wf": 0.5}
     assert {name: one.horizontal for name, one in WEIGHTINGS.items() if one.horizontal} == {"wk": "wd"}
     assert all(one.horizontal in WEIGHTINGS for one in WEIGHTINGS.values() if one.horizontal)

@@ -330,4 +330,6 @@ def test_the_command_refuses_what_is_no_log(drive, tmp_path: Path) -> None:
     write_log(tmp_path / "00001-001.csv", drive(2))
     with pytest.raises(BadInput, match="expected a place where a page can be written"):
         main.main(["report", str(tmp_path), "--out", str(tmp_path / "no" / "p.html")])
-    assert not (tmp_path / "p.html").exists()
+    with pytest.raises(BadInput, match=r"--out .*p\.pdf: expected the name of a web page, such as p\.html"):
+        main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.pdf")])
+    assert not list(tmp_path.glob("p.*"))

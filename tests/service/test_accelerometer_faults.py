@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.accelerometers import accelerometers, adxl345, bma220, iio, pasco
+from drivers.accelerometers import accelerometers, adxl345, bma220, iio
 from drivers.chip_bus import ConfiguredChip
 from drivers.readings import AccelerationBlock
 
@@ -23,8 +23,12 @@ from ..support.accelerometer_promises import (
 )
 
 Patch = Callable[[pytest.MonkeyPatch, str], None]
-DECODERS = {"adxl345": adxl345.Adxl345Decoder, "bma220": bma220.Bma220Decoder, "iio": iio.IioDecoder,
-            "pasco": pasco.PascoDecoder}
+
+
+def decoder_of(name: str) -> Any:
+    """The class of an accelerometer's decoder."""
+    kind = accelerometers()[name]
+    return type(kind.decoder(kind.settings(), 2))
 
 
 @dataclass(frozen=True)
@@ -41,16 +45,16 @@ class Fault:
 def decoded(change: Callable[[AccelerationBlock], AccelerationBlock]) -> Patch:
     """Samples come out changed."""
     def plant(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-        take = DECODERS[name].take
-        monkeypatch.setattr(DECODERS[name], "take", lambda self: change(take(self)))
+        take = decoder_of(name).take
+        monkeypatch.setattr(decoder_of(name), "take", lambda self: change(take(self)))
     return plant
 
 
 def fed(change: Callable[[bytes], bytes]) -> Patch:
     """Bytes are read in another way."""
     def plant(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-        feed = DECODERS[name].feed
-        monkeypatch.setattr(DECODERS[name], "feed", lambda self, t_us, data: feed(self, t_us, change(data)))
+        feed = decoder_of(name).feed
+        monkeypatch.setattr(decoder_of(name), "feed", lambda self, t_us, data: feed(self, t_us, change(data)))
     return plant
 
 

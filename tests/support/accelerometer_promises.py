@@ -81,6 +81,7 @@ def samples_are_what_it_felt(name: str, settings: Any, folder: Path) -> None:
     state = ride.fake.state
     config = config_by_header(ride)
     block = ride.samples(config)
+    assert len(block) > 0
     since_s = (block.t_us - begin_us) / 1e6
     jolted, calm = (since_s > 4.1) & (since_s < 4.9), (since_s < 3.9) | (since_s > 5.1)
     assert block.clipped[jolted].all()

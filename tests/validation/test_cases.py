@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
+from logger.store.formats.effect_file import shipped_effects
+
 from .cases import random_case as cases
 from .cases.case_files import write_case
 from .cases.random_case import Hidden, case, draw_car, mistaken, with_effects, without
@@ -40,6 +42,7 @@ def rough_scene(seed: int) -> Scene:
 def test_the_list_is_the_contract_and_the_outsiders_are_not_on_it() -> None:
     assert len(EFFECTS) == 20
     assert len(ALL) == len(EFFECTS) + len(OUTSIDERS) + len(NEWCOMERS)
+    assert not (OUTSIDERS | NEWCOMERS).keys() & shipped_effects().keys(), "what ridelog ships is no outsider any more"
     assert all(near in EFFECTS for outsider in (OUTSIDERS | NEWCOMERS).values() for near in outsider.akin)
 
 

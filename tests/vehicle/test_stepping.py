@@ -205,7 +205,7 @@ def test_an_effect_of_ones_own_is_simulated_as_newton_says(tmp_path: Path) -> No
     """The example of docs/own-effect.md."""
     page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
     (tmp_path / "mine.py").write_text(page.split("```python\n")[1].split("```")[0])
-    mine = chosen(own_effect(tmp_path / "mine.py"), {"quadratic_damping_n_s2_per_m2": 2000})
+    mine = chosen(own_effect(tmp_path / "mine.py"), {"damping_n_s2_per_m2": 2000})
 
     def change(car: Newton) -> None:
         car.damper = lambda i, v: car.axles[i].suspension_damping_n_s_per_m * v + 2000 * v * abs(v)

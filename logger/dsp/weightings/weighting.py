@@ -1,7 +1,7 @@
-"""What a frequency weighting of ISO 2631-1 is: the standard's analog formula, and digital sections made from it.
+"""What a frequency weighting of vibration is: the analog formula of its standard, and digital sections made from it.
 
-Problem: the standard defines a weighting by poles and zeros in continuous time, one of them at 100 Hz, above half
-the rate of a 100 Hz record. The plain bilinear transform is several dB wrong there.
+Problem: a standard (ISO 2631-1, ISO 8041-1) defines a weighting by poles and zeros in continuous time, one of them at
+100 Hz, above half the rate of a 100 Hz record. The plain bilinear transform is several dB wrong there.
 
 Solution: the formula is kept as the truth, exactly as the standard writes it. A whole record is weighted by the formula
 itself, through its Fourier transform. A stream needs sections: fitted to the formula at the desk, for any rate, by
@@ -39,12 +39,15 @@ class Weighting:
     f5, q5       zeros of the upward step; f6, q6 its poles
     sections     per sample rate [Hz], digital sections within 0.02 dB of the formula, DELAY_SAMPLES behind it
     gain         factor over all
-    is_sickness  its values are of motion sickness: the words for comfort do not fit them (clause 9)
+    printed      per frequency [Hz], the factor that its standard prints: three or more, where it prints a table
+    comfort_words    ISO 2631-1's words for comfort (clause C.2.3) are said of its values
+    is_sickness  its values are of motion sickness, and have a dose (clause 9)
     health_factor    k of its axis for health (clause 7.2.3); None: it is none of health
     horizontal   name of the weighting of x and y that are combined with a z weighted by this one; empty: none are
     counts_up_to_hz    what lies above is no part of what it stands for (clause 1)
 
-    A part whose frequencies are infinite is absent (f3 alone infinite: a transition without zero). Source: ISO
+    A part whose frequencies are infinite is absent (f3 alone infinite: a transition without zero); one that is there
+    has a quality factor, else ValueError. Source: ISO
     2631-1:1997 Annex A; Eq 2.13-2.17 of Blum (2015). Eq 2.16 is misprinted there: the denominator of the upward step
     has f6 and Q6, as here.
     """
@@ -54,17 +57,24 @@ class Weighting:
     f2_hz: float
     f3_hz: float = math.inf
     f4_hz: float = math.inf
-    q4: float = 1.0
+    q4: float = math.nan
     f5_hz: float = math.inf
-    q5: float = 1.0
+    q5: float = math.nan
     f6_hz: float = math.inf
-    q6: float = 1.0
+    q6: float = math.nan
     sections: Mapping[int, Sections] = field(default_factory=dict)
     gain: float = 1.0
+    printed: Mapping[float, float] = field(default_factory=dict)
+    comfort_words: bool = False
     is_sickness: bool = False
     health_factor: float | None = None
     horizontal: str = ""
     counts_up_to_hz: float = 80.0
+
+    def __post_init__(self) -> None:
+        for number, pole_hz, q in ((4, self.f4_hz, self.q4), (5, self.f5_hz, self.q5), (6, self.f6_hz, self.q6)):
+            if math.isfinite(pole_hz) and not q > 0.0:
+                raise ValueError(f"{self.name}: expected q{number}, as there is f{number}_hz")
 
     def factors(self) -> tuple[tuple[Polynomial, Polynomial], ...]:
         """The weighting as a product of (numerator, denominator), polynomials in s [rad/s], highest power first.

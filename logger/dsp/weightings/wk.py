@@ -1,6 +1,6 @@
 """Wk: vertical vibration of people who sit or stand; the weighting of ride comfort.
 
-Source: ISO 2631-1:1997 Tables 1 and A.1; Table 2.7 of Blum (2015). The sections are what
+Source: ISO 2631-1:1997 Tables 1, 3 and A.1; Table 2.7 of Blum (2015). The sections are what
 ``logger.dsp.design.design_sections(WEIGHTING, 100)`` gives; a test designs them again.
 """
 
@@ -17,6 +17,8 @@ WEIGHTING = Weighting(
     q5=0.91,
     f6_hz=3.35,
     q6=0.91,
+    printed={0.5: 0.418, 4.0: 0.967, 31.5: 0.405},
+    comfort_words=True,
     health_factor=1.0,
     horizontal="wd",
     sections={

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from logger.exchange.format import Format
-from logger.exchange.geometry import Geometry, Line
+from logger.exchange.geometry import DECIMALS, Geometry, Line
 from logger.exchange.layer import Layer
 from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
-
-_DECIMALS = 6
 
 
 class GeoJson(Format):
@@ -39,7 +37,7 @@ def _geometry(geometry: Geometry) -> dict[str, Any] | None:
 
 
 def _places(line: Line) -> list[list[float]]:
-    return [[round(degrees, _DECIMALS) for degrees in place] for place in line]
+    return [[round(degrees, DECIMALS) for degrees in place] for place in line]
 
 
 FORMAT = GeoJson()

@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from logger.exchange.format import Format
+from logger.exchange.geometry import DECIMALS
 from logger.exchange.layer import Feature, Layer
 
 _SPACE = "urn:x-ridelog:values:1"
@@ -51,13 +52,14 @@ def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:
 
 def _waypoint(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
     lon_deg, lat_deg = middle
-    return (f'<wpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{_time(row)}<name>{escape(row.title)}</name>'
-            f"{_extensions(row, names)}</wpt>\n")
+    return (f'<wpt lat="{lat_deg:.{DECIMALS}f}" lon="{lon_deg:.{DECIMALS}f}">{_time(row)}'
+            f"<name>{escape(row.title)}</name>{_extensions(row, names)}</wpt>\n")
 
 
 def _point(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
     lon_deg, lat_deg = middle
-    return f'<trkpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{_time(row)}{_extensions(row, names)}</trkpt>\n'
+    return (f'<trkpt lat="{lat_deg:.{DECIMALS}f}" lon="{lon_deg:.{DECIMALS}f}">{_time(row)}{_extensions(row, names)}'
+            "</trkpt>\n")
 
 
 def _time(row: Feature) -> str:

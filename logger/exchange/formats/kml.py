@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 
 from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
 from logger.exchange.format import Format
-from logger.exchange.geometry import Geometry, Line
+from logger.exchange.geometry import DECIMALS, Geometry, Line
 from logger.exchange.layer import Feature, Layer
 from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
 from logger.roads.iso8608 import CLASS_GD_N0_CM3
@@ -66,7 +66,7 @@ def _line(line: Line) -> str:
 
 
 def _places(line: Line) -> str:
-    return f"<coordinates>{' '.join(f'{lon:.7f},{lat:.7f}' for lon, lat in line)}</coordinates>"
+    return f"<coordinates>{' '.join(f'{lon:.{DECIMALS}f},{lat:.{DECIMALS}f}' for lon, lat in line)}</coordinates>"
 
 
 FORMAT = Kml()

@@ -113,7 +113,7 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
     if _overlap(logs, stick / manifest.FOLDER):
         raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
                        f"{stick / manifest.FOLDER}")
-    with _folder(logs, "with the logs") as card, _folder(stick, "to copy to, such as a mounted stick") as root:
+    with _folder(stick, "to copy to, such as a mounted stick") as root, _folder(logs, "with the logs") as card:
         names = finished_files(card, dumps)
         try:
             identity = logger_identity(card)

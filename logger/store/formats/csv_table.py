@@ -31,6 +31,20 @@ _NUMBER = re.compile(rb"[ \t]*[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
+_TAKEN_BY = (
+    ({"accel_z_mps2", "distance_m"}, "a drive: ridelog estimate"),
+    ({"accel_z_mps2"}, "an acceleration record: ridelog comfort"),
+    ({"distance_m", "elevation_m"}, "a profile: ridelog iri"),
+)
+"""Columns of the files of the desk, what such a file is, and which command takes it alone."""
+
+
+def _taken_by(names: Names) -> str:
+    """What a file is that another command takes; nothing for other files."""
+    known = next((words for columns, words in _TAKEN_BY if columns <= set(names)), "")
+    return f"; this is {known} takes it" if known else ""
+
+
 def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None], header: str) -> tuple[Names, Array]:
     """The columns of a table that ``choose`` wants, and their numbers, (rows, columns), all finite, at least one row.
 
@@ -45,7 +59,7 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
     names = tuple(name.strip() for name in first.split(","))
     wanted = choose(names)
     if wanted is None:
-        raise BadInput(f"{file}:1: expected {header}, found {shown(first)}")
+        raise BadInput(f"{file}:1: expected {header}, found {shown(first)}{_taken_by(names)}")
     rows = data.count(b"\n")
     if rows == 0:
         raise BadInput(f"{file}:2: expected numbers below the header, found nothing")

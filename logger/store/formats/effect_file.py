@@ -37,7 +37,8 @@ def own_effect(path: Path) -> Effect:
     with blamed_on(path):
         effect = watched(look_through(effect), partial(blamed_on, path))
     if effect.name in shipped_effects():
-        raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}")
+        raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}; rename yours, "
+                       "or name ridelog's own without a file")
     return effect
 
 
@@ -50,7 +51,7 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
         return own_effect(Path(text)), text
     if text not in shipped_effects():
         raise BadInput(f"no effect {text!r}: expected one of {', '.join(shipped_effects())}, or a file of your own "
-                       "(with a / or .py in its name)")
+                       f"(with a / or .py in its name){did_you_mean(text, shipped_effects())}")
     return shipped_effects()[text], None
 
 

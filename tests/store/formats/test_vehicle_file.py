@@ -466,7 +466,7 @@ def test_complaints_about_the_history_name_the_line(tmp_path: Path, step: str, w
     ("EFFECT = AirDrag()", "EFFECT = 1 / 0", ":18: ZeroDivisionError: division by zero"),
     ("EFFECT = AirDrag()", "raise SystemExit(3)", ":18: SystemExit: 3"),
     ("EFFECT = AirDrag()", "EFFECT = )", ":18: expected Python, found unmatched ')'"),
-    ('"air_drag"', '"tire_damping"', ": expected a name that no effect of ridelog has, found 'tire_damping'"),
+    ('"air_drag"', '"tire_damping"', ": expected a name that no effect of ridelog has, found 'tire_damping'; rename"),
     ('"air_drag"', '"drag"', "car.yaml:22: expected 'drag', as EFFECT in"),
     ('"air_drag"', '"air-drag"', ": expected a name of letters, digits and _, found 'air-drag'"),
     ('source = "mine"', "", ": expected EFFECT to have a text 'source'"),
