@@ -53,15 +53,18 @@ class LocalRoughness:
         log_error[known] = self._known.log_error[number[known]]
         return RelativeVariance(variance, log_error)
 
-    def learn(self, first: int, innovations: Array, before: Array, gain: Array, seen: Array) -> None:
+    def learn(
+        self, first: int, innovations: Array, before: Array, gain: Array, seen: Array, taken: Array | float = 1.0
+    ) -> None:
         """Take what a solved block says.
 
         innovations    (n,) v at its points; n is even
         before         (n,) the d that it was solved with
         gain           (n // 2 + 1,) information over prior of each wave where d is 1
         seen           (n,) 1 where the road was read, else 0
+        taken          (n,) degrees of freedom that it takes there over their mean; 1 where readings are even
         """
-        resolved = np.interp(np.log(before), _LOG_TABLE, self._resolved_by_point(gain, len(before))) * seen
+        resolved = np.interp(np.log(before), _LOG_TABLE, self._resolved_by_point(gain, len(before))) * seen * taken
         power = self._smoothed(innovations**2 * seen)
         weight = self._smoothed(resolved)
         fresh = (_COMMON + power) / (_COMMON + weight)

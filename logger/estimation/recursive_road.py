@@ -182,21 +182,24 @@ class FollowedRoad:
 
         moving = block.moving & read
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
-        gain = solution.gain
+        gain, taken = solution.gain, np.ones(block.count)
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
             others = cavity(motion, variance)
             if moving.any():
                 gain = gain * (mean_variance / even_variance(motion, others[moving], variance[moving]))
+                # Sharp readings come where the road shook the car: what they show must be judged by what they can.
+                taken = block.about(np.where(moving, others / (others + variance), 0.0))
+                taken = taken / float(taken[seen > 0].mean())
 
         innovations = np.fft.irfft(solution.waves, block.count)
         resolved = mean_resolved(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
-        expected = sqrt(2 * float(resolved.sum()) / block.count)
-        white = np.clip(innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
+        most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count * taken)
+        white = np.clip(innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, resolved, block.wave_number_cpm, seen_share, before)
-        self._local.learn(first, innovations, local, gain, seen)
+        self._local.learn(first, innovations, local, gain, seen, taken)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
