@@ -43,6 +43,22 @@ class LocalRoughness:
         self._reach = _REACH_M / spacing_m
         self._first = 0
         self._known = RelativeVariance(np.empty(0), np.empty(0))
+        self._common = _COMMON
+        self._scatter = 2 / _COMMON
+
+    def _learnt_common(self, power, weight, gain, seen):
+        inside = seen > 0
+        if not inside.any() or not RATE: return self._common
+        count = len(power)
+        rho = np.fft.irfft(gain / (1 + gain), count)
+        neigh = np.fft.irfft(_neighbours(count, self._reach) ** 2, count)
+        chance = 2 * float(neigh @ rho**2)/ (rho[0] * neigh_sum(count, self._reach))**2
+        mean = float(weight[inside].mean())
+        off = power[inside] / np.maximum(weight[inside], 0.1 * mean) - 1
+        found = float(np.mean(off**2)) - chance
+        share = mean / neigh_sum(count, self._reach)
+        self._scatter += RATE * share * (min(max(found, -CAP), CAP) - self._scatter)
+        return 2 / min(max(self._scatter, FLOOR), 0.5)
 
     def at(self, first: int, count: int) -> RelativeVariance:
         """What is known of points ``first`` ... ``first + count - 1``."""
@@ -67,7 +83,8 @@ class LocalRoughness:
         resolved = np.interp(np.log(before), _LOG_TABLE, self._resolved_by_point(gain, len(before))) * seen * taken
         power = self._smoothed(innovations**2 * seen)
         weight = self._smoothed(resolved)
-        fresh = (_COMMON + power) / (_COMMON + weight)
+        self._common = self._learnt_common(power, weight, gain, seen)
+        fresh = (self._common + power) / (self._common + weight)
         log_new = _TAKEN_OVER * np.log(fresh) + (1 - _TAKEN_OVER) * np.log(before)
         log_new = np.where(self._smoothed(seen) > 0, np.clip(log_new, _SMALLEST_LOG, _LARGEST_LOG), 0.0)
         self._first = first
@@ -98,6 +115,12 @@ def _neighbours(count: int, reach: float) -> npt.NDArray[np.complex128]:
     """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
     lag = np.minimum(np.arange(count), count - np.arange(count))
     return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))
+
+
+RATE = 0.1
+CAP, FLOOR = 0.5, 0.02
+def neigh_sum(count, reach):
+    return float(_neighbours(count, reach)[0].real)
 
 
 def mean_resolved(gain: Array, variance: Array) -> Array:

@@ -90,6 +90,7 @@ class FollowedRoad:
         """Another drive begins: spectrum and noise are taken along, all that belongs to places is not."""
         self._begun = False
         self._gaussian: GaussianReadings | None = None
+        self._centre_mps2, self._accel_variance = 0.0, 0.0
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
@@ -138,11 +139,18 @@ class FollowedRoad:
         self._unscored += len(fresh)
         if self._gaussian is None:
             return
-        guess = first_guess(fresh.reading_mps2, self._sensor)
+        guess = self._expected_of(fresh)
         self._gaussian = GaussianReadings(
             np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
             np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
         )
+
+    def _expected_of(self, fresh: Samples) -> GaussianReadings:
+        """What readings say of accelerations of which no other tells yet: they go on as they were."""
+        centre = np.full(len(fresh), self._centre_mps2)
+        nothing = GaussianReadings(centre, np.full(len(fresh), np.inf))
+        low, high = bounds(fresh.reading_mps2, fresh.at_end, self._sensor.step_mps2)
+        return improved(nothing, low, high, centre, self._accel_variance, self._sensor)
 
     def take_off(self, change_mps2: Array) -> None:
         """From here on readings come with so much less (t,) of what is not the linear car's."""
@@ -186,6 +194,7 @@ class FollowedRoad:
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
             others = cavity(motion, variance)
+            self._centre_mps2, self._accel_variance = float(solution.drift_mps2[-1]), motion.variance
             if moving.any():
                 gain = gain * (mean_variance / even_variance(motion, others[moving], variance[moving]))
                 # Sharp readings come where the road shook the car: what they show must be judged by what they can.
