@@ -193,10 +193,12 @@ class FollowedRoad:
         gain, taken = solution.gain, np.ones(block.count)
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
-            others = cavity(motion, variance)
+            others, drift_variance = cavity(motion, variance), solution.drift_variance
             self._centre_mps2, self._accel_variance = float(solution.drift_mps2[-1]), motion.variance
             if moving.any():
-                gain = gain * (mean_variance / even_variance(motion, others[moving], variance[moving]))
+                even = even_variance(motion, others[moving], variance[moving])
+                gain = gain * (mean_variance / even)
+                drift_variance = solution.drift_variance * (even / mean_variance)
                 # Sharp readings come where the road shook the car: what they show must be judged by what they can.
                 taken = block.about(np.where(moving, others / (others + variance), 0.0))
                 taken = taken / float(taken[seen > 0].mean())
@@ -208,11 +210,11 @@ class FollowedRoad:
         white = np.clip(innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, resolved, block.wave_number_cpm, seen_share, before)
-        self._local.learn(first, innovations, local, gain, seen, taken)
+        self._local.learn(first, innovations, local, gain, seen, taken, self._is_coarse and learns and before is not None)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
-            self._gaussian = self._improved(readings, samples, read, solution, others, usable)
+            self._gaussian = self._improved(readings, samples, read, solution, others + drift_variance, usable)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())

@@ -47,6 +47,7 @@ class Solution:
     road         (k,) rfft of the elevations there [m]
     fitted_mps2  (t,) the readings that this road and the drift explain
     drift_mps2   (t,) the drift alone
+    drift_variance    (t,) that the readings leave of it, were the road known [(m/s2)2]
     gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
@@ -54,6 +55,7 @@ class Solution:
     road: ComplexArray
     fitted_mps2: Array
     drift_mps2: Array
+    drift_variance: Array
     gain: Array
 
 
@@ -162,7 +164,8 @@ class Block:
             unexplained = unexplained - step * weighed
             before = size
         drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
-        return Solution(waves, waves * factor, explained + drift, drift, gain)
+        drift_variance = ((self._grid.drift @ inner) * self._grid.drift).sum(axis=1)
+        return Solution(waves, waves * factor, explained + drift, drift, drift_variance, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
