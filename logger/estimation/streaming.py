@@ -365,7 +365,8 @@ class RoadEstimator:
         louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
-        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
+        misplaced_m = hypot(self._place_std_m, self._late_std_s * speed_mps)
+        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, misplaced_m)
         like_noise = iri.iri_m_per_km * self._road.scale_log_std
         iri = replace(iri, shared_std_m_per_km=hypot(iri.shared_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)
