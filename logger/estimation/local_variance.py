@@ -108,11 +108,12 @@ class LocalRoughness:
         return share
 
     def _log_error(self, log_variance: Array, weight: Array, seen: npt.NDArray[np.bool_]) -> Array:
-        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); s is seen shrunk by the common points."""
+        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); where s is not learnt, it is seen shrunk by
+        the common points."""
         if not seen.any():
             return np.zeros(len(weight))
-        shrunk = float(np.mean(weight[seen] / (weight[seen] + self._common)))
-        scatter = float(np.var(log_variance[seen])) / max(shrunk, 0.1) ** 2
+        shrunk = float(np.mean(weight[seen] / (weight[seen] + _COMMON)))
+        scatter = 2 / self._common if self._heard else float(np.var(log_variance[seen])) / max(shrunk, 0.1) ** 2
         error: Array = 1 / (1 / np.clip(scatter, _LEAST_SCATTER, _LARGEST_SCATTER) + 0.5 * weight)
         return error
 
