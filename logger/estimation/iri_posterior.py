@@ -118,7 +118,7 @@ class WindowIri:
     """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
     ``shared`` with neighbours.
 
-    change_per_m    how much the IRI of a window a metre further on is higher [m/km per m]
+    change_per_m    how much the IRI of a window further on is higher, over the way that it may be misplaced [m/km per m]
     """
 
     iri_m_per_km: float
@@ -134,6 +134,7 @@ def window_iri(
     louder: SlopeKnowledge,
     log_level_std: float,
     length_m: float,
+    misplaced_m: float = 0.0,
 ) -> WindowIri:
     """IRI of the window whose estimated slopes are given from edge to edge.
 
@@ -143,6 +144,7 @@ def window_iri(
     louder           the same for the ``raised`` spectrum
     log_level_std    standard error of the road's log level
     length_m         of the window [m]
+    misplaced_m      standard error of its place [m]
     """
     weight = np.full(len(slope), 1 / (len(slope) - 1))
     weight[[0, -1]] *= 0.5
@@ -154,7 +156,9 @@ def window_iri(
     stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
     shared = hypot((more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std)
-    change = float(absolute[-1] - absolute[0]) / length_m
+    # A window that lies further on loses as much way as it gains: what it changes by is the mean over that way.
+    ends = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
+    change = float(absolute[-ends:].mean() - absolute[:ends].mean()) / length_m
     return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * shared, PER_KM * change)
 
 

@@ -20,7 +20,7 @@ UNKNOWN_LOG_STD = 1.0
 """Of a noise that was only guessed: by a factor of e up or down."""
 # However long the drive: what road and car do that the model does not know, and how rough the propagation is where the
 # noise does not blur the steps, as found on drives of known noise (tests/benchmarks/noise.py).
-_MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 0.0065
+_MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 5e-4
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
 _FORGOTTEN_PER_STRETCH = 0.005
 _FORGOTTEN_PER_LOG = 5.0  # what was learnt of another noise is no longer quite true of this one
@@ -154,7 +154,7 @@ class NoiseLearner:
         """What is believed now."""
         if not self._stretches:
             return NoiseBelief(self._mean, self._std)
-        std = hypot(self._std, _MODEL_LOG_STD, _ROUGH_LOG_STD * (self._step_mps2 / exp(self._mean)) ** 2)
+        std = hypot(self._std, _MODEL_LOG_STD, _ROUGH_LOG_STD * (self._step_mps2 / exp(self._mean)) ** 3)
         return NoiseBelief(self._mean, min(std, UNKNOWN_LOG_STD))
 
 

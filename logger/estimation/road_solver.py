@@ -47,6 +47,7 @@ class Solution:
     road         (k,) rfft of the elevations there [m]
     fitted_mps2  (t,) the readings that this road and the drift explain
     drift_mps2   (t,) the drift alone
+    drift_variance    (t,) that the readings leave of it, were the road known [(m/s2)2]
     gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
@@ -54,6 +55,7 @@ class Solution:
     road: ComplexArray
     fitted_mps2: Array
     drift_mps2: Array
+    drift_variance: Array
     gain: Array
 
 
@@ -65,6 +67,10 @@ class TimeGrid:
         self.car = car
         self.rate_hz = rate_hz
         self.by_axle = car.by_axle(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
+        in_a_step = np.zeros_like(self.by_axle)
+        in_a_step[:, 1:] = self.by_axle[:, 1:] / np.arange(1, self.by_axle.shape[1])
+        power = np.fft.irfft(1j * in_a_step) ** 2
+        self.step_power = np.fft.rfft(power / power.sum(axis=1, keepdims=True))
         half_waves = np.arange(1, int(2 * _DRIFT_BELOW_HZ * count / rate_hz) + 1)
         phase = pi * half_waves * (np.arange(count)[:, None] + 0.5) / count
         self.drift = np.hstack([np.ones((count, 1)), np.cos(phase)])
@@ -158,7 +164,8 @@ class Block:
             unexplained = unexplained - step * weighed
             before = size
         drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
-        return Solution(waves, waves * factor, explained + drift, drift, gain)
+        drift_variance = ((self._grid.drift @ inner) * self._grid.drift).sum(axis=1)
+        return Solution(waves, waves * factor, explained + drift, drift, drift_variance, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
@@ -210,6 +217,16 @@ class Block:
     def seen_points(self, read: npt.NDArray[np.bool_]) -> int:
         """How many points of the distance grid the car passed while there were readings."""
         return int(np.diff(self._front, append=self._front[-1])[read].sum())
+
+    def about(self, row: Array) -> Array:
+        """Mean (count,) of a row (t,) over the readings that show a step of the road at each point, as much as they do
+        with either axle; between the nearest where none does."""
+        back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.step_power), len(row))
+        points = self._points.ravel()
+        weight = np.bincount(points, self._shares.ravel(), self.count)
+        total = np.bincount(points, (self._shares * back).ravel(), self.count)
+        passed = np.flatnonzero(weight)
+        return np.interp(np.arange(self.count), passed, total[passed] / weight[passed])
 
     def driven(self, road: ComplexArray) -> Array:
         """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""

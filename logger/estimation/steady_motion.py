@@ -21,6 +21,11 @@ class SteadyMotion:
     psd: Array
     rate_hz: float
 
+    @property
+    def variance(self) -> float:
+        """Of the acceleration before anything is read [(m/s2)2]."""
+        return float(self.psd.mean()) * self.rate_hz / 2
+
     def remaining_variance(self, variance: float) -> float:
         """Variance that is left of each acceleration [(m/s2)2]."""
         return float(self._left_psd(variance).mean()) * self.rate_hz / 2

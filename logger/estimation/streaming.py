@@ -298,7 +298,8 @@ class RoadEstimator:
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
                 if weighted is not None:
                     log_std = self.noise.log_std if self.noise is not None else 0.0
-                    place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std)
+                    place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std,
+                                      self._road.scale_log_std)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
@@ -364,7 +365,10 @@ class RoadEstimator:
         louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
-        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
+        misplaced_m = hypot(self._place_std_m, self._late_std_s * speed_mps)
+        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, misplaced_m)
+        like_noise = iri.iri_m_per_km * self._road.scale_log_std
+        iri = replace(iri, shared_std_m_per_km=hypot(iri.shared_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:

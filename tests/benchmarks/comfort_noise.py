@@ -168,7 +168,7 @@ def drives(
         turns = ENGINE_HZ / GRID_HZ * np.arange(len(drive.accel_mps2))
         engine = engine_mps2 * np.sqrt(2) * np.sin(2 * np.pi * turns)
         drive = replace(drive, accel_mps2=drive.accel_mps2 + engine)
-        guess = NoiseBelief.guessed(ASSUMED_MPS2, step) if learns else None
+        guess = NoiseBelief.guessed(ASSUMED_MPS2) if learns else None
         believed = Sensor(guess.noise_rms_mps2 if guess else reported or noise, step)
         parts.append(driven(drive, chip, believed, guess, 1000 * mph + 10 * range_g + number))
     return pooled(parts)

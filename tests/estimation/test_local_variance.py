@@ -188,3 +188,41 @@ def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
     tolerance = 1e-12 if np.ptp(variance) == 0 else 2e-3
     assert mean_resolved(gain, variance) == pytest.approx(direct, abs=tolerance)
     assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
+
+
+def scatter_of_what_is_learnt(true_variance: np.ndarray, learns: bool) -> float:
+    """Of log d over the road that was read, mean over the last of twelve drives."""
+    block, _, seen = a_block()
+    rng = np.random.default_rng(5)
+    local = LocalRoughness(SPACING_M)
+    found = []
+    for drive in range(12):
+        reading, start = read(true_variance, rng), None
+        for turn in range(4):
+            variance = local.at(0, block.count).variance if turn else np.ones(block.count)
+            solution = block.solve(reading, weights(), ROAD, variance, 12, start)
+            start = solution.waves
+            local.learn(0, np.fft.irfft(start, block.count), variance, solution.gain, seen.astype(float), 1.0,
+                        learns and turn == 3)
+        if drive > 8:
+            found.append(np.log(local.at(0, block.count).variance[seen]).std())
+    return float(np.mean(found))
+
+
+def test_that_a_road_is_gaussian_is_learnt_and_that_it_is_patchy_is_kept() -> None:
+    block, _, _ = a_block()
+    even = np.ones(block.count)
+    patchy = np.where(np.arange(block.count) // 60 % 3 == 0, 6.0, 1.0)
+    assert scatter_of_what_is_learnt(even, learns=True) < 0.5 * scatter_of_what_is_learnt(even, learns=False)
+    assert scatter_of_what_is_learnt(patchy, learns=True) > 0.9 * scatter_of_what_is_learnt(patchy, learns=False)
+
+
+def test_what_readings_are_about_a_point_is_weighed_as_its_innovation_shows_in_them() -> None:
+    block, matrix, seen = a_block()
+    lag = np.arange(COUNT)[:, None] - np.arange(COUNT)
+    row = np.exp(-0.5 * (lag / 30) ** 2) @ np.random.default_rng(6).standard_normal(COUNT)
+    power = matrix**2
+    exact = (row @ power / power.sum(axis=0))[seen]
+    inner = slice(60, -60)
+    assert np.corrcoef(block.about(row)[seen][inner], exact[inner])[0, 1] > 0.97
+    assert block.about(np.full(COUNT, 0.3)) == pytest.approx(np.full(block.count, 0.3))

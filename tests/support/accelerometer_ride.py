@@ -25,11 +25,15 @@ from .faults.sensors import epoch
 SPEED_MPS = 12.0
 
 
+ROUGH_TONES_HZ = (1.3, 3.7, 7.1, 11.9)
+ROUGH_MPS2 = 1.2
+
+
 def rough(t_us: int) -> Vector:
     """A road of some tones, larger than a step of any sensor here, and gravity."""
     t_s = t_us / 1e6
-    up = sum(np.sin(2 * np.pi * f_hz * t_s + f_hz) for f_hz in (1.3, 3.7, 7.1, 11.9))
-    return np.array([0.3 * np.sin(t_s), 0.2 * np.cos(3 * t_s), 9.80665 + 1.2 * up])
+    up = sum(np.sin(2 * np.pi * f_hz * t_s + f_hz) for f_hz in ROUGH_TONES_HZ)
+    return np.array([0.3 * np.sin(t_s), 0.2 * np.cos(3 * t_s), 9.80665 + ROUGH_MPS2 * up])
 
 
 def core_of(config: Config) -> tuple[EventCore, Rows]:
