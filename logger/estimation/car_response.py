@@ -9,6 +9,7 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.road_spectrum import log_waves
 from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
 from logger.vehicle.frequency_response import frequency_response
 from logger.vehicle.linear_car import LinearCar
@@ -22,6 +23,7 @@ ComplexArray = npt.NDArray[np.complex128]
 HIGHEST_HZ = 42.0  # recorders pass less from here on
 _SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
 WAVE_NUMBERS_CPM = np.geomspace(0.004, 3.3, 300)
+LOG_WAVES = log_waves(WAVE_NUMBERS_CPM)
 WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBERS_CPM[0])
 
 

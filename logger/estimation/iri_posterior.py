@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.car_response import (
+    LOG_WAVES,
     WAVE_NUMBER_STEPS_CPM,
     WAVE_NUMBERS_CPM,
     CarResponse,
@@ -41,7 +42,7 @@ def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> floa
 
 def resolved_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
     """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings resolve."""
-    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+    signal = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES)
     return signal / (signal + noise_psd)
 
 
@@ -51,7 +52,7 @@ def vehicle_error_variance(
     """White noise of readings that costs the IRI as much as a model whose axles' gains are each off by a share
     ``vehicle_error`` [(m/s2)2], or whose numbers are off by their standard errors where that is more: the error's
     density over wave numbers, weighted as the IRI weights them."""
-    road = spectrum.psd(WAVE_NUMBERS_CPM)
+    road = spectrum.psd_of(LOG_WAVES)
     weight = _SLOPE_POWER * road
     off = vehicle_error**2 * car.power_apart(speed_mps)
     if not car.is_exact:
@@ -63,9 +64,14 @@ def vehicle_error_variance(
 def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
                   ) -> SteadyMotion:
     """What such a road makes of the car, at the frequencies of ``count`` readings (even)."""
-    per_hz = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM) / speed_mps
-    f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+    per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
+    f_hz = _frequencies_hz(count, rate_hz)
     return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
+
+
+@lru_cache(maxsize=4)
+def _frequencies_hz(count: int, rate_hz: float) -> Array:
+    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ class SlopeErrors:
 
     def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
         """For readings of this variance [(m/s2)2] at this speed [m/s]."""
-        prior = _SLOPE_POWER * spectrum.psd(WAVE_NUMBERS_CPM)
+        prior = _SLOPE_POWER * spectrum.psd_of(LOG_WAVES)
         resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
         left = (prior * (1 - resolved)) @ self._waves
         return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0],

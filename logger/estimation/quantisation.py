@@ -81,11 +81,12 @@ def cavity(motion: SteadyMotion, variance: Array) -> Array:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
 
     trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    whole = np.array([1 / motion.remaining_variance(trial) for trial in trials.tolist()])
-    log_others = -np.log(np.maximum(whole - 1 / trials, _LEAST_OTHERS / trials))
+    log_trials = np.log(trials)
+    # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
+    log_others = log_trials - np.log(np.maximum(1 / motion.resolved_per_reading(trials) - 1, _LEAST_OTHERS))
     even = 1 / mean(1 / variance)
     for _ in range(_EVENING_ROUNDS):
-        others = np.exp(np.interp(np.log(even), np.log(trials), log_others))
+        others = np.exp(np.interp(np.log(even), log_trials, log_others))
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
     return others
 
@@ -95,8 +96,8 @@ def even_variance(motion: SteadyMotion, others: Array, variance: Array) -> float
     each, the share that it has in what is known of its own acceleration."""
     taken = float((others / (others + variance)).mean())
     trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    by_trial = [motion.resolved_per_reading(trial) for trial in trials.tolist()]
-    return float(np.exp(np.interp(-taken, -np.array(by_trial), np.log(trials))))
+    by_trial = motion.resolved_per_reading(trials)
+    return float(np.exp(np.interp(-taken, -by_trial, np.log(trials))))
 
 
 def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
