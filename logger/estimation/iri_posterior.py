@@ -24,6 +24,7 @@ from logger.estimation.car_response import (
     golden_car_slope,
 )
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
+from logger.estimation.road_solver import quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.steady_motion import SteadyMotion
 from logger.roads.iri import PER_KM
@@ -176,11 +177,11 @@ def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:
 
 def unseen_share(seen: Array, spacing_m: float) -> Array:
     """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0."""
-    memory = _memory(spacing_m)
-    missing = np.concatenate([np.ones(len(memory)), 1.0 - seen])
-    length = len(missing) + len(memory)
-    share = np.fft.irfft(np.fft.rfft(missing, length) * np.fft.rfft(memory, length), length)
-    return np.clip(share[len(memory): len(missing)], 0.0, 1.0)
+    behind = len(_memory(spacing_m))
+    missing = np.concatenate([np.ones(behind), 1.0 - seen])
+    length = quick_fft_length(behind + len(missing))
+    share = np.fft.irfft(np.fft.rfft(missing, length) * _memory_waves(spacing_m, length), length)
+    return np.clip(share[behind: len(missing)], 0.0, 1.0)
 
 
 @lru_cache(maxsize=4)
@@ -197,3 +198,9 @@ def _memory(spacing_m: float) -> Array:
     power = np.fft.irfft(per_slope, count)[: count // 2] ** 2
     memory: Array = power / power.sum()
     return memory
+
+
+@lru_cache(maxsize=32)
+def _memory_waves(spacing_m: float, length: int) -> npt.NDArray[np.complex128]:
+    """Its rfft over so many points; kept, for there are few such numbers."""
+    return np.asarray(np.fft.rfft(_memory(spacing_m), length))

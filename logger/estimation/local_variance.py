@@ -73,7 +73,8 @@ class LocalRoughness:
     def _resolved_by_point(self, gain: Array, count: int) -> Array:
         """Share of a point's innovation that the readings resolve, for each d of the table: the mean over all waves."""
         strength = np.exp(_LOG_TABLE)[:, None] * gain
-        share: Array = (strength / (1 + strength)).sum(axis=1) * 2 / count
+        strength /= 1 + strength
+        share: Array = strength.sum(axis=1) * 2 / count
         return share
 
     def _log_error(self, log_variance: Array, weight: Array, seen: npt.NDArray[np.bool_]) -> Array:

@@ -87,10 +87,11 @@ def variance_of_mean_absolute(mean: Array, deviation: Array, correlation: Array,
     second = sqrt(2) * deviation * density(u)
     whole = mean**2 + deviation**2 - (sqrt(2) * second + u * first) ** 2  # its mean is as in mean_absolute
     third = np.sqrt(np.maximum(whole - first**2 - second**2, 0.0))
-    total = 0.0
-    for power, term in enumerate((first, second, third), start=1):
+    total, power = 0.0, np.ones(len(correlation))
+    for term in (first, second, third):
+        power = power * correlation
         weighted = weight * term
         by_lag = np.correlate(weighted, weighted, mode="full")[len(weighted) - 1:]
         by_lag[1:] *= 2  # a lag counts ahead and behind
-        total += float(by_lag @ correlation**power)
+        total += float(by_lag @ power)
     return max(total, 0.0)

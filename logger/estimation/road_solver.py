@@ -22,7 +22,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
-from math import pi
+from math import exp, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -71,8 +71,8 @@ class TimeGrid:
         self.rate_hz = rate_hz
         self.by_axle = car.by_axle(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
         half_waves = np.arange(1, int(2 * _DRIFT_BELOW_HZ * count / rate_hz) + 1)
-        phase = pi * half_waves[:, None] * (np.arange(count) + 0.5) / count
-        self.drift = np.vstack([np.ones(count), np.cos(phase)])
+        phase = pi * half_waves * (np.arange(count)[:, None] + 0.5) / count
+        self.drift = np.hstack([np.ones((count, 1)), np.cos(phase)])
         # The constant is gravity: nothing is known of it. The rest is small.
         self.drift_precision = np.array([1e-6, *np.full(len(half_waves), _DRIFT_MPS2**-2)])
 
@@ -139,13 +139,13 @@ class Block:
         factor = self.wave_factors(spectrum)
         shaped = factor * self._averaged
         gain = self._gain(weight) * np.abs(factor) ** 2
-        weighted = weight * self._grid.drift
-        inner = np.linalg.inv(weighted @ self._grid.drift.T + np.diag(self._grid.drift_precision))
+        weighted = weight[:, None] * self._grid.drift
+        inner = np.linalg.inv(self._grid.drift.T @ weighted + np.diag(self._grid.drift_precision))
         pair = np.empty((2, len(factor)), np.complex128)
 
         def weigh(row: Array) -> Array:
             """The weights, less what the drift can explain (Woodbury)."""
-            result: Array = weight * row - (inner @ (weighted @ row)) @ weighted
+            result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
             return result
 
         def seen_as(waves: ComplexArray) -> tuple[Array, Array]:
@@ -186,7 +186,7 @@ class Block:
                 pull, held = brought_back(weighed, unlikely)
                 residual = residual - step * (pull + held)
             before = size
-        drift = (inner @ (weighted @ (reading_mps2 - explained))) @ self._grid.drift
+        drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
         return Solution(waves, waves * factor, white, explained + drift, drift, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
@@ -224,7 +224,7 @@ class Block:
         slowest = self._speed_class.min()
         by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
         for speed_class in np.flatnonzero(by_class):
-            power = self._grid.car.power(float(np.exp((slowest + speed_class) / _SPEED_CLASSES_PER_E)))
+            power = self._grid.car.power(exp((slowest + speed_class) / _SPEED_CLASSES_PER_E))
             total += by_class[speed_class] * power
         gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
@@ -254,7 +254,10 @@ class Block:
         return np.fft.rfft(self._scattered(row)) * self._averaged
 
     def _read(self, under: ComplexArray) -> Array:
-        return np.fft.irfft((under * self._grid.by_axle).sum(axis=0), len(self._front))
+        first, *others = under * self._grid.by_axle
+        for one in others:
+            first += one
+        return np.fft.irfft(first, len(self._front))
 
     def _under(self, elevation: Array) -> ComplexArray:
         low, high = elevation.take(self._points) * self._shares
