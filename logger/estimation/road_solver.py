@@ -22,7 +22,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
-from math import exp, pi
+from math import pi
 
 import numpy as np
 import numpy.typing as npt
@@ -219,13 +219,11 @@ class Block:
 
     def _gain(self, weight: Array) -> Array:
         """Information on each wave where the road is seen, were the speeds mixed evenly along it."""
-        total = np.zeros(len(WAVE_NUMBERS_CPM))
         moving = self.moving & (weight > 0)
         slowest = self._speed_class.min()
         by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
-        for speed_class in np.flatnonzero(by_class):
-            power = self._grid.car.power(exp((slowest + speed_class) / _SPEED_CLASSES_PER_E))
-            total += by_class[speed_class] * power
+        found = np.flatnonzero(by_class)
+        total = by_class[found] @ self._grid.car.powers(np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist())
         gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 
