@@ -90,17 +90,17 @@ def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -
 
 def _variance(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> float:
     """The variance [N2] of that force, over what its motion may have been, on the average."""
-    *parts, beside = (*_parts(laws, slopes, motion, std), *([] if laws.others else [np.zeros((len(_AT), 1))]))
+    parts = _parts(laws, slopes, motion, std)
     scattered = std[1] * _AT[:, None]
-    beside = beside - slopes.beside_n_s_per_m * scattered
+    beside = (parts.pop() if laws.others else 0.0) - slopes.beside_n_s_per_m * scattered
     if laws.dry_friction_n:
         beside = beside + laws.dry_friction_n * np.sign(motion[1] + scattered)
-    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (*parts, beside))
+    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in [*parts, beside])
 
 
 def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> list[Array]:
-    """Forces (p, t) of dampers, of springs if any push by more than the travel, less those of their stand-ins, and last,
-    if there are any, of laws beside them, whole, without dry friction, at the points of a normal distribution."""
+    """Forces (p, t) of dampers, of springs if any push by more than the travel, less those of their stand-ins, and last
+    of laws beside them, if there are any, whole, without dry friction, at the points of a normal distribution."""
     own_rate = motion[2] + std[2] * _AT[:, None]
     parts = [laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate]
     if laws.springs or slopes.spring_n_per_m:

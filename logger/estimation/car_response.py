@@ -78,7 +78,7 @@ class CarResponse:
         missing = [key for key in dict.fromkeys(keys) if key not in self._powers]
         if missing:
             self._find_powers(missing)
-        return np.array([self._powers[key] for key in keys])
+        return np.array([self._powers[key] for key in keys]).reshape(len(keys), len(WAVE_NUMBERS_CPM))
 
     def _find_powers(self, keys: Sequence[int]) -> None:
         """For rounded speeds, side by side: that costs less than one after the other."""

@@ -103,7 +103,7 @@ def even_variance(motion: SteadyMotion, others: Array, variance: Array) -> float
 def _trials(variance: Array) -> tuple[Array, Array]:
     """Variances over the range of these (n,), and their logarithms, which are even."""
     lowest, highest = log(float(variance.min())), log(float(variance.max()) * 1.001)
-    logs = lowest + (highest - lowest) / (_TRIALS - 1) * np.arange(_TRIALS)
+    logs: Array = lowest + (highest - lowest) / (_TRIALS - 1) * np.arange(_TRIALS, dtype=np.float64)
     return np.exp(logs), logs
 
 

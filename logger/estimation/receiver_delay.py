@@ -268,8 +268,8 @@ def _rows(stretch: Stretch) -> Rows:
 
 
 def _covariances(t_s: Array, strengths: Sequence[Strength], weight: Array) -> Array:
-    """Of B without its line, plus e: (s, k, k) [(m/s)2], from the block's start. An acceleration whose covariance over
-    a time u is ``s^2 (1 + u/T) exp(-u/T)`` makes a speed of covariance ``H(t) + H(t') - H(|t - t'|)``, with H'' that."""
+    """Of B without its line, plus e: (s, k, k) [(m/s)2], from a block's start. An acceleration whose covariance over a
+    time u is ``s^2 (1 + u/T) exp(-u/T)`` makes a speed of covariance ``H(t) + H(t') - H(|t - t'|)``, with H'' that."""
     since = t_s - t_s[0]
     apart = np.abs(since[:, None] - since)
 

@@ -194,8 +194,8 @@ class FollowedRoad:
 
         resolved = mean_resolved(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
-        expected = sqrt(2 * float(resolved.sum()) / block.count)
-        white = np.clip(solution.innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
+        most = _MOST_DEVIATIONS * sqrt(2 * float(resolved.sum()) / block.count)
+        white = np.clip(solution.innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
         self._local.learn(first, solution.innovations, local, gain, seen)

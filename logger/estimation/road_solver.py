@@ -263,7 +263,7 @@ class Block:
 
     def _scattered(self, row: Array) -> Array:
         back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.by_axle), len(row))
-        return np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count)
+        return np.asarray(np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count), np.float64)
 
 
 def _quantile(row: Array, share: float) -> float:
