@@ -124,23 +124,26 @@ def power_sums(mean: Array, std: Array, correlation: Array) -> tuple[PowerSum, P
     correlation    (l,) of its errors, by lag; 0 beyond
     """
     squares, fourths = power_means(mean, std)
-    return (PowerSum(squares, _variance((2 * mean * std, 2 * std**2), correlation)),
-            PowerSum(fourths, _variance(((4 * mean**3 + 12 * mean * std**2) * std, 12 * (mean**2 + std**2) * std**2,
-                                         24 * mean * std**3, 24 * std**4), correlation)))
+    square, variance, mixed = mean * mean, std * std, mean * std
+    return (PowerSum(squares, _variance((2 * mixed, 2 * variance), correlation)),
+            PowerSum(fourths, _variance(((4 * square + 12 * variance) * mixed, 12 * (square + variance) * variance,
+                                         24 * mixed * variance, 24 * variance * variance), correlation)))
 
 
 def power_means(mean: Array, std: Array) -> tuple[float, float]:
     """Expected sums of the squares and of the fourth powers."""
-    return float((mean**2 + std**2).sum()), float((mean**4 + 6 * mean**2 * std**2 + 3 * std**4).sum())
+    square, variance = mean * mean, std * std
+    return float((square + variance).sum()), float((square * (square + 6 * variance) + 3 * variance * variance).sum())
 
 
 def _variance(derivatives: tuple[Array, ...], correlation: Array) -> float:
     """Variance of the sum of f(m + s z) over a path, by E f', E f'', ... times s, s^2, ...: the covariance at two
     places is the sum over k of the product of both E f^(k) with correlation^k / k! (Mehler)."""
-    total = 0.0
+    correlation = correlation[:len(derivatives[0])]
+    total, kernel = 0.0, np.ones(len(correlation))
     for order, row in enumerate(derivatives, start=1):
         lags = np.correlate(row, row, "full")[len(row) - 1:][:len(correlation)]
-        kernel = correlation[:len(lags)] ** order
+        kernel = kernel * correlation
         total += float(2 * (lags @ kernel) - lags[0] * kernel[0]) / factorial(order)
     return max(total, 0.0)
 

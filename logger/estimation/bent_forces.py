@@ -80,31 +80,36 @@ class BentForces:
 def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> Array:
     """The mean force (t,) [N] of a corner's laws, less that of their stand-ins, over what its motion may have been:
     travel, rate and the damper's own rate (3, t) within standard errors (3,)."""
-    force = np.asarray(_SHARE @ sum(_parts(laws, slopes, motion, std)))
+    force = sum(_SHARE @ one for one in _parts(laws, slopes, motion, std)) - slopes.beside_n_s_per_m * motion[1]
     if laws.dry_friction_n:
         share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
         # nearly its mean over a normal distribution, which is an erf
-        force += laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share + 0.044715 * share**3))
+        force += laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share * (1 + 0.044715 * share * share)))
     return force
 
 
 def _variance(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> float:
     """The variance [N2] of that force, over what its motion may have been, on the average."""
-    *parts, beside = _parts(laws, slopes, motion, std)
+    parts = _parts(laws, slopes, motion, std)
+    scattered = std[1] * _AT[:, None]
+    beside = (parts.pop() if laws.others else 0.0) - slopes.beside_n_s_per_m * scattered
     if laws.dry_friction_n:
-        beside = beside + laws.dry_friction_n * np.sign(motion[1] + std[1] * _AT[:, None])
-    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (*parts, beside))
+        beside = beside + laws.dry_friction_n * np.sign(motion[1] + scattered)
+    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in [*parts, beside])
 
 
 def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> list[Array]:
-    """Forces (p, t) of dampers, of springs if any push by more than the travel, and last of what lies beside them, less
-    those of their stand-ins, without dry friction, at the points of a normal distribution."""
-    travel, rate, own_rate = motion[:, None] + std[:, None, None] * _AT[:, None]
+    """Forces (p, t) of dampers, of springs if any push by more than the travel, less those of their stand-ins, and last
+    of laws beside them, if there are any, whole, without dry friction, at the points of a normal distribution."""
+    own_rate = motion[2] + std[2] * _AT[:, None]
     parts = [laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate]
     if laws.springs or slopes.spring_n_per_m:
+        travel = motion[0] + std[0] * _AT[:, None]
         at = slopes.rest_m + travel
         parts.append(np.asarray(sum((law(at) for law in laws.springs), -slopes.spring_n_per_m * travel)))
-    # travel and rate of one instant are not correlated: what asks for both is asked at the mean travel
-    middle = np.broadcast_to(slopes.rest_m + motion[0], rate.shape)
-    beside = sum((law(middle, rate) for law in laws.others), -slopes.beside_n_s_per_m * rate)
-    return [*parts, np.asarray(beside)]
+    if laws.others:
+        # travel and rate of one instant are not correlated: what asks for both is asked at the mean travel
+        rate = motion[1] + std[1] * _AT[:, None]
+        middle = np.broadcast_to(slopes.rest_m + motion[0], rate.shape)
+        parts.append(np.asarray(sum(law(middle, rate) for law in laws.others)))
+    return parts

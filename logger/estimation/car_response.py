@@ -9,6 +9,7 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.road_spectrum import log_waves
 from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
 from logger.vehicle.frequency_response import frequency_response
 from logger.vehicle.linear_car import LinearCar
@@ -22,6 +23,7 @@ ComplexArray = npt.NDArray[np.complex128]
 HIGHEST_HZ = 42.0  # recorders pass less from here on
 _SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
 WAVE_NUMBERS_CPM = np.geomspace(0.004, 3.3, 300)
+LOG_WAVES = log_waves(WAVE_NUMBERS_CPM)
 WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBERS_CPM[0])
 
 
@@ -67,11 +69,24 @@ class CarResponse:
         """
         key = round(log(speed_mps) * _SPEEDS_PER_E)
         if key not in self._powers:
-            f_hz = WAVE_NUMBERS_CPM * exp(key / _SPEEDS_PER_E)
-            delays = np.exp(-2j * np.pi * self.behind_m[:, None] * WAVE_NUMBERS_CPM)
-            gain = (self.by_axle(f_hz) * delays).sum(axis=0) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
-            self._powers[key] = np.abs(gain) ** 2
+            self._find_powers([key])
         return self._powers[key]
+
+    def powers(self, speeds_mps: Sequence[float]) -> Array:
+        """The same for several speeds (v,), as (v, n)."""
+        keys = [round(log(speed) * _SPEEDS_PER_E) for speed in speeds_mps]
+        missing = [key for key in dict.fromkeys(keys) if key not in self._powers]
+        if missing:
+            self._find_powers(missing)
+        return np.array([self._powers[key] for key in keys]).reshape(len(keys), len(WAVE_NUMBERS_CPM))
+
+    def _find_powers(self, keys: Sequence[int]) -> None:
+        """For rounded speeds, side by side: that costs less than one after the other."""
+        f_hz = WAVE_NUMBERS_CPM * np.exp(np.array(keys) / _SPEEDS_PER_E)[:, None]
+        delays = np.exp(-2j * np.pi * self.behind_m[:, None] * WAVE_NUMBERS_CPM)
+        by_axle = self.by_axle(f_hz.ravel()).reshape(len(self.behind_m), *f_hz.shape)
+        gains = (by_axle * delays[:, None]).sum(axis=0) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
+        self._powers.update(zip(keys, np.abs(gains) ** 2, strict=True))
 
     @property
     def is_exact(self) -> bool:

@@ -14,7 +14,7 @@ from math import exp
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
+from logger.estimation.road_spectrum import RoadSpectrum
 
 Array = npt.NDArray[np.float64]
 
@@ -43,20 +43,20 @@ class Belief:
 
 
 def learnt(
-    belief: Belief, power: Array, resolved: Array, wave_number_cpm: Array, seen_share: float,
+    belief: Belief, power: Array, resolved: Array, log_waves: Array, seen_share: float,
     before: RoadSpectrum | None,
 ) -> Belief:
     """One scoring step for level and waviness.
 
     power         (k,) of each wave of the white innovations, where 1 is expected of a wave that is fully resolved
     resolved      (k,) share of each wave that the readings resolve where the road was read
+    log_waves     (k,) of each, as ``road_spectrum.log_waves``
     seen_share    of the distance grid, where the car was read
     before        the spectrum of the stretch before; None: there was none
     """
     used = resolved > 0
     power, resolved = power[used], resolved[used]
-    tilt = -np.log(np.maximum(wave_number_cpm[used], FLATTENED_BELOW_CPM) / PIVOT_CPM)
-    slopes = np.stack([np.ones(len(tilt)), tilt])
+    slopes = np.stack([np.ones(len(power)), -log_waves[used]])
     gradient = slopes @ (power - seen_share * resolved)
     curvature = (slopes * (seen_share * resolved**2)) @ slopes.T
     now = np.array([belief.spectrum.log_level, belief.spectrum.waviness])

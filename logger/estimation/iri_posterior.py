@@ -17,12 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.car_response import (
+    LOG_WAVES,
     WAVE_NUMBER_STEPS_CPM,
     WAVE_NUMBERS_CPM,
     CarResponse,
     golden_car_slope,
 )
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
+from logger.estimation.road_solver import quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.steady_motion import SteadyMotion
 from logger.roads.iri import PER_KM
@@ -41,7 +43,7 @@ def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> floa
 
 def resolved_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
     """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings resolve."""
-    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+    signal = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES)
     return signal / (signal + noise_psd)
 
 
@@ -51,7 +53,7 @@ def vehicle_error_variance(
     """White noise of readings that costs the IRI as much as a model whose axles' gains are each off by a share
     ``vehicle_error`` [(m/s2)2], or whose numbers are off by their standard errors where that is more: the error's
     density over wave numbers, weighted as the IRI weights them."""
-    road = spectrum.psd(WAVE_NUMBERS_CPM)
+    road = spectrum.psd_of(LOG_WAVES)
     weight = _SLOPE_POWER * road
     off = vehicle_error**2 * car.power_apart(speed_mps)
     if not car.is_exact:
@@ -63,9 +65,14 @@ def vehicle_error_variance(
 def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
                   ) -> SteadyMotion:
     """What such a road makes of the car, at the frequencies of ``count`` readings (even)."""
-    per_hz = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM) / speed_mps
-    f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+    per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
+    f_hz = _frequencies_hz(count, rate_hz)
     return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
+
+
+@lru_cache(maxsize=4)
+def _frequencies_hz(count: int, rate_hz: float) -> Array:
+    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,7 @@ class SlopeErrors:
 
     def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
         """For readings of this variance [(m/s2)2] at this speed [m/s]."""
-        prior = _SLOPE_POWER * spectrum.psd(WAVE_NUMBERS_CPM)
+        prior = _SLOPE_POWER * spectrum.psd_of(LOG_WAVES)
         resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
         left = (prior * (1 - resolved)) @ self._waves
         return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0],
@@ -118,7 +125,7 @@ class WindowIri:
     """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
     ``shared`` with neighbours.
 
-    change_per_m    how much the IRI of a window further on is higher, over the way that it may be misplaced [m/km per m]
+    change_per_m    by how much the IRI of a window further on is higher [m/km per m], over the way that it may be off
     """
 
     iri_m_per_km: float
@@ -174,11 +181,11 @@ def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:
 
 def unseen_share(seen: Array, spacing_m: float) -> Array:
     """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0."""
-    memory = _memory(spacing_m)
-    missing = np.concatenate([np.ones(len(memory)), 1.0 - seen])
-    length = len(missing) + len(memory)
-    share = np.fft.irfft(np.fft.rfft(missing, length) * np.fft.rfft(memory, length), length)
-    return np.clip(share[len(memory): len(missing)], 0.0, 1.0)
+    behind = len(_memory(spacing_m))
+    missing = np.concatenate([np.ones(behind), 1.0 - seen])
+    length = quick_fft_length(behind + len(missing))
+    share = np.fft.irfft(np.fft.rfft(missing, length) * _memory_waves(spacing_m, length), length)
+    return np.clip(share[behind: len(missing)], 0.0, 1.0)
 
 
 @lru_cache(maxsize=4)
@@ -195,3 +202,9 @@ def _memory(spacing_m: float) -> Array:
     power = np.fft.irfft(per_slope, count)[: count // 2] ** 2
     memory: Array = power / power.sum()
     return memory
+
+
+@lru_cache(maxsize=32)
+def _memory_waves(spacing_m: float, length: int) -> npt.NDArray[np.complex128]:
+    """Its rfft over so many points; kept, for there are few such numbers."""
+    return np.asarray(np.fft.rfft(_memory(spacing_m), length))

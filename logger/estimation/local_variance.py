@@ -72,14 +72,14 @@ class LocalRoughness:
         taken          (n,) degrees of freedom that it takes there over their mean; 1 where readings are even
         learns         the scatter of d as well: once per block, when its readings have settled
         """
-        resolved = np.interp(np.log(before), _LOG_TABLE, self._resolved_by_point(gain, len(before))) * seen * taken
-        power = self._smoothed(innovations**2 * seen)
-        weight = self._smoothed(resolved)
+        log_before = np.log(before)
+        resolved = np.interp(log_before, _LOG_TABLE, self._resolved_by_point(gain, len(before))) * taken
+        power, weight, near = self._smoothed(np.stack([innovations**2, resolved, np.ones(len(before))]) * seen)
         if learns and seen.any():
             self._learn_scatter(power, weight, gain, seen > 0)
         fresh = (self._common + power) / (self._common + weight)
-        log_new = _TAKEN_OVER * np.log(fresh) + (1 - _TAKEN_OVER) * np.log(before)
-        log_new = np.where(self._smoothed(seen) > 0, np.clip(log_new, _SMALLEST_LOG, _LARGEST_LOG), 0.0)
+        log_new = _TAKEN_OVER * np.log(fresh) + (1 - _TAKEN_OVER) * log_before
+        log_new = np.where(near > 0, np.clip(log_new, _SMALLEST_LOG, _LARGEST_LOG), 0.0)
         self._first = first
         self._known = RelativeVariance(np.exp(log_new), self._log_error(log_new, weight, seen > 0))
 
@@ -104,12 +104,13 @@ class LocalRoughness:
     def _resolved_by_point(self, gain: Array, count: int) -> Array:
         """Share of a point's innovation that the readings resolve, for each d of the table: the mean over all waves."""
         strength = np.exp(_LOG_TABLE)[:, None] * gain
-        share: Array = (strength / (1 + strength)).sum(axis=1) * 2 / count
+        strength /= 1 + strength
+        share: Array = strength.sum(axis=1) * 2 / count
         return share
 
     def _log_error(self, log_variance: Array, weight: Array, seen: npt.NDArray[np.bool_]) -> Array:
-        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); where s is not learnt, it is seen shrunk by
-        the common points."""
+        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); where s is not learnt, the
+        common points shrink what is seen of it."""
         if not seen.any():
             return np.zeros(len(weight))
         shrunk = float(np.mean(weight[seen] / (weight[seen] + _COMMON)))
@@ -117,9 +118,10 @@ class LocalRoughness:
         error: Array = 1 / (1 / np.clip(scatter, _LEAST_SCATTER, _LARGEST_SCATTER) + 0.5 * weight)
         return error
 
-    def _smoothed(self, row: Array) -> Array:
-        """Sum over the neighbours, weighted with a Gaussian of ``_REACH_M``, periodic as the grid is."""
-        return np.maximum(np.fft.irfft(np.fft.rfft(row) * _neighbours(len(row), self._reach), len(row)), 0.0)
+    def _smoothed(self, rows: Array) -> Array:
+        """Sums (r, n) over the neighbours, weighted with a Gaussian of ``_REACH_M``, periodic as the grid is."""
+        count = rows.shape[1]
+        return np.maximum(np.fft.irfft(np.fft.rfft(rows) * _neighbours(count, self._reach), count), 0.0)
 
 
 @lru_cache(maxsize=32)
@@ -135,8 +137,10 @@ def mean_resolved(gain: Array, variance: Array) -> Array:
     if not len(variance):
         return gain / (1 + gain)
     logs = np.log(variance)
-    counts, edges = np.histogram(logs, bins=_CLASSES)
-    sums, _ = np.histogram(logs, bins=edges, weights=logs)
-    strength = np.exp(sums / np.maximum(counts, 1))[:, None] * gain
+    lowest, width = logs.min(), (logs.max() - logs.min()) / _CLASSES
+    classes = np.minimum((logs - lowest) / width, _CLASSES - 1).astype(np.int64) if width else np.zeros(len(logs), int)
+    counts, sums = np.bincount(classes), np.bincount(classes, logs)
+    counts, sums = counts[counts > 0], sums[counts > 0]
+    strength = np.exp(sums / counts)[:, None] * gain
     mean: Array = (counts / counts.sum()) @ (strength / (1 + strength))
     return mean

@@ -31,9 +31,11 @@ def _tail(u: Array) -> Array:
     z = u / sqrt(2)
     t = 1 / (1 + 0.5 * z)
     series = np.full_like(t, _CHEBYSHEV[-1])
-    for coefficient in _CHEBYSHEV[-2::-1]:
-        series = coefficient + t * series
-    return 0.5 * t * np.exp(-z * z + series)
+    for coefficient in _CHEBYSHEV[-2::-1]:  # in place: for long rows most of the time goes into new memory
+        series *= t
+        series += coefficient
+    series -= z * z
+    return 0.5 * t * np.exp(series, out=series)
 
 
 def distribution(u: Array) -> Array:
@@ -48,15 +50,18 @@ def within(mean: Array, variance: Array, low: Array, high: Array) -> tuple[Array
     The bounds may be infinite. The variance is never more than ``variance`` and never zero.
     """
     deviation = np.sqrt(variance)
-    below, above = (low - mean) / deviation, (high - mean) / deviation
-    mirrored = below > 0  # take the tail where the distribution function is small, not near one
-    below, above = np.where(mirrored, -above, below), np.where(mirrored, -below, above)
-    share = distribution(above) - distribution(below)
+    ends = (np.stack([low, high]) - mean) / deviation
+    mirrored = ends[0] > 0  # take the tail where the distribution function is small, not near one
+    ends = np.where(mirrored, -ends[::-1], ends)
+    below_share, above_share = distribution(ends)
+    share = above_share - below_share
     far = share < _LEAST_SHARE  # so far out that the variable sits at the near bound
     share = np.where(far, 1.0, share)
-    at_below, at_above = density(below), density(above)
-    shift = np.where(far, above, (at_below - at_above) / share)
-    moment = np.where(np.isfinite(below), below, 0.0) * at_below - np.where(np.isfinite(above), above, 0.0) * at_above
+    densities = density(ends)
+    at_below, at_above = densities
+    shift = np.where(far, ends[1], (at_below - at_above) / share)
+    moment_below, moment_above = np.where(np.isfinite(ends), ends, 0.0) * densities
+    moment = moment_below - moment_above
     narrowed = np.where(far, _LEAST_NARROWING, 1 + moment / share - shift * shift)
     shift = np.where(mirrored, -shift, shift)
     return mean + deviation * shift, variance * np.clip(narrowed, _LEAST_NARROWING, 1.0)
@@ -82,10 +87,11 @@ def variance_of_mean_absolute(mean: Array, deviation: Array, correlation: Array,
     second = sqrt(2) * deviation * density(u)
     whole = mean**2 + deviation**2 - (sqrt(2) * second + u * first) ** 2  # its mean is as in mean_absolute
     third = np.sqrt(np.maximum(whole - first**2 - second**2, 0.0))
-    total = 0.0
-    for power, term in enumerate((first, second, third), start=1):
+    total, power = 0.0, np.ones(len(correlation))
+    for term in (first, second, third):
+        power = power * correlation
         weighted = weight * term
         by_lag = np.correlate(weighted, weighted, mode="full")[len(weighted) - 1:]
         by_lag[1:] *= 2  # a lag counts ahead and behind
-        total += float(by_lag @ correlation**power)
+        total += float(by_lag @ power)
     return max(total, 0.0)

@@ -15,6 +15,7 @@ on one side only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 import numpy.typing as npt
@@ -80,12 +81,12 @@ def cavity(motion: SteadyMotion, variance: Array) -> Array:
     def mean(row: Array) -> Array:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
 
-    trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    whole = np.array([1 / motion.remaining_variance(trial) for trial in trials.tolist()])
-    log_others = -np.log(np.maximum(whole - 1 / trials, _LEAST_OTHERS / trials))
+    trials, log_trials = _trials(variance)
+    # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
+    log_others = log_trials - np.log(np.maximum(1 / motion.resolved_per_reading(trials) - 1, _LEAST_OTHERS))
     even = 1 / mean(1 / variance)
     for _ in range(_EVENING_ROUNDS):
-        others = np.exp(np.interp(np.log(even), np.log(trials), log_others))
+        others = np.exp(np.interp(np.log(even), log_trials, log_others))
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
     return others
 
@@ -94,9 +95,16 @@ def even_variance(motion: SteadyMotion, others: Array, variance: Array) -> float
     """Variance of even readings that take as many degrees of freedom as these (n,), whose ``cavity`` is ``others``: of
     each, the share that it has in what is known of its own acceleration."""
     taken = float((others / (others + variance)).mean())
-    trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    by_trial = [motion.resolved_per_reading(trial) for trial in trials.tolist()]
-    return float(np.exp(np.interp(-taken, -np.array(by_trial), np.log(trials))))
+    trials, log_trials = _trials(variance)
+    by_trial = motion.resolved_per_reading(trials)
+    return float(np.exp(np.interp(-taken, -by_trial, log_trials)))
+
+
+def _trials(variance: Array) -> tuple[Array, Array]:
+    """Variances over the range of these (n,), and their logarithms, which are even."""
+    lowest, highest = log(float(variance.min())), log(float(variance.max()) * 1.001)
+    logs: Array = lowest + (highest - lowest) / (_TRIALS - 1) * np.arange(_TRIALS, dtype=np.float64)
+    return np.exp(logs), logs
 
 
 def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:

@@ -34,6 +34,7 @@ with it (0.005 s too little in simulated cars that pitch by 4 degrees per g).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import hypot, sqrt
@@ -166,7 +167,7 @@ def _weighed(known: Information, rows: Rows, mean: Array) -> BlockInformation:
         index, w = _best(so_far[0] + a, so_far[1] + b, known.gravity + mean, known.blocks >= FEWEST_BLOCKS)
         residual = z - x[index] @ w
         weight = _weights(residual, t_s, strength, weight)
-    likelihood = np.array([_log_likelihood(residual, t_s, each, weight) for each in STRENGTHS])
+    likelihood = _log_likelihoods(residual, t_s, STRENGTHS, weight)
     return BlockInformation(*_sums(x, z, t_s, strength, weight), mean, likelihood, rows)
 
 
@@ -266,54 +267,66 @@ def _rows(stretch: Stretch) -> Rows:
     return mean, np.add.reduceat(z, first) / size, np.add.reduceat(t_s, first) / size
 
 
-def _covariance(t_s: Array, strength: Strength, weight: Array) -> Array:
-    """Of B without its line, plus e: (k, k) [(m/s)2], from the block's start. An acceleration whose covariance over a
+def _covariances(t_s: Array, strengths: Sequence[Strength], weight: Array) -> Array:
+    """Of B without its line, plus e: (s, k, k) [(m/s)2], from a block's start. An acceleration whose covariance over a
     time u is ``s^2 (1 + u/T) exp(-u/T)`` makes a speed of covariance ``H(t) + H(t') - H(|t - t'|)``, with H'' that."""
-    noise_mps, walk, hill_mps2, hill_s = strength
     since = t_s - t_s[0]
     apart = np.abs(since[:, None] - since)
 
-    def h(u_s: Array) -> Array:
-        x = u_s / hill_s
-        made: Array = (hill_mps2 * hill_s) ** 2 * (2 * x - 3 + (3 + x) * np.exp(-x))
+    def hills(hill_s: float) -> Array:
+        since_h, apart_h = (hill_s**2 * (2 * x - 3 + (3 + x) * np.exp(-x)) for x in (since / hill_s, apart / hill_s))
+        made: Array = since_h[:, None] + since_h - apart_h
         return made
 
-    hills = h(since)[:, None] + h(since) - h(apart)
-    covariance: Array = walk * np.minimum.outer(since, since) + hills + np.diag(noise_mps**2 / weight)
-    return covariance
+    walks = np.minimum.outer(since, since)
+    by_time = {hill_s: hills(hill_s) for hill_s in {one[3] for one in strengths}}
+    covariances = np.stack([walk * walks + hill_mps2**2 * by_time[hill_s] for _, walk, hill_mps2, hill_s in strengths])
+    noise_mps = np.array([one[0] for one in strengths])
+    at = np.arange(len(t_s))
+    covariances[:, at, at] += noise_mps[:, None] ** 2 / weight
+    return covariances
 
 
-def _whitened(t_s: Array, strength: Strength, weight: Array, columns: Array
-              ) -> tuple[Array, Array, float]:
-    """Columns (k, m) made white and freed of the line; the line's basis (k, 2); half the log determinants."""
-    root = np.linalg.cholesky(_covariance(t_s, strength, weight))
+def _line(t_s: Array) -> Array:
+    """Any straight line is one of these columns (k, 2)."""
     middle = t_s - t_s.mean()
-    line = np.stack([np.ones(len(t_s)), middle / max(float(np.std(middle)), 1e-3)], axis=1)
-    both = np.linalg.solve(root, np.hstack([line, columns]))
-    basis, triangle = np.linalg.qr(both[:, :2])
-    white = both[:, 2:] - basis @ (basis.T @ both[:, 2:])
-    logs = float(np.log(np.diag(root)).sum() + np.log(np.abs(np.diag(triangle))).sum())
-    return white, basis, logs
+    return np.stack([np.ones(len(t_s)), middle / max(float(np.std(middle)), 1e-3)], axis=1)
+
+
+def _whitened(t_s: Array, strength: Strength, weight: Array, columns: Array) -> Array:
+    """Columns (k, m) made white and freed of the line."""
+    root = np.linalg.cholesky(_covariances(t_s, [strength], weight)[0])
+    both = np.linalg.solve(root, np.hstack([_line(t_s), columns]))
+    basis, _ = np.linalg.qr(both[:, :2])
+    white: Array = both[:, 2:] - basis @ (basis.T @ both[:, 2:])
+    return white
 
 
 def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array
           ) -> tuple[Array, Array, float]:
     """A (d, 3, 3), b (d, 3) and c of a block."""
     d, k, _ = x.shape
-    white, _, _ = _whitened(t_s, strength, weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))
+    white = _whitened(t_s, strength, weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))
     rows = white[:, 1:].reshape(k, d, 3)
     return np.einsum("kdi,kdj->dij", rows, rows), np.einsum("kdi,k->di", rows, white[:, 0]), \
         float(white[:, 0] @ white[:, 0])
 
 
-def _log_likelihood(residual: Array, t_s: Array, strength: Strength, weight: Array) -> float:
-    white, _, logs = _whitened(t_s, strength, weight, residual[:, None])
-    return -0.5 * float(white[:, 0] @ white[:, 0]) - logs
+def _log_likelihoods(residual: Array, t_s: Array, strengths: Sequence[Strength], weight: Array) -> Array:
+    """Of residuals (k,) for each of the strengths (s,), whatever line is in them."""
+    roots = np.linalg.cholesky(_covariances(t_s, strengths, weight))
+    white = np.linalg.solve(roots, np.column_stack([_line(t_s), residual]))
+    basis, triangle = np.linalg.qr(white[..., :2])
+    rest = white[..., 2:]
+    rest = rest - basis @ (np.swapaxes(basis, 1, 2) @ rest)
+    logs = (np.log(np.abs(np.diagonal(one, axis1=1, axis2=2))).sum(axis=1) for one in (roots, triangle))
+    found: Array = -0.5 * (rest**2).sum(axis=(1, 2)) - sum(logs)
+    return found
 
 
 def _weights(residual: Array, t_s: Array, strength: Strength, weight: Array) -> Array:
     """Weights (k,) of fixes by Student's t: of what each is off from what the others say."""
-    inverse = np.linalg.inv(_covariance(t_s, strength, weight))
+    inverse = np.linalg.inv(_covariances(t_s, [strength], weight)[0])
     line = np.stack([np.ones(len(t_s)), t_s - t_s.mean()], axis=1)
     inverse -= inverse @ line @ np.linalg.solve(line.T @ inverse @ line, line.T @ inverse)
     spread = np.maximum(np.diag(inverse), 1e-9)

@@ -59,11 +59,13 @@ class SolvedBlock:
     """road      (k,) rfft of the elevations on the block's grid [m]
     accel_mps2   (t,) what the car does on it
     variance     of a reading, noise, rounding and the car's own error, while it moved [(m/s2)2]
+    seen         (n,) 1 at the points of the grid that were driven over while there were readings, else 0
     """
 
     road: ComplexArray
     accel_mps2: Array
     variance: float
+    seen: Array
 
 
 class FollowedRoad:
@@ -178,24 +180,25 @@ class FollowedRoad:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         self._begun = True
+        seen = block.seen(read)
         for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, steps, before, left == 0, beyond_variance)
+            result = self._round(block, samples, read, seen, steps, before, left == 0, beyond_variance)
         return result
 
     def _round(
-        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool,
-        beyond_variance: float,
+        self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
+        learns: bool, beyond_variance: float,
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``."""
         readings = self._as_gaussian(samples)
-        there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
+        first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
+        local = self._local.at(first, block.count).variance
+        there = _levelled(spectrum, local)
         variance = readings.variance + vehicle_error_variance(
             block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
         ) + beyond_variance
         weight = np.where(read, 1 / variance, 0.0)
-        seen, seen_share = block.seen(read), block.seen_points(read) / block.count
-        first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
-        local = self._local.at(first, block.count).variance
+        seen_share = block.seen_points(read) / block.count
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
 
@@ -216,15 +219,14 @@ class FollowedRoad:
                 taken = block.about(np.where(moving, others / (others + variance), 0.0))
                 taken = taken / float(taken[seen > 0].mean())
 
-        innovations = np.fft.irfft(solution.waves, block.count)
         resolved = mean_resolved(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
         most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count * taken)
-        white = np.clip(innovations / np.sqrt(local), -most, most)
+        white = np.clip(solution.innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
-        self._belief = learnt(self._belief, power, resolved, block.wave_number_cpm, seen_share, before)
+        self._belief = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
         settled = self._is_coarse and learns and before is not None
-        self._local.learn(first, innovations, local, gain, seen, taken, settled)
+        self._local.learn(first, solution.innovations, local, gain, seen, taken, settled)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
@@ -235,7 +237,7 @@ class FollowedRoad:
             self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
-        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, mean_variance)
+        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, mean_variance, seen)
 
     def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
@@ -289,8 +291,7 @@ class FollowedRoad:
         """The spectrum at points ``first`` ... ``first + count - 1`` of the distance grid, and the standard error of
         its log level."""
         local = self._local.at(first, count)
-        spectrum = self._belief.spectrum
-        there = replace(spectrum, log_level=spectrum.log_level + log(float(local.variance.mean())))
+        there = _levelled(self._belief.spectrum, local.variance)
         return there, sqrt(self._belief.log_level_std**2 + float(local.log_error.mean()))
 
 
@@ -298,3 +299,8 @@ def _beyond_two(reading_mps2: Array, step_mps2: float) -> int:
     """How many readings are on other steps than the two on which most are."""
     _, counts = np.unique(np.rint(reading_mps2 / step_mps2), return_counts=True)
     return int(np.sort(counts)[:-2].sum())
+
+
+def _levelled(spectrum: RoadSpectrum, relative_variance: Array) -> RoadSpectrum:
+    """The spectrum about points (n,) that are rougher or smoother than it says."""
+    return replace(spectrum, log_level=spectrum.log_level + log(float(relative_variance.mean())))

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.comfort.uncertain_ride import PowerSum, RideSums, larger, power_means, power_sums
-from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse
+from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.iri_posterior import LEVEL_TRIAL, raised
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -102,7 +102,7 @@ class RidePosterior:
 
     def knowledge(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> RideKnowledge:
         """For readings of this variance [(m/s2)2] at this speed [m/s]."""
-        per_cpm = self._car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+        per_cpm = self._car.power(speed_mps) * spectrum.psd_of(LOG_WAVES)
         ride = np.interp(self._f_hz / speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / speed_mps
         noise = 2 * variance / self._rate_hz
         wiener_gain = ride / (ride + noise)

@@ -19,14 +19,16 @@ Both grids are periodic. In space the road goes on unseen for longer than it rem
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, CarResponse
-from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.road_spectrum import RoadSpectrum, log_waves
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -39,12 +41,14 @@ _FAST_SHARE = 0.98
 _SPEED_CLASSES_PER_E = 10
 _DRIFT_BELOW_HZ = 0.1
 _DRIFT_MPS2 = 0.05
+_LOG_WAVE_NUMBERS = np.log(WAVE_NUMBERS_CPM)
 
 
 @dataclass(frozen=True)
 class Solution:
     """waves     (k,) rfft of the innovations v on the distance grid
     road         (k,) rfft of the elevations there [m]
+    innovations  (n,) v itself, point by point
     fitted_mps2  (t,) the readings that this road and the drift explain
     drift_mps2   (t,) the drift alone
     drift_variance    (t,) that the readings leave of it, were the road known [(m/s2)2]
@@ -53,6 +57,7 @@ class Solution:
 
     waves: ComplexArray
     road: ComplexArray
+    innovations: Array
     fitted_mps2: Array
     drift_mps2: Array
     drift_variance: Array
@@ -97,20 +102,28 @@ class Block:
         first_m = distance_m[0] - car.behind_m.max() - _MARGIN_M
         self.start_m = float(np.floor(first_m / align_m) * align_m)
         self.count = quick_fft_length((distance_m[-1] + _MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
-        self.wave_number_cpm = np.asarray(np.fft.rfftfreq(self.count, spacing_m), dtype=np.float64)
+        self._waves = _waves_of(self.count, spacing_m)
+        self.wave_number_cpm, self.log_waves = self._waves.wave_number_cpm, self._waves.log_waves
         speed_mps = np.gradient(distance_m) * rate_hz
         # Not the highest speed: a single place that is wrong by metres must not cost the short waves of the block.
-        self._highest_cpm = HIGHEST_HZ / max(float(np.quantile(speed_mps, _FAST_SHARE)), SLOWEST_MPS)
-        self._averaged = patch_gain(self.wave_number_cpm, car.contact_patch_m, spacing_m)
+        self._highest_cpm = HIGHEST_HZ / max(_quantile(speed_mps, _FAST_SHARE), SLOWEST_MPS)
+        self._averaged = _patch_gain_on_grid(self.count, car.contact_patch_m, spacing_m)
         place = (distance_m - car.behind_m[:, None] - self.start_m) / spacing_m
         low = np.floor(place).astype(np.int64)
         self._front = low[0]
+        self._advance = np.diff(self._front, append=self._front[-1])
         # (2, axles, t): the points on either side of each axle, and their shares in the elevation there
         self._points = np.stack([low, low + 1])
         self._shares = np.stack([1 - (place - low), place - low])
         self.moving = speed_mps > SLOWEST_MPS
         self.mean_speed_mps = float(speed_mps[self.moving].mean()) if self.moving.any() else SLOWEST_MPS
         self._speed_class = np.round(np.log(np.maximum(speed_mps, SLOWEST_MPS)) * _SPEED_CLASSES_PER_E).astype(int)
+
+    def on(self, grid: TimeGrid) -> Block:
+        """The same stretch, driven by a car whose axles stand as this one's do and that answers otherwise."""
+        other = copy(self)
+        other._grid, other.car = grid, grid.car
+        return other
 
     def solve(
         self,
@@ -130,48 +143,66 @@ class Block:
         start           ``waves`` of an earlier solution of this block to go on from, or ``carried_over`` ones
         """
         factor = self.wave_factors(spectrum)
+        shaped = factor * self._averaged
         gain = self._gain(weight) * np.abs(factor) ** 2
         weighted = weight[:, None] * self._grid.drift
         inner = np.linalg.inv(self._grid.drift.T @ weighted + np.diag(self._grid.drift_precision))
+        pair = np.empty((2, len(factor)), np.complex128)
 
         def weigh(row: Array) -> Array:
             """The weights, less what the drift can explain (Woodbury)."""
             result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
             return result
 
-        def unlikely(waves: ComplexArray) -> ComplexArray:
-            """Prior precision times the innovations: the inverse of their variance from point to point."""
-            return np.fft.rfft(np.fft.irfft(waves, self.count) / relative_variance)
+        def seen_as(waves: ComplexArray) -> tuple[Array, Array]:
+            """Innovations point by point, and the readings of the car on them."""
+            np.multiply(waves, shaped, out=pair[0])
+            pair[1] = waves
+            elevation, white = np.fft.irfft(pair, self.count)
+            return white, self._read(self._under(elevation))
 
-        waves: ComplexArray = np.zeros(len(factor), np.complex128) if start is None else start * (factor != 0)
-        explained = np.zeros(len(weight)) if start is None else self.driven(waves * factor)
-        held = unlikely(waves)
-        unexplained = weigh(reading_mps2 - explained)
+        def brought_back(weighed: Array, unlikely: Array) -> tuple[ComplexArray, ComplexArray]:
+            """A row in time under the car's transpose, and one on the distance grid, as waves of the innovations."""
+            scattered, held = np.fft.rfft(np.stack([self._scattered(weighed), unlikely]))
+            return np.conj(shaped) * scattered, held
+
+        if start is None:
+            waves: ComplexArray = np.zeros(len(factor), np.complex128)
+            white, explained = np.zeros(self.count), np.zeros(len(weight))
+        else:
+            waves = start * (factor != 0)
+            white, explained = seen_as(waves)
+        # The prior precision of innovations is one over their variance from point to point.
+        pull, held = brought_back(weigh(reading_mps2 - explained), white / relative_variance)
+        residual = pull - held
         direction, before = np.zeros_like(waves), np.inf
-        for _ in range(steps):
-            residual = np.conj(factor) * self.transposed(unexplained) - held
+        for left in reversed(range(steps)):
             preconditioned = residual / (1 + gain)
             size = _product(residual, preconditioned)
             if size <= 0.0:
                 break
             direction = preconditioned + (size / before) * direction
-            image, holding = self.driven(direction * factor), unlikely(direction)
-            weighed = weigh(image)
-            step = size / (_product(direction, holding) + self.count * float(image @ weighed))
+            along, image = seen_as(direction)
+            unlikely, weighed = along / relative_variance, weigh(image)
+            step = size / (self.count * float(along @ unlikely + image @ weighed))
             waves = waves + step * direction
-            held = held + step * holding
+            white = white + step * along
             explained = explained + step * image
-            unexplained = unexplained - step * weighed
+            if left:
+                pull, held = brought_back(weighed, unlikely)
+                residual = residual - step * (pull + held)
             before = size
         drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
         drift_variance = ((self._grid.drift @ inner) * self._grid.drift).sum(axis=1)
-        return Solution(waves, waves * factor, explained + drift, drift, drift_variance, gain)
+        return Solution(waves, waves * factor, white, explained + drift, drift, drift_variance, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
 
         Innovations are local, so they can be cut and shifted where elevations would get an edge.
         """
+        if (earlier.start_m, earlier.count) == (self.start_m, self.count):
+            return waves
         white = np.fft.irfft(waves, earlier.count)
         behind = round((self.start_m - earlier.start_m) / self.spacing_m)
         kept = white[behind: min(earlier.count, behind + self.count)] if behind >= 0 else white[:0]
@@ -179,7 +210,7 @@ class Block:
 
     def same_road(self, waves: ComplexArray, old: RoadSpectrum, new: RoadSpectrum) -> ComplexArray:
         """``waves`` found with one spectrum as they are with another, for the same road."""
-        return waves * np.sqrt(old.psd(self.wave_number_cpm) / new.psd(self.wave_number_cpm))
+        return waves * np.sqrt(old.psd_of(self.log_waves) / new.psd_of(self.log_waves))
 
     def wave_factors(self, spectrum: RoadSpectrum) -> ComplexArray:
         """F: from white innovations to elevations [m]; 0 for the mean and for waves that the time grid cannot hold.
@@ -187,7 +218,7 @@ class Block:
         A quarter of a wave behind, as an integral is: where the waviness is 2, innovations are the road's slope, so
         that what is rough at one place is an innovation at that place.
         """
-        psd = spectrum.psd(self.wave_number_cpm)
+        psd = spectrum.psd_of(self.log_waves)
         psd[(self.wave_number_cpm == 0) | (self.wave_number_cpm > self._highest_cpm)] = 0.0
         factor: ComplexArray = -1j * np.sqrt(psd / (2 * self.spacing_m))
         factor[-1] = 0.0  # the shortest wave of the grid has no quarter
@@ -195,28 +226,25 @@ class Block:
 
     def _gain(self, weight: Array) -> Array:
         """Information on each wave where the road is seen, were the speeds mixed evenly along it."""
-        total = np.zeros(len(WAVE_NUMBERS_CPM))
         moving = self.moving & (weight > 0)
-        for speed_class in np.unique(self._speed_class[moving]):
-            power = self._grid.car.power(float(np.exp(speed_class / _SPEED_CLASSES_PER_E)))
-            total += weight[moving & (self._speed_class == speed_class)].sum() * power
-        log_n = np.log(np.maximum(self.wave_number_cpm, WAVE_NUMBERS_CPM[0]))
-        gain: Array = np.interp(log_n, np.log(WAVE_NUMBERS_CPM), np.sqrt(total), right=0.0) ** 2
+        slowest = self._speed_class.min()
+        by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
+        found = np.flatnonzero(by_class)
+        total = by_class[found] @ self._grid.car.powers(np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist())
+        gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 
     def seen(self, read: npt.NDArray[np.bool_]) -> Array:
         """(count,) 1 where the front wheel passed a point of the distance grid while there were readings, else 0."""
-        front = self._front
-        change = np.zeros(self.count + 1)
-        reach = np.maximum(np.diff(front, append=front[-1] + 1), 1)
-        np.add.at(change, front[read], 1.0)
-        np.add.at(change, np.minimum(front[read] + reach[read], self.count), -1.0)
-        result: Array = (np.cumsum(change)[:-1] > 0).astype(np.float64)
+        first, reach = self._front[read], np.maximum(self._advance, 1)[read]
+        begins, ends = (np.bincount(at, minlength=self.count + 1)
+                        for at in (first, np.minimum(first + reach, self.count)))
+        result: Array = (np.cumsum(begins - ends)[:-1] > 0).astype(np.float64)
         return result
 
     def seen_points(self, read: npt.NDArray[np.bool_]) -> int:
         """How many points of the distance grid the car passed while there were readings."""
-        return int(np.diff(self._front, append=self._front[-1])[read].sum())
+        return int(self._advance @ read)
 
     def about(self, row: Array) -> Array:
         """Mean (count,) of a row (t,) over the readings that show a step of the road at each point, as much as they do
@@ -230,18 +258,60 @@ class Block:
 
     def driven(self, road: ComplexArray) -> Array:
         """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
-        return np.fft.irfft((self.under(road) * self._grid.by_axle).sum(axis=0), len(self._front))
+        return self._read(self.under(road))
 
     def under(self, road: ComplexArray) -> ComplexArray:
         """The rfft in time of the elevations under the axles (x, f) [m], contact patch and all, of such a road."""
-        elevation = np.fft.irfft(road * self._averaged, self.count)
-        return np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
+        return self._under(np.fft.irfft(road * self._averaged, self.count))
 
     def transposed(self, row: Array) -> ComplexArray:
         """A' times a row (t,) in time, as an rfft."""
+        return np.fft.rfft(self._scattered(row)) * self._averaged
+
+    def _read(self, under: ComplexArray) -> Array:
+        first, *others = under * self._grid.by_axle
+        for one in others:
+            first += one
+        return np.fft.irfft(first, len(self._front))
+
+    def _under(self, elevation: Array) -> ComplexArray:
+        low, high = elevation.take(self._points) * self._shares
+        return np.fft.rfft(low + high)
+
+    def _scattered(self, row: Array) -> Array:
         back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.by_axle), len(row))
-        elevation = np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count)
-        return np.fft.rfft(elevation) * self._averaged
+        return np.asarray(np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count), np.float64)
+
+
+def _quantile(row: Array, share: float) -> float:
+    """That of ``np.quantile``, without what makes it slow for short rows."""
+    place = share * (len(row) - 1)
+    below = int(place)
+    low, high = np.partition(row, (below, below + 1))[below:below + 2]
+    return float(low + (high - low) * (place - below))
+
+
+@dataclass(frozen=True)
+class _Waves:
+    """Those of a grid: wave numbers (k,) [cycle/m], ``log_waves`` of them, and the logarithms of those (k,) that
+    ``CarResponse`` knows."""
+
+    wave_number_cpm: Array
+    log_waves: Array
+    log_n: Array
+
+
+@lru_cache(maxsize=32)
+def _waves_of(count: int, spacing_m: float) -> _Waves:
+    """Kept, for there are few counts."""
+    wave_number_cpm = np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64)
+    log_n = np.log(np.maximum(wave_number_cpm, WAVE_NUMBERS_CPM[0]))
+    return _Waves(wave_number_cpm, log_waves(wave_number_cpm), log_n)
+
+
+@lru_cache(maxsize=32)
+def _patch_gain_on_grid(count: int, contact_patch_m: float, spacing_m: float) -> Array:
+    return patch_gain(_waves_of(count, spacing_m).wave_number_cpm, contact_patch_m, spacing_m)
 
 
 def patch_gain(wave_number_cpm: Array, contact_patch_m: float, spacing_m: float) -> Array:

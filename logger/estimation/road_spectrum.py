@@ -45,5 +45,13 @@ class RoadSpectrum:
 
     def psd(self, wave_number_cpm: Array) -> Array:
         """Displacement spectrum [m3], one-sided, at wave numbers [cycle/m]; flat below 0.01 cycle/m."""
-        n = np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM)
-        return np.exp(self.log_level - self.waviness * np.log(n / PIVOT_CPM))
+        return self.psd_of(log_waves(wave_number_cpm))
+
+    def psd_of(self, logs: Array) -> Array:
+        """The same at waves (...) whose ``log_waves`` are known."""
+        return np.exp(self.log_level - self.waviness * logs)
+
+
+def log_waves(wave_number_cpm: Array) -> Array:
+    """Logarithm (...) of wave numbers [cycle/m] over the pivot's, where the spectrum is not flat."""
+    return np.log(np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM)

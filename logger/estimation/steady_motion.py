@@ -26,22 +26,20 @@ class SteadyMotion:
         """Of the acceleration before anything is read [(m/s2)2]."""
         return float(self.psd.mean()) * self.rate_hz / 2
 
-    def remaining_variance(self, variance: float) -> float:
-        """Variance that is left of each acceleration [(m/s2)2]."""
-        return float(self._left_psd(variance).mean()) * self.rate_hz / 2
+    def remaining_variance(self, variance: Array | float) -> Array | float:
+        """Variance that is left of each acceleration [(m/s2)2], for one variance of the readings or for many."""
+        return variance * self.resolved_per_reading(variance)
 
     def covariance_left(self, variance: float) -> Array:
         """The same by lag, (2 (f - 1),), as in a record that repeats [(m/s2)2]."""
-        return np.fft.irfft(self._left_psd(variance)) * self.rate_hz / 2
+        return np.fft.irfft(self._resolved(variance)) * variance
 
-    def resolved_per_reading(self, variance: float) -> float:
-        """Degrees of freedom that the motion takes of each reading, 0 to 1."""
-        return float((self._left_psd(variance) / self._noise_psd(variance)).mean())
+    def resolved_per_reading(self, variance: Array | float) -> Array | float:
+        """Degrees of freedom that the motion takes of each reading, 0 to 1; for one variance or for many."""
+        return np.mean(self._resolved(variance), axis=-1)
 
-    def _noise_psd(self, variance: float) -> float:
-        return 2 * variance / self.rate_hz
-
-    def _left_psd(self, variance: float) -> Array:
-        noise = self._noise_psd(variance)
-        left: Array = self.psd * noise / (self.psd + noise)
-        return left
+    def _resolved(self, variance: Array | float) -> Array:
+        """Share S / (S + N) of each frequency, (..., f) for variances (...)."""
+        noise = np.asarray(2 * variance / self.rate_hz)[..., None]
+        share: Array = self.psd / (self.psd + noise)
+        return share

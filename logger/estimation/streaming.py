@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.bent_forces import BentForces
-from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
 from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
     SlopeErrors,
@@ -170,7 +170,7 @@ class RoadEstimator:
 
     def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float) -> _Answers:
         """How the car answers such a road at such a speed; the last few are kept."""
-        psd = spectrum.psd(WAVE_NUMBERS_CPM)
+        psd = spectrum.psd_of(LOG_WAVES)
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
         if car in self._kept:
             return self._kept[car]
@@ -270,7 +270,7 @@ class RoadEstimator:
 
     def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
-        block = self._block(samples)
+        block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
         read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
@@ -278,10 +278,10 @@ class RoadEstimator:
         if self._answers.bent is None:
             solved = self._road.solved(block, samples, read)
         else:
-            block, solved = self._solved_in_turns(samples, read)
+            block, solved = self._solved_in_turns(block, samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
-        unseen = unseen_share(block.seen(read), self._spacing_m)
+        unseen = unseen_share(solved.seen, self._spacing_m)
         ride = self._answers.ride
         weighted = ride.weighted(solved.accel_mps2) if ride is not None else None
         estimates: list[WindowEstimate] = []
@@ -305,28 +305,23 @@ class RoadEstimator:
             estimates += self._window(number, piece)
         return estimates
 
-    def _block(self, samples: Samples) -> Block:
+    def _driven(self, block: Block) -> Block:
         """The block, with the car as it is on this road at this speed."""
-        block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
-        if self._car.depends_on_motion:
-            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
-            answers = self._answers_on(there, block.mean_speed_mps)
-            if answers is not self._answers:
-                self._answers = answers
-                block = Block(answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
-        return block
+        there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+        self._answers = self._answers_on(there, block.mean_speed_mps)
+        return block.on(self._answers.grid)
 
-    def _solved_in_turns(self, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
+    def _solved_in_turns(self, block: Block, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
         """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
         for _ in range(_TURNS if self._road.begun else _FIRST_TURNS):
-            block = self._block(samples)
+            block = self._driven(block)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
             solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
             assert self._answers.bent is not None
-            psd = there.psd(WAVE_NUMBERS_CPM)
+            psd = there.psd_of(LOG_WAVES)
             found, self._beyond_variance = self._answers.bent.reading(block.under(solved.road), psd, resolved)
             solved = replace(solved, accel_mps2=solved.accel_mps2 + self._beyond)
             change = _WAY * (found - self._beyond)

@@ -13,6 +13,7 @@ A force by all that moves at a wheel is a row of factors on q and z instead, and
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -94,11 +95,6 @@ class CornerSlopes:
     def passed(self, s: Complex) -> Complex:
         """Share (f,) of the suspension's rate that reaches the damper, at s (f,) [1/s]."""
         return 1 / (1 + self.damper_n_s_per_m * s / self.mount_n_per_m)
-
-    def suspension(self, s: Complex, damper_n_s_per_m: float) -> Complex:
-        """Force per travel (f,) [N/m] beyond a linear spring and a damper that is in the matrices."""
-        damped = self.damper_n_s_per_m * self.passed(s) + self.beside_n_s_per_m - damper_n_s_per_m
-        return np.asarray(self.spring_n_per_m + s * damped)
 
     def tire(self, s: Complex, tire_n_per_m: float) -> Complex:
         """Force per deflection (f,) [N/m] beyond a linear tire that is in the matrices."""
@@ -204,21 +200,34 @@ class LinearCar:
         dynamic, pressed = self._dynamic(s)
         return np.asarray(np.linalg.solve(dynamic, self.structure.road + pressed))
 
+    @cached_property
+    def _matrices(self) -> tuple[Array, Array]:
+        """Damping and stiffness (n, n) with the laws of the corners, as far as these are springs and dampers; of a
+        damper behind a mount as if that were rigid."""
+        structure = self.structure
+        damping, stiffness = structure.damping, structure.stiffness
+        for i, one in enumerate(self.corners):
+            travel, wheel = structure.travel[i], structure.wheels[i]
+            whole, resting = (float(one.tire(np.asarray(s), structure.tires[i]).real) for s in (1.0, 0.0))
+            damped = one.damper_n_s_per_m + one.beside_n_s_per_m - structure.dampers[i]
+            damping = (damping + damped * np.outer(travel, travel) + (whole - resting) * np.outer(wheel, wheel)
+                       + one.wheel_n_s_per_m * np.outer(wheel, wheel)
+                       + one.body_n_s_per_m * np.outer(travel + wheel, travel + wheel))
+            stiffness = (stiffness + one.spring_n_per_m * np.outer(travel, travel)
+                         + resting * np.outer(wheel, wheel))
+        return damping, stiffness
+
     def _dynamic(self, s: Complex) -> tuple[Complex, Complex]:
         """What q is multiplied by (..., n, n), and what the laws of the tires add to the road's force (..., n, w)."""
         structure = self.structure
-        suspension = np.stack(
-            [one.suspension(s, own) for one, own in zip(self.corners, structure.dampers, strict=True)], axis=-1)
+        dynamic = dynamic_stiffness(structure.mass, *self._matrices, s)
         tire = np.stack([one.tire(s, own) for one, own in zip(self.corners, structure.tires, strict=True)], axis=-1)
-        dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
-        dynamic = dynamic + (structure.travel.T * suspension[..., None, :]) @ structure.travel
         pressed = structure.wheels.T * tire[..., None, :]
-        dynamic = dynamic + pressed @ structure.wheels
         for i, one in enumerate(self.corners):
             travel, wheel = structure.travel[i], structure.wheels[i]
-            for row, per_rate in ((wheel, one.wheel_n_s_per_m), (travel + wheel, one.body_n_s_per_m)):
-                if per_rate:
-                    dynamic = dynamic + s[..., None, None] * (per_rate * np.outer(row, row))
+            if np.isfinite(one.mount_n_per_m):
+                kept_back = s * one.damper_n_s_per_m * (one.passed(s) - 1)
+                dynamic = dynamic + kept_back[..., None, None] * np.outer(travel, travel)
             for law in one.motions:
                 by_q, by_road = moved_by(law.forces(s), s, travel, wheel)
                 along = law.along(travel, wheel)

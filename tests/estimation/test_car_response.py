@@ -35,6 +35,15 @@ def test_power_is_that_of_the_car_at_a_steady_speed(name: str, speed_mps: float)
     assert not found[WAVE_NUMBERS_CPM * speed_mps > HIGHEST_HZ * 1.03].any()
 
 
+def test_powers_side_by_side_are_those_one_after_the_other() -> None:
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    one, other = (CarResponse(LinearCar(car, body_point(car, 0.7))) for _ in range(2))
+    one.power(17.0)
+    speeds_mps = [17.0, 5.0, 17.2, 30.0]
+    assert one.powers(speeds_mps) == pytest.approx(np.array([other.power(speed) for speed in speeds_mps]), rel=1e-12)
+    assert one.powers([]).shape == (0, len(WAVE_NUMBERS_CPM))
+
+
 def test_a_full_car_has_one_response_per_axle() -> None:
     full = structure_of(read_vehicle(vehicle_file("rav4-2009-full")))
     car = CarResponse(LinearCar(full, body_point(full)))

@@ -10,7 +10,7 @@ from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
 from logger.estimation.local_variance import mean_resolved
 from logger.estimation.road_solver import Block, Solution, TimeGrid
-from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum, log_waves
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -62,7 +62,7 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
 
     resolved = gain / (1 + gain)
     # The most probable waves have this power.
-    found = learnt(Belief(now), resolved * power / (1 + gain), resolved, n, 1.0, before)
+    found = learnt(Belief(now), resolved * power / (1 + gain), resolved, log_waves(n), 1.0, before)
     h = 1e-4
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
@@ -122,7 +122,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     solution = block.solve(reading, weight, now, variance, 400)
     share = block.seen_points(weight > 0) / block.count
     resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
-    found = learnt(Belief(now), whitened(block, solution, variance), resolved, block.wave_number_cpm, share, None)
+    found = learnt(Belief(now), whitened(block, solution, variance), resolved, block.log_waves, share, None)
     step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
     h = 0.02
     slope = np.array([
@@ -159,7 +159,7 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
                 waves = solution.waves
                 resolved = solution.gain / (1 + solution.gain)
                 belief = learnt(
-                    belief, whitened(block, solution, even), resolved, block.wave_number_cpm, share, None
+                    belief, whitened(block, solution, even), resolved, block.log_waves, share, None
                 )
             scores.append((belief.spectrum.log_level - true.log_level) / belief.log_level_std)
             wavinesses.append(belief.spectrum.waviness - waviness)
@@ -229,7 +229,7 @@ def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
 def test_nothing_read_leaves_what_roads_are_like() -> None:
     block = a_block(1024, 15.0)
     waves = np.zeros(len(block.wave_number_cpm))
-    found = learnt(Belief(COMMON_ROAD), waves, waves, block.wave_number_cpm, 0.0, None)
+    found = learnt(Belief(COMMON_ROAD), waves, waves, block.log_waves, 0.0, None)
     assert found.spectrum == COMMON_ROAD
     assert found.log_level_std == pytest.approx(1.8)
     assert with_noise(found, np.zeros(1024), np.zeros(1024), 0.0).log_noise == pytest.approx(0.0, abs=0.2)

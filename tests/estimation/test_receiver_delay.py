@@ -8,7 +8,7 @@ import pytest
 
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import angle_rad
-from logger.estimation.receiver_delay import Belief, DelayEstimate, combined
+from logger.estimation.receiver_delay import STRENGTHS, Belief, DelayEstimate, _log_likelihoods, combined
 
 from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive, fed
 
@@ -35,6 +35,32 @@ def test_the_delay_and_forward_are_found_at_every_angle(yaw_deg: float, delay_s:
     level = found.forward - seen.upward * (found.forward @ seen.upward)
     assert angle_rad(level, seen.forward) < np.radians(2)
     assert found.gain == pytest.approx(1.0, abs=0.15)  # the body pitches when the car brakes
+
+
+def test_likelihoods_are_those_of_dense_algebra() -> None:
+    """A straight line with a prior as broad as a barn door stands for one that is free."""
+    rng = np.random.default_rng(4)
+    t_s, weight = np.sort(rng.uniform(0.0, 40.0, 30)), rng.uniform(0.2, 1.2, 30)
+    residual = 0.2 * rng.standard_normal(30) + 11.0 - 0.03 * t_s
+    since = t_s - t_s[0]
+
+    def speed_covariance(hill_s: float) -> np.ndarray:
+        """Of the integral of an acceleration of covariance (1 + u/T) exp(-u/T), by sums over small steps."""
+        edges = np.linspace(0.0, since[-1], 1500)
+        u = np.abs(edges[:-1, None] - edges[:-1]) / hill_s
+        steps = np.clip(since[:, None] - edges[:-1], 0.0, edges[1])
+        return steps @ ((1 + u) * np.exp(-u)) @ steps.T
+
+    broad = np.stack([np.ones(30), t_s - t_s.mean()], axis=1) * 1e3
+    hills = {hill_s: speed_covariance(hill_s) for hill_s in {one[3] for one in STRENGTHS}}
+    expected = []
+    for noise_mps, walk, hill_mps2, hill_s in STRENGTHS:
+        covariance = (walk * np.minimum.outer(since, since) + hill_mps2**2 * hills[hill_s]
+                      + np.diag(noise_mps**2 / weight) + broad @ broad.T)
+        quadratic = residual @ np.linalg.solve(covariance, residual)
+        expected.append(-0.5 * (np.linalg.slogdet(covariance)[1] + quadratic))
+    found = _log_likelihoods(residual, t_s, STRENGTHS, weight)
+    assert found - found.mean() == pytest.approx(np.array(expected) - np.mean(expected), abs=0.05, rel=2e-3)
 
 
 def test_fixes_that_are_later_are_reported_to_be_later() -> None:

@@ -312,3 +312,32 @@ def test_lengths_are_even_long_enough_and_quick(least: float) -> None:
         while length % prime == 0:
             length //= prime
     assert length == 1
+
+
+def test_another_car_on_the_same_stretch_is_as_if_it_had_been_its_own() -> None:
+    """But for its laws: axles and contact patch are the same."""
+    rng = np.random.default_rng(8)
+    own, other = (time_grid("rav4-2009", 1024, ahead_m) for ahead_m in (0.0, 0.9))
+    there = Block(other, way(1024, [12.0, 20.0]), SPACING_M, ALIGN_M)
+    moved = Block(own, way(1024, [12.0, 20.0]), SPACING_M, ALIGN_M).on(other)
+    reading, weight = rng.standard_normal(1024), weights(1024)
+    assert moved.car is other.car
+    one, two = (block.solve(reading, weight, ROAD, uneven(block), 4) for block in (there, moved))
+    assert np.array_equal(one.road, two.road) and np.array_equal(one.fitted_mps2, two.fitted_mps2)
+
+
+@pytest.mark.parametrize("speeds_mps", [[20.0, 20.0], [3.0, 25.0, 9.0]])
+def test_waves_that_the_time_grid_cannot_hold_have_no_factor(speeds_mps: list[float]) -> None:
+    block = a_block(speeds_mps=speeds_mps)
+    speed_mps = np.gradient(way(1024, speeds_mps)) * RATE_HZ
+    held = block.wave_number_cpm[block.wave_factors(ROAD) != 0]
+    highest_cpm = 42.0 / np.quantile(speed_mps, 0.98)
+    assert held.max() == block.wave_number_cpm[:-1][block.wave_number_cpm[:-1] <= highest_cpm].max()
+
+
+def test_innovations_are_the_waves_of_a_solution() -> None:
+    block = a_block()
+    rng = np.random.default_rng(9)
+    first = block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 5)
+    for found in (first, block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 3, first.waves)):
+        assert found.innovations == pytest.approx(np.fft.irfft(found.waves, block.count), abs=1e-9)
