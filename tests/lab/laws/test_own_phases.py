@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import refitted
+from logger.lab.diagnosis import refit
 from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.laws.families.wheel_turns import FAMILY as WHEEL_TURNS
@@ -42,7 +42,7 @@ def _with_tone(run, phase):  # type: ignore[no-untyped-def]
 def test_a_hum_that_begins_elsewhere_in_each_run_is_found_with_a_pair_for_each() -> None:
     posterior = posterior_of(humming())
     start = posterior.start()
-    base = refitted(posterior, start)
+    base = refit(posterior, start)
     drafts = [one for one in HUM.drafts(LawContext(posterior, base.state)) if one.variant.startswith("steady")]
     alike, each = (fit_roughly(base.score, base, screen_law(base, one, misalignment(posterior, start)))[0]
                    for one in drafts)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.likelihood.lag import drift, lags
+from logger.lab.likelihood.lag import lag_drift, lags
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
@@ -105,7 +105,7 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     driven = SimulatedRuns(truth).predict(residuals.car)
     measured = [measuring(run, one) for run, one in zip(residuals.runs, driven, strict=True)]
     wrong = ModelResiduals(measured, residuals.car, residuals.predictions, residuals.responses)
-    assert drift(lags(measured, residuals.predictions)).value == pytest.approx(0.01, rel=0.03)
+    assert lag_drift(lags(measured, residuals.predictions)).value == pytest.approx(0.01, rel=0.03)
     found = marks(wrong)
     assert "runs ahead by 1 m in each 100 m" in sentence(mark(found, "drift"))
     assert found.found[0].name == "drift"
