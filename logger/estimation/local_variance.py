@@ -108,7 +108,7 @@ class LocalRoughness:
         return share
 
     def _log_error(self, log_variance: Array, weight: Array, seen: npt.NDArray[np.bool_]) -> Array:
-        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); where s is not learnt, it is seen shrunk by
+        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); s that is not learnt is seen shrunk by
         the common points."""
         if not seen.any():
             return np.zeros(len(weight))
