@@ -125,7 +125,7 @@ class WindowIri:
     """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
     ``shared`` with neighbours.
 
-    change_per_m    by how much the IRI of a window further on is higher [m/km per m], over the way that it may be off
+    change_per_m    how much the IRI of a window further on is higher, over the way it may be misplaced [m/km per m]
     """
 
     iri_m_per_km: float

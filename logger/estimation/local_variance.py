@@ -109,8 +109,8 @@ class LocalRoughness:
         return share
 
     def _log_error(self, log_variance: Array, weight: Array, seen: npt.NDArray[np.bool_]) -> Array:
-        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); where s is not learnt, the
-        common points shrink what is seen of it."""
+        """A road whose d scatters by s is known to 1 / (1 / s + weight / 2); s that is not learnt is seen shrunk by
+        the common points."""
         if not seen.any():
             return np.zeros(len(weight))
         shrunk = float(np.mean(weight[seen] / (weight[seen] + _COMMON)))

@@ -169,12 +169,12 @@ def test_a_recording_alone_gives_the_same_rows_again(name: str, settings: Any, t
     live = recording_alone_gives_the_same_rows(name, settings, tmp_path)
     known = [record for record in live.records if record.iri_m_per_km is not None]
     assert known or settings.__dict__.get("range_g", 2) > 2  # steps of a larger range hide this road
-    known_rides = [record for record in live.records[10:-10] if record.a_w_mps2 is not None]
-    assert len(known_rides) > 10
-    for record in known_rides:  # the tones beat: from one short window to the next the ride is 0.1 m/s2 more or less
-        assert abs(record.a_w_mps2 - ROUGH_A_W_MPS2) < 3 * np.hypot(record.a_w_std_mps2 or 0.0, 0.1), record
-    exact = [record.a_w_mps2 for record in known_rides if (record.a_w_std_mps2 or 0.0) < 0.1]
-    assert all(1.0 < figure < 2.5 for figure in exact)
+    rides = [(record.a_w_mps2, record.a_w_std_mps2 or 0.0) for record in live.records[10:-10]
+             if record.a_w_mps2 is not None]
+    assert len(rides) > 10
+    for figure, std in rides:  # the tones beat: from one short window to the next the ride is 0.1 m/s2 more or less
+        assert abs(figure - ROUGH_A_W_MPS2) < 3 * np.hypot(std, 0.1)
+        assert 1.0 < figure < 2.5 or std > 0.1
 
 
 @pytest.mark.parametrize("name", NAMES)
