@@ -2,8 +2,8 @@
 
 Problem: the chip samples by its own clock, whose rate is no more than nominal, into a buffer of 32 entries that gives
 them without times; a buffer that ran over has lost the oldest; and after a dip of its supply the chip stands by.
-Solution: the buffer (FIFO, in stream mode) is emptied some 20 times a second, ``SampleClock`` recovers the rate and the
-times from when that was, an overrun starts them over, and settings are read back in turn (``ChipSource``).
+Solution: the buffer (FIFO, in stream mode) is emptied some 20 times a second, its samples are dated
+(``drivers.buffered_chip``), and settings are read back in turn (``ChipSource``).
 
 It runs in full resolution at +-16 g: one count is 3.9 mg at every range, and a smaller range would only clip sooner.
 
@@ -28,15 +28,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from drivers.accelerometers.accelerometer import Accelerometer, Readings
-from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
-from drivers.dated_samples import DatedSamples, Samples
+from drivers.buffered_chip import BufferedChip, BufferedDecoder, Entries, Waiting, buffered_source
+from drivers.chip_bus import bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
-from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.readings import STANDARD_GRAVITY_MPS2
 from drivers.registers import Field, Register
 from drivers.settings import Kind, OneOf, Whole
-from drivers.sources import US_PER_S, ChipSource, Scattered, Source
+from drivers.sources import Source
 
 ADDRESSES = (0x53, 0x1D)
 DEVICE_ID = Register("device id", 0x00, reset_value=0xE5)
@@ -73,7 +73,6 @@ LARGEST_COUNT = 4095  # 13 bits
 NOISE_MPS2 = 1.1 / COUNTS_PER_G * STANDARD_GRAVITY_MPS2  # Z at 100 Hz, 1.1 LSB r.m.s.; on the 100 Hz grid at any rate
 TURN_ON_S = 0.0011  # and one sample (Table 1)
 RATE_TOLERANCE = 0.02  # the data sheet states none; a rate that is further off is found out
-LONGEST_LOOK_US = 50_000
 
 log = logging.getLogger(__name__)
 
@@ -90,7 +89,7 @@ class Adxl345Config:
             raise SettingsError(f"rate_hz is one of {', '.join(map(str, RATE_CODES))}, not {self.rate_hz}", "rate_hz")
 
 
-class Adxl345(ConfiguredChip):
+class Adxl345(BufferedChip):
     """One chip on a bus. ``sleep`` takes seconds. Every method but ``stop`` raises the DeviceError family, as
     ``Bma220`` does; after any, wait and call ``start`` again: it assumes nothing about the chip."""
 
@@ -100,10 +99,9 @@ class Adxl345(ConfiguredChip):
             (RATE, {RATE_CODE: RATE_CODES[rate_hz], LOW_POWER: 0}),
             (FIFO, {FIFO_MODE: STREAM}),
             (POWER, {MEASURE: 1, SLEEP: 0, LINK_AND_SLEEP: 0}),
-        ))
+        ), DATA_ADDRESS, ENTRY_BYTES)
         self._sleep = sleep
         self._rate_hz = rate_hz
-        self._lost = True
 
     def start(self) -> int:
         """Find the chip, set it up with an empty buffer, and let it measure. Gives the address that it answers at."""
@@ -123,29 +121,13 @@ class Adxl345(ConfiguredChip):
         log.info("ADXL345 runs at 0x%02X, %d samples a second", chip, self._rate_hz)
         return chip
 
-    def read(self, now_us: Callable[[], int]) -> tuple[int, bytes]:
-        """The time at which the chip was asked how many entries it holds [us], and its answer: INT_SOURCE, FIFO_STATUS,
-        then X, Y, Z of each entry, low byte first, oldest entry first. Empty where it holds none.
+    def _waiting(self, chip: int) -> Waiting:
+        interrupts = INTERRUPTS.read(self._bus, chip)
+        status = FIFO_STATUS.read(self._bus, chip)
+        return Waiting(ENTRIES.extract(status), bool(OVERRUN.extract(interrupts)), bytes((interrupts, status)))
 
-        The overrun bit of INT_SOURCE is also set where entries were lost between the last answer and this one: by a
-        transfer that failed, or because the chip has been started.
-        """
-        chip = self._started()
-        t_us = now_us()
-        try:
-            interrupts = INTERRUPTS.read(self._bus, chip)
-            status = FIFO_STATUS.read(self._bus, chip)
-            t_us = now_us()
-            count = ENTRIES.extract(status)
-            if not count:
-                return t_us, b""
-            lost = self._lost or bool(OVERRUN.extract(interrupts))
-            self._lost = True  # until all entries are here
-            entries = [self._entry(chip) for _ in range(count)]
-        except OSError as error:
-            raise bus_fault(error, chip) from error
-        self._lost = False
-        return t_us, bytes((OVERRUN.insert(interrupts, int(lost)), status)) + b"".join(entries)
+    def _marked(self, said: bytes, lost: bool) -> bytes:
+        return bytes((OVERRUN.insert(said[0], int(lost)), said[1]))
 
     def stop(self) -> None:
         """Let the chip stand by. Never raises."""
@@ -154,63 +136,22 @@ class Adxl345(ConfiguredChip):
             with suppress(OSError, DeviceError):
                 POWER.update(self._bus, chip, {MEASURE: 0})
 
-    def _entry(self, chip: int) -> bytes:
-        data = bytes(self._bus.read_i2c_block_data(chip, DATA_ADDRESS, ENTRY_BYTES))
-        if len(data) != ENTRY_BYTES:
-            raise BadReply(f"ADXL345 at 0x{chip:02X}: a read of {ENTRY_BYTES} bytes gave {len(data)}")
-        return data
 
-
-class Adxl345Decoder:
-    """What ``Adxl345.read`` gave, in; samples with their times, out."""
+class Adxl345Decoder(BufferedDecoder):
+    """Answers of ``Adxl345.read``: INT_SOURCE, FIFO_STATUS, then X, Y, Z of each entry, low byte first."""
 
     name = "adxl345"
 
     def __init__(self, rate_hz: int) -> None:
-        self._samples = DatedSamples(rate_hz, RATE_TOLERANCE)
-        self._overruns = 0
+        super().__init__(rate_hz, RATE_TOLERANCE)
 
-    @property
-    def doubt(self) -> str:
-        """What is wrong with the samples that come; empty: nothing."""
-        return self._samples.doubt("Check the wires of the bus, its clock (400 kHz for 400 samples a second and more), "
-                                   "and what else keeps the computer busy")
-
-    @property
-    def note(self) -> str:
-        """How the samples come; empty: as they should."""
-        return self._samples.note
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """What came in so far, and what is missing in it."""
-        clock = self._samples.clock
-        return {"samples": self._samples.good, "overruns": self._overruns, "lost": clock.lost,
-                "resyncs": clock.resyncs, "undated": self._samples.undated}
-
-    def feed(self, t_us: int, data: bytes) -> None:
-        """Take the entries of one look at ``t_us``. BadReply (and nothing taken) where their number is another one."""
+    def _decoded(self, data: bytes) -> Entries:
         count, rest = divmod(len(data) - 2, ENTRY_BYTES)
         if count < 1 or rest or ENTRIES.extract(data[1]) != count:
             raise BadReply(f"an ADXL345 answer of {len(data)} bytes: expected INT_SOURCE, FIFO_STATUS and its entries")
         counts = np.frombuffer(data, dtype="<i2", offset=2).reshape(-1, 3).astype(np.float64)
-        overrun = bool(OVERRUN.extract(data[0]))
-        self._overruns += overrun
-        self._samples.add(Samples(
-            after_loss=overrun,
-            arrivals_us=np.full(count, t_us, dtype=np.int64),
-            accel_mps2=counts * (STANDARD_GRAVITY_MPS2 / COUNTS_PER_G),
-            clipped=np.asarray(((counts <= -LARGEST_COUNT - 1) | (counts >= LARGEST_COUNT)).any(axis=1)),
-            good=np.ones(count, dtype=np.bool_),
-        ))
-
-    def flush(self) -> None:
-        """No more will come: the next ``take`` gives all."""
-        self._samples.flush()
-
-    def take(self) -> AccelerationBlock:
-        """The samples whose times are certain by now."""
-        return self._samples.take()
+        return Entries(bool(OVERRUN.extract(data[0])), counts * (STANDARD_GRAVITY_MPS2 / COUNTS_PER_G),
+                       np.asarray(((counts <= -LARGEST_COUNT - 1) | (counts >= LARGEST_COUNT)).any(axis=1)))
 
 
 class _Adxl345(Accelerometer[Adxl345Config]):
@@ -227,13 +168,9 @@ class _Adxl345(Accelerometer[Adxl345Config]):
 
     def source(self, settings: Adxl345Config, machine: Machine) -> Source:
         """Looks that leave the buffer half empty."""
-        interval_us = US_PER_S // settings.rate_hz
-        look_us = min(LONGEST_LOOK_US, FIFO_ENTRIES // 2 * interval_us)
-        return ChipSource(
-            self.name, lambda: machine.open_i2c(settings.i2c_bus, None),
-            lambda bus: Adxl345(bus, settings.rate_hz, machine.sleep), machine.now_us,
-            Scattered(look_us, interval_us, machine.sleep),
-        )
+        return buffered_source(self.name, machine, settings.i2c_bus,
+                               lambda bus: Adxl345(bus, settings.rate_hz, machine.sleep), settings.rate_hz,
+                               FIFO_ENTRIES)
 
     def decoder(self, settings: Adxl345Config, upright_axis: int) -> Adxl345Decoder:
         """By the nominal rate."""
