@@ -32,7 +32,7 @@ LONGEST_LOOK_US = 50_000
 class Waiting(NamedTuple):
     """What a chip says of its buffer: how many entries it holds, whether some were lost, and the bytes that said so."""
 
-    count: int
+    entries: int
     overrun: bool
     said: bytes
 
@@ -77,11 +77,11 @@ class BufferedChip(ConfiguredChip, ABC):
         try:
             waiting = self._waiting(chip)
             t_us = now_us()
-            if not waiting.count:
+            if not waiting.entries:
                 return t_us, b""
             lost = self._lost or waiting.overrun
             self._lost = True  # until all entries are here
-            entries = [self._entry(chip) for _ in range(waiting.count)]
+            entries = [self._entry(chip) for _ in range(waiting.entries)]
         except OSError as error:
             raise bus_fault(error, chip) from error
         self._lost = False
@@ -109,7 +109,7 @@ class BufferedDecoder(ABC):
     check    what to look at where samples are lost
     """
 
-    name: ClassVar[str]
+    name: str
     check: ClassVar[str] = ("Check the wires of the bus, its clock (400 kHz for 400 samples a second and more), and "
                             "what else keeps the computer busy")
 
