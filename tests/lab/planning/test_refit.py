@@ -39,7 +39,7 @@ def test_a_car_with_other_numbers_leaves_no_more_than_what_its_prior_costs(numbe
     assert 0 < gain < 1.01 * costs
     linear = drive.model().without_soft_bounds()
     white = linear.whitened([change])
-    mixed, own = linear.mixed(white)
+    mixed, own = linear.cross_products(white)
     first_order = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
     assert first_order > 1.3 * gain
 
@@ -48,6 +48,6 @@ def test_what_is_small_leaves_what_first_order_says() -> None:
     drive, rng = planned(0.5), np.random.default_rng(4)
     change = 0.01 * rng.standard_normal(drive.run.count)
     linear = drive.model().without_soft_bounds()
-    mixed, own = linear.mixed(linear.whitened([change]))
+    mixed, own = linear.cross_products(linear.whitened([change]))
     expected = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
     assert refitted_gain([there_of(drive)], [[change]], precision_of(drive)) == pytest.approx(expected, rel=0.05)
