@@ -28,7 +28,7 @@ def headline(found: Comparison) -> list[str]:
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
     lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
-             f"error (ratio) {plain.error:.3f}."]
+             f"error {plain.error:.3f}, their ratio."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += " (and the numbers of its effects)"

@@ -65,7 +65,7 @@ def chance(p_value: float) -> str:
     """A probability, such as a p-value."""
     if p_value < _RARE:
         return "below 1e-9"
-    return f"{p_value:.2g}"
+    return f"{p_value:.2f}" if p_value >= 0.01 else f"{p_value:.2g}"
 
 
 def percent(share: float) -> str:

@@ -152,7 +152,7 @@ def test_the_table_has_the_candidates_in_order_with_errors_where_they_are_known(
     rows = list(table(FOUND))
     assert [row[0] for row in rows] == ["dry_friction", "tire_damping", "sensor_gain"]
     assert rows[0][1:3] == ("0.200", "below 1e-9") and rows[0][3].startswith("friction_force_n 85 ± 4 N")
-    assert rows[1][2] == "30%" and "±" not in rows[1][3]
+    assert rows[1][2] == "0.30" and "±" not in rows[1][3]
     assert list(table(FOUND, 1)) == rows[:1]
 
 

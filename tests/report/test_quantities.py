@@ -27,7 +27,7 @@ def test_units_are_the_ends_of_names() -> None:
     one = chosen(shipped_effects()["dry_friction"], {"friction_force_n": 85.2},
                  standard_errors={"friction_force_n": 4.1})
     assert numbers_of(one) == "friction_force_n 85 ± 4 N, transition_velocity_m_per_s 0 m/s"
-    assert [chance(p) for p in (1e-30, 2e-4, 1.0)] == ["below 1e-9", "0.0002", "1"]
+    assert [chance(p) for p in (1e-30, 2e-4, 0.3, 1.0)] == ["below 1e-9", "0.0002", "0.30", "1.00"]
 
 
 @pytest.mark.parametrize(("name", "unit"), [
