@@ -108,11 +108,12 @@ def _say(complaints: Iterable[str], warn: Callable[[str], None], anyway: bool) -
 
 @dataclass(frozen=True)
 class _Followed:
-    """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it. What is wrong
-    with a whole record, its sign or its unit, is wrong in both."""
+    """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it, at any lag and
+    within the half wave at hand. What is wrong with a whole record, its sign or its unit, is wrong in both bands."""
 
     around: list[RoadMatch]
     below: list[RoadMatch]
+    below_at_hand: list[RoadMatch]
     band_hz: tuple[float, float]
 
 
@@ -126,6 +127,7 @@ def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _F
     band_hz = bounce_band_hz(body_hz)
     mains = [(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)]
     return _Followed([road_match(run, one, band_hz) for run, one in mains],
+                     [road_match(run, one, (band_hz[0], float(body_hz.min()))) for run, one in mains],
                      [match_below_bounce(run, one, body_hz) for run, one in mains], band_hz)
 
 
@@ -136,7 +138,7 @@ def _moves(run: Run, prediction: Array) -> bool:
 
 def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
-    for run, around, below in zip(runs.runs, followed.around, followed.below, strict=True):
+    for run, around, below in zip(runs.runs, followed.around, followed.below_at_hand, strict=True):
         if around.is_upside_down and below.turned > below.correlation:
             yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
                    f"the model (correlation {around.turned:.2f})")

@@ -67,7 +67,7 @@ _SAID = (
     (r"argument (\S+): invalid float value: '(.*)'", r"\1 \2: expected a number"),
     (r"argument (\S+): invalid int value: '(.*)'", r"\1 \2: expected a whole number"),
     (r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", r"\1 \2: expected one of \3"),
-    (r"the following arguments are required: (.*)", r"expected \1 as well"),
+    (r"the following arguments are required: (.*)", r"expected \1"),
     (r"unrecognized arguments: (.*)", r"expected no \1"),
 )
 """Complaints of argparse, and how all others here are worded."""

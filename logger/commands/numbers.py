@@ -21,7 +21,8 @@ def add_number(
             value = kind(text)
         except ValueError:
             what = ("a whole number" if kind is int else "a number") + (f" in {unit}" if unit else "")
-            raise BadInput(f"{option} {text}: expected {what}, without its unit") from None
+            without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""
+            raise BadInput(f"{option} {text}: expected {what}{without}") from None
         Range(low, high, unit).check(option, value)
         return value
 

@@ -181,7 +181,7 @@ def _check_given(args: argparse.Namespace) -> None:
               "--out": args.out}
     missing = [name for name, given in needed.items() if not given]
     if missing:
-        raise BadInput(f"simulate: expected {', '.join(missing)} as well (try 'ridelog simulate --help')")
+        raise BadInput(f"simulate: expected {', '.join(missing)} (try 'ridelog simulate --help')")
 
 
 def _check_files(args: argparse.Namespace, picture: Path | None) -> None:

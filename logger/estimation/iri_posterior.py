@@ -125,13 +125,17 @@ class WindowIri:
     """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
     ``shared`` with neighbours.
 
-    change_per_m    how much the IRI of a window further on is higher, over the way it may be misplaced [m/km per m]
+    begins_with, ends_with    IRI over the way by which the window may be misplaced, at its beginning and at its end
+                              [m/km]: a window further on loses as much at the one and gains as much at the other
+    scatter                   variance of the IRI over such ways, along the window [(m/km)2]
     """
 
     iri_m_per_km: float
     own_std_m_per_km: float
     shared_std_m_per_km: float
-    change_per_m: float
+    begins_with_m_per_km: float
+    ends_with_m_per_km: float
+    scatter: float
 
 
 def window_iri(
@@ -163,10 +167,11 @@ def window_iri(
     stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
     shared = hypot((more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std)
-    # A window that lies further on loses as much way as it gains: what it changes by is the mean over that way.
-    ends = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
-    change = float(absolute[-ends:].mean() - absolute[:ends].mean()) / length_m
-    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * shared, PER_KM * change)
+    points = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
+    begins, ends = float(absolute[:points].mean()), float(absolute[-points:].mean())
+    parts = absolute[: len(absolute) // points * points].reshape(-1, points).mean(axis=1)
+    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * shared, PER_KM * begins, PER_KM * ends,
+                     PER_KM**2 * float(parts.var(ddof=1)))
 
 
 def raised(spectrum: RoadSpectrum) -> RoadSpectrum:

@@ -170,11 +170,11 @@ class FollowedRoad:
         if self._gaussian is not None:
             self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
 
-    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
-               ) -> SolvedBlock:
+    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1,
+               is_last: bool = True) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
         uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved, which
-        share rounds and steps."""
+        share rounds and steps, and ``is_last`` whether this is the last time."""
         rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
@@ -182,14 +182,15 @@ class FollowedRoad:
         self._begun = True
         seen = block.seen(read)
         for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, seen, steps, before, left == 0, beyond_variance)
+            result = self._round(block, samples, read, seen, steps, before, left == 0, is_last, beyond_variance)
         return result
 
     def _round(
         self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
-        learns: bool, beyond_variance: float,
+        learns: bool, is_last: bool, beyond_variance: float,
     ) -> SolvedBlock:
-        """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``."""
+        """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``, of how
+        much roughness scatters once per block, the last time."""
         readings = self._as_gaussian(samples)
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
         local = self._local.at(first, block.count).variance
@@ -225,7 +226,7 @@ class FollowedRoad:
         white = np.clip(solution.innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
-        settled = self._is_coarse and learns and before is not None
+        settled = self._is_coarse and learns and is_last and before is not None
         self._local.learn(first, solution.innovations, local, gain, seen, taken, settled)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:

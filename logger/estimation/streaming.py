@@ -313,10 +313,11 @@ class RoadEstimator:
 
     def _solved_in_turns(self, block: Block, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
         """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
-        for _ in range(_TURNS if self._road.begun else _FIRST_TURNS):
+        turns = _TURNS if self._road.begun else _FIRST_TURNS
+        for turn in range(turns):
             block = self._driven(block)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
-            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS)
+            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS, turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
@@ -383,7 +384,11 @@ class RoadEstimator:
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
         late_m = self._late_std_s * sum(one.speed_mps for one in pieces) / len(pieces)
-        misplaced = hypot(self._place_std_m, late_m) * sum(one.change_per_m for one in iri) / len(iri)
+        # Ends that happen to be alike do not make a place certain: what they differ by counts half, the other half is
+        # what two such ends differ by along the window.
+        change = sqrt((iri[-1].ends_with_m_per_km - iri[0].begins_with_m_per_km) ** 2 / 2
+                       + sum(one.scatter for one in iri) / len(iri))
+        misplaced = hypot(self._place_std_m, late_m) * change / (len(iri) * self._piece_m)
         std = hypot(own, shared, misplaced)
         return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride)]
 
@@ -400,7 +405,7 @@ class RoadEstimator:
 
 
 def _nothing(missing: str) -> _Piece:
-    return _Piece(WindowIri(nan, nan, nan, nan), 0.0, missing)
+    return _Piece(WindowIri(nan, nan, nan, nan, nan, nan), 0.0, missing)
 
 
 def _joined_ride(pieces: list[_Piece]) -> RideFigures:

@@ -125,7 +125,8 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
 def _sample(engine: Engine, since_us: int | None, until_us: int | None, passes: int) -> Mapping[str, npt.NDArray[Any]]:
     """Passes by session of a part of the roads, at most some ``MOST_PASSES``.
 
-    Of few roads the part by remainders may be far smaller than meant, or empty: then of twice as many roads."""
+    Of few roads the part by remainders may be far smaller than meant, or empty: then of twice as many roads. A few
+    roads that hold most of the passes may so bring more than ``MOST_PASSES``."""
     one_in = -(-passes // MOST_PASSES)
     while True:
         sample = engine.arrays(passes_by_session(engine.rows, since_us, until_us, _ZERO_US, one_in))

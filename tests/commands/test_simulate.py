@@ -371,5 +371,5 @@ def test_the_effects_there_are(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_what_a_drive_needs_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"expected --profile or --flat, --out as well"):
+    with pytest.raises(BadInput, match=r"expected --profile or --flat, --out"):
         main(["simulate", "--vehicle", "rav4-2009", "--speed", "3"])

@@ -32,7 +32,7 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
     (["iri", "p.csv", "--window", "3ft"], "--window 3ft: expected a number (try"),
     (["iri", "p.csv", "--windows", "3"], "expected no --windows 3 (try"),
     (["sections", "logs", "--units", "uk"], "--units uk: expected one of 'si', 'us' (try"),
-    (["convert", "logs"], "expected --to as well (try"),
+    (["convert", "logs"], "expected --to (try"),
 ])
 def test_wrong_use_is_said_as_everything_else(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
@@ -46,6 +46,8 @@ def test_wrong_use_is_said_as_everything_else(
     ("iri", "t_s,accel_z_mps2,speed_mps,distance_m", "; this is a drive: ridelog estimate takes it"),
     ("iri", "t_s,accel_z_mps2", "; this is an acceleration record: ridelog comfort takes it"),
     ("comfort", "distance_m,elevation_m", "; this is a profile: ridelog iri takes it"),
+    ("iri", "distance_m,elevation_m,roll_deg", "found 'distance_m,elevation_m,roll_deg'"),
+    ("comfort", "time_s,accel_z_mps2", "found 'time_s,accel_z_mps2'"),
 ])
 def test_a_file_of_another_command_is_recognised(command: str, header: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "one.csv").write_text(header + "\n" + ",".join("0" for _ in header.split(",")) + "\n")

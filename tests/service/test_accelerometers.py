@@ -175,6 +175,7 @@ def test_a_recording_alone_gives_the_same_rows_again(name: str, settings: Any, t
     for figure, std in rides:  # the tones beat: from one short window to the next the ride is 0.1 m/s2 more or less
         assert abs(figure - ROUGH_A_W_MPS2) < 3 * np.hypot(std, 0.1)
         assert 1.0 < figure < 2.5 or std > 0.1
+        assert std < 0.1 or settings.__dict__.get("range_g", 2) > 8
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -32,16 +32,18 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 _TAKEN_BY = (
-    ({"accel_z_mps2", "distance_m"}, "a drive: ridelog estimate"),
-    ({"accel_z_mps2"}, "an acceleration record: ridelog comfort"),
-    ({"distance_m", "elevation_m"}, "a profile: ridelog iri"),
+    ({"t_s", "accel_z_mps2", "speed_mps", "distance_m"}, "a drive: ridelog estimate"),
+    ({"t_s", "accel_z_mps2"}, "an acceleration record: ridelog comfort"),
 )
-"""Columns of the files of the desk, what such a file is, and which command takes it alone."""
+"""All columns of the files of the desk that a command takes alone, what such a file is, and the command."""
+_PROFILE = ("distance_m", "elevation_m")
 
 
 def _taken_by(names: Names) -> str:
-    """What a file is that another command takes; nothing for other files."""
-    known = next((words for columns, words in _TAKEN_BY if columns <= set(names)), "")
+    """What a file is that another command takes; nothing for other files. A command refuses no file with all columns
+    that it wants, so that nobody is sent to the command that has just refused."""
+    known = "a profile: ridelog iri" if names == _PROFILE else next(
+        (words for columns, words in _TAKEN_BY if columns <= set(names)), "")
     return f"; this is {known} takes it" if known else ""
 
 
