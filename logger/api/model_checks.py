@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from math import log
 from typing import TYPE_CHECKING
 
 from logger.errors import BadInput
-from logger.units import STANDARD_GRAVITY_MPS2
+from logger.units import FOOT_M, STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.road_match import RoadMatch
@@ -21,13 +22,12 @@ if TYPE_CHECKING:
 
 _LEAST_MPS2 = 1e-4
 _NEAR = 0.3
-_FOOT_M = 0.3048
 _RECORD, _PROFILE = "the record seems to be", "the profile seems to be"
 # Measured / model, where one of them is in another unit.
 _UNITS = (
     (_RECORD, "g", 1 / STANDARD_GRAVITY_MPS2), (_RECORD, "thousandths of g", 1000 / STANDARD_GRAVITY_MPS2),
-    (_RECORD, "mm/s2", 1000.0), (_RECORD, "ft/s2", 1 / _FOOT_M),
-    (_PROFILE, "mm", 0.001), (_PROFILE, "cm", 0.01), (_PROFILE, "inches", _FOOT_M / 12), (_PROFILE, "feet", _FOOT_M),
+    (_RECORD, "mm/s2", 1000.0), (_RECORD, "ft/s2", 1 / FOOT_M),
+    (_PROFILE, "mm", 0.001), (_PROFILE, "cm", 0.01), (_PROFILE, "inches", FOOT_M / 12), (_PROFILE, "feet", FOOT_M),
 )
 _SENSOR_GAIN = (0.2, 5.0)
 """Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
@@ -111,24 +111,42 @@ class _Followed:
     """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it, at any lag and
     within the half wave at hand. What is wrong with a whole record, its sign or its unit, is wrong in both bands."""
 
-    around: list[RoadMatch]
-    below: list[RoadMatch]
-    below_at_hand: list[RoadMatch]
-    band_hz: tuple[float, float]
+    pairs: list[tuple[Run, Array]]
+    body_hz: Array
+
+    @cached_property
+    def band_hz(self) -> tuple[float, float]:
+        from logger.lab.road_match import bounce_band_hz
+
+        return bounce_band_hz(self.body_hz)
+
+    @cached_property
+    def around(self) -> list[RoadMatch]:
+        from logger.lab.road_match import road_match
+
+        return [road_match(run, prediction, self.band_hz) for run, prediction in self.pairs]
+
+    @cached_property
+    def below(self) -> list[RoadMatch]:
+        from logger.lab.road_match import below_bounce_band_hz, road_match
+
+        band_hz = below_bounce_band_hz(self.body_hz)
+        return [road_match(run, prediction, band_hz) for run, prediction in self.pairs]
+
+    @cached_property
+    def below_at_hand(self) -> list[RoadMatch]:
+        from logger.lab.road_match import match_below_bounce
+
+        return [match_below_bounce(run, prediction, self.body_hz) for run, prediction in self.pairs]
 
 
 def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
-    from logger.lab.road_match import bounce_band_hz, match_below_bounce, road_match
     from logger.vehicle.models import structure_of
     from logger.vehicle.modes import undamped_frequencies_hz
 
     structure = structure_of(car.vehicle)
-    body_hz = undamped_frequencies_hz(structure)[: -len(structure.wheels)]
-    band_hz = bounce_band_hz(body_hz)
-    mains = [(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)]
-    return _Followed([road_match(run, one, band_hz) for run, one in mains],
-                     [road_match(run, one, (band_hz[0], float(body_hz.min()))) for run, one in mains],
-                     [match_below_bounce(run, one, body_hz) for run, one in mains], band_hz)
+    return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)],
+                     undamped_frequencies_hz(structure)[: -len(structure.wheels)])
 
 
 def _moves(run: Run, prediction: Array) -> bool:

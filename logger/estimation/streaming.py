@@ -361,11 +361,14 @@ class RoadEstimator:
         louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
-        misplaced_m = hypot(self._place_std_m, self._late_std_s * speed_mps)
-        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, misplaced_m)
+        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, self._misplaced_m(speed_mps))
         like_noise = iri.iri_m_per_km * self._road.scale_log_std
         iri = replace(iri, shared_std_m_per_km=hypot(iri.shared_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)
+
+    def _misplaced_m(self, speed_mps: float) -> float:
+        """Standard error of a place [m]."""
+        return hypot(self._place_std_m, self._late_std_s * speed_mps)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
         """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
@@ -383,12 +386,12 @@ class RoadEstimator:
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
-        late_m = self._late_std_s * sum(one.speed_mps for one in pieces) / len(pieces)
+        mean_speed_mps = sum(one.speed_mps for one in pieces) / len(pieces)
         # Ends that happen to be alike do not make a place certain: what they differ by counts half, the other half is
         # what two such ends differ by along the window.
         change = sqrt((iri[-1].ends_with_m_per_km - iri[0].begins_with_m_per_km) ** 2 / 2
                        + sum(one.scatter for one in iri) / len(iri))
-        misplaced = hypot(self._place_std_m, late_m) * change / (len(iri) * self._piece_m)
+        misplaced = self._misplaced_m(mean_speed_mps) * change / (len(iri) * self._piece_m)
         std = hypot(own, shared, misplaced)
         return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride)]
 

@@ -87,6 +87,11 @@ def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
     return 0.4 * float(body_hz.min()), 3.0 * float(body_hz.max())
 
 
+def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
+    """Frequency band below the bounce of a body, by its natural frequencies (b,) [Hz]."""
+    return bounce_band_hz(body_hz)[0], float(body_hz.min())
+
+
 def match_below_bounce(run: Run, prediction: Array, body_hz: Array) -> RoadMatch:
     """Correlation of a run with a prediction (n,) below the bounce of a body, by its natural frequencies (b,) [Hz].
 
@@ -95,8 +100,8 @@ def match_below_bounce(run: Run, prediction: Array, body_hz: Array) -> RoadMatch
     The body moves with the road there, even if dry friction blocks the suspension, or the sensor is far from where the
     model has it: either may reverse and multiply the motion around the bounce.
     """
-    lowest_hz = float(body_hz.min())
-    return road_match(run, prediction, (bounce_band_hz(body_hz)[0], lowest_hz), most_lag_s=0.25 / lowest_hz)
+    band_hz = below_bounce_band_hz(body_hz)
+    return road_match(run, prediction, band_hz, most_lag_s=0.25 / band_hz[1])
 
 
 def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0,

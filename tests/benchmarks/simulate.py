@@ -60,7 +60,7 @@ def uneven(t: Array) -> Array:
 
 
 def accuracy(figures: Figures) -> None:
-    """R.m.s. of the error over r.m.s. of the motion, of the worst of four outputs, beside DOP853 at rtol 1e-7."""
+    """R.m.s. of the error over r.m.s. of the motion, of the worst of four outputs, against DOP853 at rtol 1e-7."""
     x, fine_x = 0.05 * np.arange(1600), 0.01 * np.arange(4000)
     rough = np.random.default_rng(2).standard_normal(4000) * 0.005  # every centimetre of it another height
     random, other = (Track(0.05, iso8608.generate(256, 80, 0.05, seed)) for seed in (3, 4))

@@ -109,11 +109,11 @@ def test_noise_is_reported_without_rounding_and_as_it_was_read() -> None:
               for one in runs]
     posterior = posterior_of(coarse)
     state = posterior.start()
-    beside = posterior.with_rounding_at(state)
-    assert sensor_noise_of(beside, state).deviation_mps2 == pytest.approx(0.1, rel=0.05)
-    with_rounding = sensor_noise_with_rounding(beside, state)
+    rounded = posterior.with_rounding_at(state)
+    assert sensor_noise_of(rounded, state).deviation_mps2 == pytest.approx(0.1, rel=0.05)
+    with_rounding = sensor_noise_with_rounding(rounded, state)
     assert with_rounding.deviation_mps2 == pytest.approx(np.hypot(0.1, STEP / np.sqrt(12)), rel=0.05)
-    assert beside.error(state) == posterior.error(state)
+    assert rounded.error(state) == posterior.error(state)
 
 
 def test_what_is_not_rounded_is_the_same_posterior() -> None:
