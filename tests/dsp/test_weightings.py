@@ -33,6 +33,7 @@ def test_stored_sections_are_within_0_02_db_of_the_formula() -> None:
     assert road.phase_deg < 0.2
 
 
+@pytest.mark.slow
 def test_stored_sections_are_those_of_the_design() -> None:
     again = design_sections(WEIGHTING, 100)
     stored = np.abs(frequency_response(WEIGHTING.sections[100], BAND_HZ, 100))

@@ -333,6 +333,7 @@ def test_places_that_lie_close_together_share_a_mark(open_page: Open) -> None:
     assert numbers[-1][0] == "1"
 
 
+@pytest.mark.slow
 def test_repeated_drives_are_one_street_and_each_can_be_looked_at(open_page: Open) -> None:
     rows = repeated_drives(3, 60, iri=(2.0, 3.0, 4.0))
     tab = open_page(rows)

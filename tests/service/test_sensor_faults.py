@@ -30,6 +30,6 @@ def test_nobody_asks_the_systems_clock() -> None:
     assert asked == []
 
 
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=1), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()

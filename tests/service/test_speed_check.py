@@ -19,6 +19,7 @@ from logger.service.timebase import TimedFix
 from ..support.drives.receivers import town_drive
 from ..support.drives.replay import rows_of
 from ..support.faults.sensors import NOON, Car, checked, epoch
+from ..support.slow import slow
 
 ROLLOVER = timedelta(weeks=1024)
 
@@ -32,7 +33,7 @@ def driven(folder: Path, reported_mps: Callable[[float], float], seconds: float 
     return car
 
 
-@pytest.mark.parametrize("factor", [0.0, 0.4, 1.6, 2.0, 3.6])
+@pytest.mark.parametrize("factor", [0.4, 2.0, *slow(0.0, 1.6, 3.6)])
 def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_path: Path, factor: float) -> None:
     car = driven(tmp_path, lambda second: 15.0 * factor)
     status = car.drive(1)
@@ -52,7 +53,7 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     assert car.rows.records[-1].iri_m_per_km is not None
 
 
-@pytest.mark.parametrize("factor", [0.93, 1.0, 1.07])
+@pytest.mark.parametrize("factor", [1.0, *slow(0.93, 1.07)])
 def test_a_speed_that_is_a_little_off_is_believed(tmp_path: Path, factor: float) -> None:
     car = driven(tmp_path, lambda second: 15.0 * factor, 90)
     assert "speed_doubtful" not in car.flags()
@@ -93,6 +94,7 @@ def test_a_single_place_far_off_costs_nothing() -> None:
     assert [doubted(town_drive(900, seed, outlier_s=600))[1] for seed in range(50, 60)] == [[]] * 10
 
 
+@pytest.mark.slow
 def test_the_demo_raises_no_doubt() -> None:
     with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump, open_dump(dump) as reader:
         rows = rows_of(reader.header, reader)

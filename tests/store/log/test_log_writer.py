@@ -25,6 +25,8 @@ from logger.store.log.log_writer import (
 )
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
 
+from ...support.slow import slow
+
 SIDECAR = {"ridelog_version": "0.1.0", "sensor": {"driver": "bma220", "verified": True}}
 OFFSET_US = 1_783_160_000_000_000
 NEVER = 10**9
@@ -317,7 +319,7 @@ def test_cut_at_every_change_then_repair(tmp_path: Path, power: bool) -> None:
         assert texts(folder) == before
 
 
-@pytest.mark.parametrize("power", [False, True])
+@pytest.mark.parametrize("power", [True, *slow(False)])
 def test_cut_of_the_repair_at_every_change(tmp_path: Path, power: bool) -> None:
     total = changes_of(lambda files: Drive().run(_fresh(tmp_path, "whole"), files))
     for cut_at in range(0, total, 3):

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..slow import slow
+
 
 @dataclass(frozen=True)
 class Found:
@@ -105,9 +107,10 @@ def _words(broken: AssertionError) -> str:
     return str(broken) or str(traceback.extract_tb(broken.__traceback__)[-1].line)
 
 
-def cases_for_tests(hazards: Sequence[Hazard]) -> list[tuple[Hazard, Any]]:
-    """Each fault with each of its few cases."""
-    return [(hazard, case) for hazard in hazards for case in hazard.some()]
+def cases_for_tests(hazards: Sequence[Hazard], quick: int = 1_000_000) -> list[Any]:
+    """Each fault with each of its few cases; of these all but the first so many are slow tests."""
+    return [one for hazard in hazards for one in [*((hazard, case) for case in hazard.some()[:quick]),
+                                                  *slow(*((hazard, case) for case in hazard.some()[quick:]))]]
 
 
 def label(value: object) -> str:
