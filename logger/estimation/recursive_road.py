@@ -170,11 +170,11 @@ class FollowedRoad:
         if self._gaussian is not None:
             self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
 
-    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1,
-               is_last: bool = True) -> SolvedBlock:
-        """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
-        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved, which
-        share rounds and steps, and ``is_last`` whether this is the last time."""
+    def solved(self, block: Block, samples: Samples, read: Bools, beyond_mps2: Array | float = 0.0,
+               beyond_variance: float = 0.0, turns: int = 1, is_last: bool = True) -> SolvedBlock:
+        """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_mps2`` (t,)
+        what was taken off the readings, ``beyond_variance`` how uncertain that is [(m/s2)2], ``turns`` how often the
+        block is solved, which share rounds and steps, and ``is_last`` whether this is the last time."""
         rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
@@ -182,12 +182,13 @@ class FollowedRoad:
         self._begun = True
         seen = block.seen(read)
         for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, seen, steps, before, left == 0, is_last, beyond_variance)
+            result = self._round(block, samples, read, seen, steps, before, left == 0, is_last, beyond_mps2,
+                                 beyond_variance)
         return result
 
     def _round(
         self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
-        learns: bool, is_last: bool, beyond_variance: float,
+        learns: bool, is_last: bool, beyond_mps2: Array | float, beyond_variance: float,
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``, of how
         much roughness scatters once per block, the last time."""
@@ -214,7 +215,8 @@ class FollowedRoad:
                 even = even_variance(motion, others[moving], variance[moving])
                 gain = gain * (mean_variance / even)
                 drift_variance = solution.drift_variance * (even / mean_variance)
-                beyond = _beyond_two(samples.reading_mps2[moving], self._step_mps2)
+                as_read = samples.reading_mps2 + beyond_mps2
+                beyond = _beyond_two(as_read[moving], self._step_mps2)
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
                 # Sharp readings come where the road shook the car: what they show must be judged by what they can.
                 taken = block.about(np.where(moving, others / (others + variance), 0.0))
@@ -298,7 +300,7 @@ class FollowedRoad:
 
 def _beyond_two(reading_mps2: Array, step_mps2: float) -> int:
     """How many readings are on other steps than the two on which most are."""
-    _, counts = np.unique(np.rint(reading_mps2 / step_mps2), return_counts=True)
+    _, counts = np.unique(np.rint((reading_mps2 - reading_mps2.min()) / step_mps2), return_counts=True)
     return int(np.sort(counts)[:-2].sum())
 
 

@@ -317,7 +317,8 @@ class RoadEstimator:
         for turn in range(turns):
             block = self._driven(block)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
-            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS, turn == turns - 1)
+            solved = self._road.solved(block, linear, read, self._beyond, self._beyond_variance, _TURNS,
+                                       turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
