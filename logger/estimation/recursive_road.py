@@ -185,9 +185,9 @@ class FollowedRoad:
         if not self._parked:
             return
         assert self._learner is not None
-        steps = np.arange(min(self._parked), max(self._parked) + 1)
+        steps = np.arange(min(self._parked), max(self._parked) + 1, dtype=np.float64)
         if len(steps) <= _MOST_STEPS_PARKED:
-            counts = np.array([self._parked[step] for step in steps.tolist()])
+            counts = np.array([self._parked[round(step)] for step in steps.tolist()], dtype=np.float64)
             self._learner.take(parked_evidence(steps, counts, self._learner.log_noise - log(self._step_mps2)))
             self._take_over()
         self._parked.clear()
