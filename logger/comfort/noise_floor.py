@@ -8,6 +8,10 @@ weighting the power K = s^2 times the mean of |W|^2 over frequency. It is indepe
 (moments of a normal distribution), whatever the ride is: no model of car or road is needed. How far a window's sums
 scatter about that follows from the correlation of the weighted noise. Rounding is such noise where noise and ride blur
 the steps (Widrow and Kollar, Quantization Noise, 2008); where they do not, nothing is known but a bound.
+
+MTVV is the largest of many running means, and the noise falls otherwise in each. Of the power d by which the largest
+lies above the mean of the window, noise alone would make c s: s is the scatter of one running mean, c the largest of a
+white noise's in a window so long. Independent scatters add by their squares: the ride's own is sqrt(d^2 - (c s)^2).
 """
 
 from __future__ import annotations
@@ -26,6 +30,10 @@ BLURRED_FROM_STEPS = 0.5
 """R.m.s. of noise, or of readings less that of rounding, in steps, from which on the variance of rounding is
 step^2 / 12 wherever in a step gravity lies. Readings that toggle between two steps for next to nothing show 0.41:
 sqrt(1/4 - 1/12)."""
+
+# Expected largest of a white noise's moving means over 1 s in a window, in their own deviations, by its length [s]:
+# simulated, 100 samples a second (tests/comfort/test_noise_floor.py).
+_LARGEST_OF_MOVING = ((0.0, 0.3, 1.0, 2.0, 5.0, 10.0, 30.0), (0.0, 0.53, 1.04, 1.46, 1.95, 2.28, 2.76))
 
 
 @dataclass(frozen=True)
@@ -71,22 +79,37 @@ class NoiseFloor:
         shared = 2 * log_std * self._power * noise_mps2**2
         running = round(self._rate_hz)  # MTVV is over 1 s
         squares = self._squares(raw.count, raw.a_w_mps2, power, shared)
+        mtvv_mps2 = self._less_chance(raw, power, max(squares.mean, 0.0) / raw.count, running)
         fourth = raw.vdv_mps175**4 * self._rate_hz - 6 * power * squares.mean - 3 * raw.count * power**2
         fourth = max(fourth, max(squares.mean, 0.0)**2 / raw.count)  # Jensen's inequality
         scatter = sqrt(self._fourth_variance(raw.count, max(squares.mean, 0.0) / raw.count, power))
         fourths = PowerSum(fourth, 0.0, hypot(scatter, 6 * squares.mean * shared))
-        return RideSums(raw.count, squares, fourths, self._squares(running, raw.mtvv_mps2, power, shared), running
+        return RideSums(raw.count, squares, fourths, self._squares(running, mtvv_mps2, power, shared), running
                         ).figures(1 / self._rate_hz)
 
     def _alike(self, count: int) -> float:
         """Sum over pairs of samples of their squared correlation: their number times how far it reaches."""
         return count * min(self._spread, count)
 
+    def _less_chance(self, raw: RawFigures, power: float, ride: float, running: int) -> float:
+        """MTVV [m/s2], noise in it, less what chance makes of the largest; ``ride`` is its mean square, ``running`` the
+        samples of a running mean."""
+        above = raw.mtvv_mps2**2 - raw.a_w_mps2**2
+        if above <= 0:
+            return raw.mtvv_mps2
+        largest = float(np.interp(raw.count / running, *_LARGEST_OF_MOVING))
+        chance = largest * sqrt(self._power_variance(running, ride, power)) / running
+        return sqrt(raw.a_w_mps2**2 + sqrt(max(above**2 - chance**2, 0.0)))
+
+    def _power_variance(self, count: int, ride: float, power: float) -> float:
+        """Of the sum of squares, by the noise. The ride is taken to be correlated as weighted noise is."""
+        return self._alike(count) * (4 * ride * power + 2 * power**2)
+
     def _squares(self, count: int, rms_mps2: float, power: float, shared: float) -> PowerSum:
-        """Sum of the ride's squares. The ride is taken to be correlated as weighted noise is."""
+        """Sum of the ride's squares."""
         mean = count * (rms_mps2**2 - power)
         ride = max(mean / count, 0.0)
-        return PowerSum(mean, 0.0, hypot(sqrt(self._alike(count) * (4 * ride * power + 2 * power**2)), count * shared))
+        return PowerSum(mean, 0.0, hypot(sqrt(self._power_variance(count, ride, power)), count * shared))
 
     def _fourth_variance(self, count: int, ride: float, power: float) -> float:
         """Of the sum of fourth powers once the expected is taken off: the sum over k of E (4! / (4 - k)! x^(4 - k))^2

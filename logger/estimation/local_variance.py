@@ -96,7 +96,7 @@ class LocalRoughness:
         relative = power[inside] / np.maximum(weight[inside], _LEAST_OF_MEAN * mean)
         found = float(np.var(relative) / np.mean(relative) ** 2) - chance
         usual = 2 / _COMMON
-        self._scattered += mean * min(found, usual) - _FORGOTTEN * self._scattered
+        self._scattered += mean * min(max(found, -usual), usual) - _FORGOTTEN * self._scattered
         self._heard += mean - _FORGOTTEN * self._heard
         scatter = (self._scattered + _COMMON * usual) / (self._heard + _COMMON)
         self._common = 2 / max(scatter, 2 / _MOST_COMMON)

@@ -10,6 +10,9 @@ Where the propagation has settled, the slope of its log evidence in a parameter 
 slopes of log Z with m and v held (Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.6 and 5.5.2): at
 the noise that the propagation was made with, the sum of log Z has the right slope, and it says what becomes of it far
 from there, where a slope alone would mislead. The next stretches are solved again with the new noise.
+
+A parked car needs no road: its readings are one level, anywhere within a step, and noise; what else shakes it, an
+engine or people who get in, is in them too. So they are evidence against larger noises only.
 """
 
 from __future__ import annotations
@@ -21,6 +24,8 @@ from logger.estimation.normal_distribution import distribution
 
 Array = npt.NDArray[np.float64]
 
+_LEVELS_PER_STEP = 64  # of the integral over a parked car's level: finer than some 1000 toggling readings show it
+_LEAST_SHARE = 1e-30
 _LEAST_PROBABILITY = 0.0027  # beyond 3 deviations: what is farther out is a hole that the solution has not found yet
 
 
@@ -36,6 +41,26 @@ def interval_evidence(expected: Array, others: Array, low: Array, high: Array, l
     share = distribution(np.where(mirrored, -below, above)) - distribution(np.where(mirrored, -above, below))
     evidence: Array = np.log(np.maximum(share, _LEAST_PROBABILITY)).sum(axis=1)
     return evidence
+
+
+def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
+    """Log evidence (g,) of a parked car's readings for noises (g,), given as logarithms of steps: at most that of
+    smaller noises, which something else that shook the car may have joined.
+
+    steps, counts    (k,) numbers of neighbouring steps, and how many readings were on each
+
+    The level may have lain anywhere: Z = integral over the level of the product of each reading's probability.
+    """
+    levels = np.arange(steps.min() - 0.5, steps.max() + 0.5, 1 / _LEVELS_PER_STEP) + 0.5 / _LEVELS_PER_STEP
+    from_level = (steps - levels[:, None]) / np.exp(log_noise)[:, None, None]
+    half = 0.5 / np.exp(log_noise)[:, None, None]
+    near = np.abs(from_level)  # in the lower tail differences keep their digits
+    share = distribution(half - near) - distribution(-half - near)
+    by_level = np.log(np.maximum(share, _LEAST_SHARE)) @ counts
+    most = by_level.max(axis=1)
+    evidence = most + np.log(np.exp(by_level - most[:, None]).mean(axis=1))
+    at_most: Array = np.maximum.accumulate(evidence[::-1])[::-1]
+    return at_most
 
 
 def residual_evidence(slope: float, free: float, at: float, log_noise: Array) -> Array:

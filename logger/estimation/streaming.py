@@ -244,6 +244,7 @@ class RoadEstimator:
             after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
+        self._road.driven_off()
         self._restart()
         return estimates
 
@@ -255,11 +256,21 @@ class RoadEstimator:
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
         self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])
         self._road.move_on(fresh)
+        self._look_whether_parked(fresh)
         self._heard += len(fresh)
         if not self._road.begun and self._heard < _FIRST_SAMPLES:
             return []
         due = list(self._due(self._samples))
         return self._estimates(self._samples, due) if due else []
+
+    def _look_whether_parked(self, fresh: Samples) -> None:
+        """From the second hop of a stand on: in the first the car may still swing."""
+        assert self._samples is not None
+        both = self._samples.part(BLOCK_SAMPLES - 2 * len(fresh), BLOCK_SAMPLES)
+        if both.distance_m[-1] > both.distance_m[0]:
+            self._road.driven_off()
+        elif both.usable.all() and not both.at_end.any():
+            self._road.parked(fresh.reading_mps2)
 
     def _due(self, samples: Samples) -> Iterator[int]:
         """Numbers of the pieces that the car is far enough past."""
@@ -317,7 +328,8 @@ class RoadEstimator:
         for turn in range(turns):
             block = self._driven(block)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
-            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS, turn == turns - 1)
+            solved = self._road.solved(block, linear, read, self._beyond, self._beyond_variance, _TURNS,
+                                       turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)

@@ -10,6 +10,9 @@ more with what was learnt carried on ("learnt"). Roads, car and receiver are tho
 limit: ISO roads with exact places and the noise given, beside the best that anybody could say (``rounding_limit``),
 also where the noise is a tenth of a step. Over the windows that have an estimate; "given" is the share of these.
 
+oversample: what reading the chip several times per sample gains, at +-2 and +-4 g: exact places, the noise given, which
+grows with the chip's filter from 0.1 m/s2 at 32 Hz, and gravity at each place within a step on each road.
+
 Without --all, a part of all combinations of noise, range and speed, drawn so that each value meets most of the others:
 some ten minutes.
 
@@ -29,17 +32,32 @@ import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import log, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from drivers.accelerometers.bma220 import Bma220Settings
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.sensor_noise import Sensor
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 
 from ..support.drives.measured import GRID_HZ, Accelerometer, Receiver, iso_road, steady_drive
-from .estimator import FIRST_SEED, LEAD_S, Logged, Score, estimates, logged_drive, pooled, r2, rav4, roads, score
+from .estimator import (
+    FIRST_SEED,
+    LEAD_S,
+    Logged,
+    Score,
+    Windows,
+    estimates,
+    exact_drive,
+    logged_drive,
+    pooled,
+    r2,
+    rav4,
+    roads,
+    score,
+)
 from .figures import Figures
 from .rounding_limit import Lap, best_values
 
@@ -201,7 +219,27 @@ def limit(figures: Figures, extent: Extent) -> None:
         figures.at_least(f"{name}: R2, limit less 0.03", r2(estimate, exact), r2(best, exact) - 0.03, "")
 
 
-PARTS = {"limit": limit, "drives": drives}
+def read_fast(range_g: int, times: int, mph: int, level: float, windows: int, number: int) -> Windows:
+    """One drive with exact places, of a chip that is read ``times`` per sample."""
+    noise = ASSUMED_MPS2 * sqrt(Bma220Settings(oversample=times).filter_hz / Bma220Settings().filter_hz)
+    chip = Chip(f"BMA220 x{times}", noise, step_of(range_g), times, (-32, 31), OFFSETS[number % len(OFFSETS)])
+    road = iso_road(level, windows * WINDOW_M, FIRST_SEED + 30_000 + number, 2.0)
+    return exact_drive(rav4(), road, mph, chip, seed=number)
+
+
+def oversample(figures: Figures, extent: Extent) -> None:
+    """Reads per sample, at two ranges and two speeds."""
+    del figures  # what is read how often is for the user to choose
+    print(f"{'reads per sample':24s}" + "".join(f"{mph:d} mph: R2, bias, in 1, in 2, given   " for mph in (20, 60)))
+    for range_g, times in itertools.product((2, 4), (1, 2, 4, 8)):
+        scores = [score(pooled([read_fast(range_g, times, mph, level, extent.windows // 2, number)
+                                for number, (level, _) in enumerate(itertools.product(extent.levels, OFFSETS))]))
+                  for mph in (20, 60)]
+        print(f"{range_g} g, {times}".ljust(24) + "   ".join(f"{figures_of(one)}{one.answered:6.2f}" for one in scores),
+              flush=True)
+
+
+PARTS = {"limit": limit, "drives": drives, "oversample": oversample}
 
 
 def main() -> int:

@@ -24,12 +24,12 @@ def ride(rms_mps2: float, rng: np.random.Generator) -> np.ndarray:
     return rms_mps2 * accel / accel.std()
 
 
-def figures_of(accel: np.ndarray) -> list[RawFigures]:
+def figures_of(accel: np.ndarray, count: int = COUNT) -> list[RawFigures]:
     weighted = sosfilt(WEIGHTING.sections[RATE_HZ], accel - accel.mean())
     running = RunningRms(RATE_HZ).process(weighted)
-    return [RawFigures(COUNT, float(np.sqrt(np.mean((accel[part] - accel.mean())**2))), a_w(weighted[part]),
+    return [RawFigures(count, float(np.sqrt(np.mean((accel[part] - accel.mean())**2))), a_w(weighted[part]),
                        float(running[part].max()), vdv(weighted[part], 1 / RATE_HZ))
-            for low in range(COUNT * 10, len(accel) - COUNT, COUNT) for part in [slice(low, low + COUNT)]]
+            for low in range(600, len(accel) - count, count) for part in [slice(low, low + count)]]
 
 
 @pytest.mark.parametrize(("rms_mps2", "noise_mps2", "step_mps2"), [(0.4, 0.1, 0.0), (0.6, 0.3, 0.6), (1.0, 0.1, 0.6)])
@@ -54,6 +54,41 @@ def test_ride_is_found_under_noise_within_its_errors(rms_mps2: float, noise_mps2
         # VDV's error is given somewhat too large: the ride's sixth moment is taken for a Gaussian's.
         assert 0.58 < np.mean(off <= 1) < 0.85, name
         assert 0.90 < np.mean(off <= 2) < 0.99, name
+
+
+@pytest.mark.parametrize("count", [60, 200, 500])
+@pytest.mark.parametrize("rms_mps2", [0.1, 0.4])
+@pytest.mark.parametrize("is_even", [True, False])
+def test_the_largest_running_mean_is_of_the_ride(count: int, rms_mps2: float, is_even: bool) -> None:
+    """A ride of one level, and one whose level swings within some seconds, below a noise of 0.15 m/s2."""
+    rng = np.random.default_rng(8)
+    true = ride(rms_mps2, rng)
+    if not is_even:
+        true *= np.exp(0.8 * np.convolve(rng.standard_normal(len(true)), np.full(150, 150**-0.5), "same"))
+    floor, noise_mps2 = NoiseFloor(GAIN, RATE_HZ, 0.0), 0.15
+    read = figures_of(true + noise_mps2 * rng.standard_normal(len(true)), count)
+    exact = np.array([one.mtvv_mps2 for one in figures_of(true, count)])
+    found = [floor.without(one, noise_mps2, 0.0).mtvv for one in read]
+    value, std = np.array([(one.value, one.std) for one in found]).T
+    assert abs(value.mean() / exact.mean() - 1) < 0.05
+    assert 0.58 < np.mean(np.abs(value - exact) <= std) < 0.80
+    assert np.mean(np.abs(value - exact) <= 2 * std) > 0.9
+
+
+@pytest.mark.parametrize("seconds", [0.3, 1.0, 2.0, 5.0, 10.0])
+def test_how_large_the_largest_of_moving_means_is(seconds: float) -> None:
+    """MTVV and a_w of a weak ride, as far apart as the noise alone would have them, leave one mean."""
+    rng = np.random.default_rng(9)
+    sums = np.cumsum(rng.standard_normal((1500, round((seconds + 1) * RATE_HZ))), axis=1)
+    largest = ((sums[:, RATE_HZ:] - sums[:, :-RATE_HZ]) / np.sqrt(RATE_HZ)).max(axis=1).mean()
+    floor, noise_mps2 = NoiseFloor(np.ones(65), RATE_HZ, 0.0), 0.5
+    a_w_mps2 = 0.55
+    ride_power = a_w_mps2**2 - noise_mps2**2
+    alone = largest * np.sqrt((4 * ride_power * noise_mps2**2 + 2 * noise_mps2**4) / RATE_HZ)
+    for share, left in ((0.9, 0.0), (2.0, np.sqrt(3))):
+        raw = RawFigures(round(seconds * RATE_HZ), a_w_mps2, a_w_mps2, np.sqrt(a_w_mps2**2 + share * alone), 1.0)
+        found = floor.without(raw, noise_mps2, 0.0).mtvv.value
+        assert found**2 == pytest.approx(ride_power + left * alone, abs=0.08 * alone)
 
 
 def test_without_noise_the_figures_are_the_raw_ones() -> None:

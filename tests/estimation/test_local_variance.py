@@ -226,3 +226,20 @@ def test_what_readings_are_about_a_point_is_weighed_as_its_innovation_shows_in_t
     inner = slice(60, -60)
     assert np.corrcoef(block.about(row)[seen][inner], exact[inner])[0, 1] > 0.97
     assert block.about(np.full(COUNT, 0.3)) == pytest.approx(np.full(block.count, 0.3))
+
+
+def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it() -> None:
+    """Slow waves alone are resolved, so that chance makes means scatter much; one block shows none at all."""
+    count = 1024
+    rng = np.random.default_rng(7)
+    gain = np.where(np.arange(count // 2 + 1) < 12, 1e4, 1e-9)
+    slow = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * (gain > 1), count)
+    patchy = slow * np.where(np.arange(count) // 100 % 3 == 0, 3.0, 0.3)
+    even = np.full(count, float(slow.std()))
+    local = LocalRoughness(SPACING_M)
+    for innovations in [even, patchy] * 30:
+        local.learn(0, innovations, np.ones(count), gain, np.ones(count), learns=True)
+    fresh = LocalRoughness(SPACING_M)
+    fresh.learn(0, patchy, np.ones(count), gain, np.ones(count))
+    scatter, unlearnt = (float(np.log(one.at(0, count).variance).std()) for one in (local, fresh))
+    assert scatter > 0.5 * unlearnt

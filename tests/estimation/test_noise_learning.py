@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
-from logger.estimation.noise_evidence import interval_evidence, residual_evidence
+from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
 from logger.estimation.quantisation import bounds, cavity, even_variance, first_guess, improved, without_own
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.steady_motion import SteadyMotion
@@ -149,6 +149,23 @@ def test_uneven_readings_leave_what_dense_algebra_says(clustered: float) -> None
     assert motion.resolved_per_reading(1 / np.mean(1 / variance)) > 1.15 * freedom
 
 
+@pytest.mark.parametrize("counts", [(1000,), (400, 600), (5, 990, 5)])
+def test_a_parked_car_is_evidence_against_larger_noises_alone(counts: tuple[int, ...]) -> None:
+    """Above its largest value as summing over fine levels gives it; below, all noises are alike."""
+    noise, steps = np.geomspace(0.03, 1.0, 60), np.arange(len(counts))
+    level = np.linspace(-0.5, len(counts) - 0.5, 20_001)[:, None]
+    exact = []
+    for one in noise:
+        away = (steps - level) / one
+        share = norm.sf(np.abs(away) - 0.5 / one) - norm.sf(np.abs(away) + 0.5 / one)
+        by_level = np.log(np.maximum(share, 1e-30)) @ np.array(counts)
+        exact.append(by_level.max() + np.log(np.exp(by_level - by_level.max()).mean()))
+    at = int(np.argmax(exact))
+    found = parked_evidence(steps, np.array(counts), np.log(noise))
+    assert found[at:] == pytest.approx(np.array(exact[at:]), abs=0.15)
+    assert found[:at] == pytest.approx(np.full(at, found[at]))
+
+
 # --- what is believed ---
 
 
@@ -260,3 +277,34 @@ def test_the_noise_of_a_drive_is_found(noise: float, guess: float, step: float) 
     assert abs(found.log_mean - np.log(noise)) < 2.5 * found.log_std
     taken = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62)
     assert taken.noise is None
+
+
+@pytest.mark.parametrize(("noise", "guess"), [(0.02, 0.3), (0.15, 0.3)])
+def test_a_stand_bounds_the_noise_once_the_car_drives_off(noise: float, guess: float) -> None:
+    """A chip that does not toggle has less than its steps would show; one that does is never found too quiet."""
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    step, count = 1.23, 4000
+    reading = 8 * step + noise * np.random.default_rng(7).standard_normal(count)
+    way = np.concatenate([np.zeros(3600), 0.01 * np.arange(400)])
+    estimator = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62,
+                              noise=NoiseBelief.guessed(guess))
+    everything = np.ones(count, dtype=bool), np.zeros(count)
+    estimator.push(step * np.round(reading / step)[:3600], everything[0][:3600], everything[1][:3600], way[:3600])
+    assert estimator.noise_stretches == 0
+    estimator.push(step * np.round(reading / step)[3600:], everything[0][3600:], everything[1][3600:], way[3600:])
+    assert estimator.noise_stretches == 1
+    found = estimator.noise
+    assert found is not None
+    assert found.noise_rms_mps2 < 0.7 * guess
+    assert found.log_mean + 2 * found.log_std > np.log(noise)
+
+
+def test_a_car_that_swings_or_is_worked_at_bounds_nothing() -> None:
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    estimator = RoadEstimator(LinearCar(car, body_point(car)), Sensor(0.1, 0.6), 7.62, noise=USUAL)
+    for swing_mps2, seconds in ((1.0, 3), (6.0, 20)):
+        count = 100 * seconds
+        reading = 0.6 * np.round(swing_mps2 * np.sin(2 * np.pi * 1.3 * np.arange(count) / 100) / 0.6)
+        estimator.push(reading, np.ones(count, dtype=bool), np.zeros(count), np.zeros(count))
+        estimator.finish()
+    assert estimator.noise_stretches == 0
