@@ -12,6 +12,7 @@ windowed sinc (``logger.dsp.kaiser``) to the rate that is wanted: of a lower one
 from __future__ import annotations
 
 from math import ceil
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +36,7 @@ cutoff)^2 / 3 + the window's own, makes that wrong by 1e-7, a thousandth of what
 class _Kernel:
     """A windowed sinc at places ``share + offsets`` (k,) of its steps, for any share of a step, 0 to 1."""
 
-    def __init__(self, offsets: Array, half: float, cutoff: float) -> None:
+    def __init__(self, offsets: npt.NDArray[np.floating[Any]], half: float, cutoff: float) -> None:
         self._phases = ceil(_PHASES * cutoff)
         apart = np.arange(self._phases + 1)[:, None] / self._phases + offsets
         self._table = np.sinc(cutoff * apart) * kaiser.window(apart, half, _STOP_DB)
