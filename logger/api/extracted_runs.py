@@ -220,10 +220,23 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
     return kept, max(0.0, driving_s - sum(len(one.time_s) for one in kept) / RATE_HZ)
 
 
+def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
+    """Why a drive, by fixes (k,), has no pass over a line."""
+    from logger.extraction.measured_line import ASIDE_M, goes_back
+
+    if goes_back(driven_m, along_m, aside_m):
+        return ": the drive goes along the profile from its end to its beginning"
+    near = aside_m <= ASIDE_M
+    if not near.any():
+        return f": the nearest fix is {aside_m.min():.0f} m aside of it"
+    return (f": only {np.ptp(driven_m[near]):.0f} m of the drive are within {ASIDE_M:g} m of it, and it has places over "
+            f"{np.ptp(line.distance_m):.0f} m")
+
+
 def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -> list[_Drive]:
     """The runs of a stretch without a break: one, or one for each pass over the profile."""
     from logger.extraction.along_track import motion_of
-    from logger.extraction.measured_line import goes_back, passes
+    from logger.extraction.measured_line import passes
 
     speeds = _speeds(fixes, recorded.config)
     motion = motion_of(speeds)
@@ -233,9 +246,7 @@ def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -
     along_m, aside_m = measured.line.passed(fixes.lat_deg, fixes.lon_deg)
     found = passes(driven_m, along_m, aside_m)
     if not found:
-        recorded.hint = (": the drive goes along the profile from its end to its beginning"
-                         if goes_back(driven_m, along_m, aside_m) else
-                         f": the nearest fix is {aside_m.min():.0f} m aside of it")
+        recorded.hint = _off_the_line(measured.line, driven_m, along_m, aside_m)
     return [one for each in found if (one := _on_profile(recorded, fixes, along_m, each, measured)) is not None]
 
 

@@ -16,6 +16,7 @@ from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
+from logger.runs import UNKNOWN
 from logger.runs import Run as Record
 from logger.store.formats import drive_file, vehicle_file
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _PLACES_EVERY_M = 10.0
+_RECEIVER = "receiver"
 _LEAST_SHARED_M = 50.0
 """Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
 
@@ -93,9 +95,10 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
         file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
         check_record(drive, file, [one for one, _ in drives[:number]])
         check_distances(drive, file)
+    facts = UNKNOWN
     if all(_counts_for_itself(one) for one, _ in drives):
-        drives = _on_one_distance(drives)
-    return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat)
+        drives, facts = _on_one_distance(drives), replace(UNKNOWN, places_by=_RECEIVER)
+    return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat, facts=facts)
                          for one, name in drives])
 
 
@@ -154,15 +157,19 @@ def diagnosed(
     from logger.lab.likelihood.priors import Tolerance
     from logger.lab.unknown_road import diagnosis
     from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
+    from logger.lab.unknown_road.placement import placed_by_road
 
-    off = Tolerance(numbers=deviation_of(tolerance))
+    off, given = Tolerance(numbers=deviation_of(tolerance)), model.given or model.vehicle
     for one in model.effects:
         if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
             raise BadInput(f"{word}: its effect {one.effect.name} needs a road that is known under the right wheels "
                            "too")
     effects, _ = known_effects(model, effect_files)
     try:
-        problem = SameRoad(records, model.given or model.vehicle, off, model.vehicle)
+        if by_receiver := all(one.facts.places_by == _RECEIVER for one in records):
+            notify("laying the drives on one distance by the road that they felt")
+            records = placed_by_road(records, given, off, model.effects, model.vehicle)
+        problem = SameRoad(records, given, off, model.vehicle, exact_places=not by_receiver)
         return diagnosis.diagnose_same_road(problem, among(effects, candidates), model.effects, notify)
     except NotOneRoad as error:
         raise BadInput(str(error)) from None

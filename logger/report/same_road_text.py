@@ -28,8 +28,10 @@ def summary(found: UnknownRoadDiagnosis) -> list[str]:
     lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
                  f"noise alone makes {found.floor_error:.3f}.")
     if found.unexplained:
-        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
-                     "missing, maybe one of the effects that only a measured road can show.")
+        cause = ("something else is missing, maybe" if found.exact_places else
+                 "the distances of these drives, by a receiver, are off within seconds, or something is missing, maybe")
+        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: {cause} one of the "
+                     "effects that only a measured road can show.")
     return lines
 
 

@@ -75,7 +75,10 @@ def factored(model: DrivesModel, count: int) -> Preconditioner:
         rows /= np.float32(np.sqrt(model.variance))
         normal += rows @ rows.T
     factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
-    return lambda residual: np.asarray(cho_solve(factor, residual.T.astype(np.float32), check_finite=False).T, float)
+    # Products with the inverse take two thirds of the time of solutions by the factor; rounds of it correct rounding.
+    solution = cho_solve(factor, np.eye(count, dtype=np.float32), overwrite_b=True, check_finite=False)
+    symmetric = 0.5 * (solution + solution.T)
+    return lambda residual: np.asarray(residual.astype(np.float32) @ symmetric, float)
 
 
 def solve(model: DrivesModel, readings: Sequence[Array], count: int, solved: float, rounds: int | None = None,

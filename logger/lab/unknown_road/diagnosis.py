@@ -74,6 +74,7 @@ class UnknownRoadDiagnosis:
     confounded    what these drives cannot identify of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
     doubtful      pairs of runs that may be over one road or two, by name
+    exact_places  whether the distances of the drives are a recorder's, not a receiver's
     """
 
     candidates: tuple[Candidate, ...]
@@ -88,6 +89,7 @@ class UnknownRoadDiagnosis:
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
+    exact_places: bool = True
 
     @property
     def unexplained(self) -> bool:
@@ -143,6 +145,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
         _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
+        problem.exact_places,
     )
 
 
@@ -157,6 +160,8 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "the model has it"
         elif why is None and isinstance(effect, DriveEffect):
             why = "it changes the way of every drive alike, and so would another road"
+        elif why is None and not (effect.reshapes or problem.exact_places):
+            why = "it only shifts the record, and the distances of these drives, by a receiver, shift as well"
         elif why is None:
             try:
                 problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
@@ -183,9 +188,9 @@ def _by_effect(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
 
 
 def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
-          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, RoadFit]:
-    """Fit the effects with the largest gains on top of the model, by name; the best of a few steps from each start goes
-    on.
+          least: float = 6.0, starts: int = 2, first_steps: int = 2) -> dict[str, RoadFit]:
+    """Fit the effects with the largest gains on top of the model, by name; the best of so many ``first_steps`` from
+    each start goes on.
 
     most, share, least    so many at most, of those whose gain is this share of the largest, and so much
     starts                so many trials at their own values; the best one also at its best strength, which holds for
@@ -197,7 +202,7 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
         progress(f"fitting {name}")
         begins = [ranked[name][0].best, *(trial.chosen for trial in ranked[name][:starts])]
         tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
-        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
+        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state, nodes=2))
         found[name] = fit(best.problem, best.state)
     return found
 

@@ -38,11 +38,13 @@ class RoadFit:
 
 
 def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: float = 0.1,
-           many_rounds: int = 12) -> RoadFit:
+           many_rounds: int = 12, falling: float = 0.5) -> RoadFit:
     """Fit the most probable state, by so many scoring steps from a state at most.
 
     converged      the fit ends before a step of a smaller expected gain in the log of the probability
     many_rounds    equations that take more iterations get a new preconditioner
+    falling        the information, which takes most of the time, is kept from step to step as long as the expected gain
+                   falls to this share or less
     """
     moves = moves_of(state.effects)
     p, q = len(state.logs), len(moves)
@@ -53,22 +55,30 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
     def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
         return here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
 
+    data, last_gain = np.empty((0, 0)), 0.0
     for count in range(steps):
         logs, effects, roads = at(here)
         gains, slopes = response_and_slopes(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
             problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
-        score, data = problem.score_and_information(problem.table(gains, slopes), roads, information=True)
+        table = problem.table(gains, slopes)
         off, precision = problem.prior_terms(logs, q, roads)
-        score -= precision * off
-        information = data + np.diag(precision)
-        step = _step(score, information, here, low, high)
-        if count and float(score @ step) < converged:
+        for renewed in (False, True) if count else (True,):
+            score, found = problem.score_and_information(table, roads, information=renewed)
+            score -= precision * off
+            data = found if renewed else data
+            information = data + np.diag(precision)
+            step = _step(score, information, here, low, high)
+            gain = float(score @ step)
+            if gain < falling * last_gain:
+                break
+        if count and gain < converged:
             break
+        last_gain = gain
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
-    found = RoadFitState(effects, logs, roads, problem.response(effects, logs))
-    return RoadFit(found, tuple(moves), data, information, problem)
+    state = RoadFitState(effects, logs, roads, problem.response(effects, logs))
+    return RoadFit(state, tuple(moves), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:

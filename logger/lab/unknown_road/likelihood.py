@@ -45,6 +45,10 @@ PROBES = 8
 """Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
 is divided by that. A judgement: fits take a time in proportion."""
 
+SOLVED = 1e-3
+"""Of what they began with, this is left of the equations of the score: a share of it, where chance leaves the root of two
+in as many as there are samples, some per cent."""
+
 
 class NotOneRoad(ValueError):
     """The drives are not over one road."""
@@ -76,13 +80,14 @@ class SameRoad:
     """Drives over one road, a nominal vehicle, and priors of its numbers and of the road.
 
     start_vehicle    the vehicle as it stands, where fits begin, if that is another than was given
+    exact_places     whether distances are a recorder's; else they follow the road that was felt, and delays with them
 
     NotOneRoad unless each of the runs shares some seconds of the way with another.
     """
 
     def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
-                 start_vehicle: Vehicle | None = None) -> None:
-        start_vehicle = start_vehicle or vehicle
+                 start_vehicle: Vehicle | None = None, exact_places: bool = True) -> None:
+        start_vehicle, self.exact_places = start_vehicle or vehicle, exact_places
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
         self.vehicle = replace(vehicle, contact_patch_m=start_vehicle.contact_patch_m)  # that is not free
         known = VehiclePrior.of(vehicle, tolerance)
@@ -99,7 +104,7 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(free_waviness=True, probes=PROBES)
+        options = Options(free_waviness=True, probes=PROBES, solved=SOLVED)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
@@ -181,13 +186,13 @@ class SameRoad:
         off, precision = self.prior_terms(state.logs, 0, state.roads)
         return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
 
-    def gain(self, before: RoadFitState, after: RoadFitState) -> float:
+    def gain(self, before: RoadFitState, after: RoadFitState, nodes: int = 3) -> float:
         """Decrease of minus twice the log-posterior from one state to another: the integral of the score between
-        them."""
+        them, from so many points."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
         total = 0.0
-        nodes, weights = np.polynomial.legendre.leggauss(3)
-        for node, weight in zip(0.5 * (nodes + 1), 0.5 * weights, strict=True):
+        places, weights = np.polynomial.legendre.leggauss(nodes)
+        for node, weight in zip(0.5 * (places + 1), 0.5 * weights, strict=True):
             table = self.table(before.gains + node * change, change[None])
             slopes, _ = self.score_and_information(table, before.roads + node * road_change, information=False)
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
