@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -13,12 +13,13 @@ from logger.errors import BadInput
 from logger.units import FOOT_M, STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
+    from logger.lab.another_car import AnotherCar
     from logger.lab.road_match import RoadMatch
     from logger.runs import Array, Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.compose import Car
-    from logger.vehicle.effect import Chosen
+    from logger.vehicle.effect import Chosen, Effect
 
 _LEAST_MPS2 = 1e-4
 _NEAR = 0.3
@@ -37,7 +38,7 @@ _NAMED = 4
 """Of the numbers of another car, so many are said."""
 
 
-def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None],
+def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], known: Mapping[str, Effect],
                 anyway: bool = False, numbers: float = USUAL_DEVIATION) -> list[Array]:
     """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
     the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
@@ -45,6 +46,7 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     it is a warning).
 
     word       by which the user knows the vehicle
+    known      effects, by name: where one of them explains the runs as another car would, it may be this car
     numbers    deviation of what the car's numbers are usually off by, as a share
     """
     from logger.vehicle.compose import compose
@@ -54,7 +56,7 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     followed = _followed(runs, predictions, car)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed), _other_roads(runs, followed, car),
-               _another_car(word, model, runs, predictions, numbers)), warn, anyway)
+               _another_car(word, model, runs, predictions, known, numbers)), warn, anyway)
     return predictions
 
 
@@ -190,19 +192,26 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
 
 
 def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],
-                 numbers: float) -> Iterator[str]:
-    """That the runs are of another car, which explains them, and how it differs."""
+                 known: Mapping[str, Effect], numbers: float) -> Iterator[str]:
+    """That the runs are of another car, which explains them as no effect does, and how it differs."""
     from logger.lab.another_car import another_car
 
     mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
-    if found is not None:
+    if found is not None and not _explained_by_an_effect(found, model, known, numbers):
         far = list(found.shares.items())[:_NAMED]
         more = f" and {len(found.shares) - _NAMED} more numbers far off" if len(found.shares) > _NAMED else ""
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: this one says "
                f"next to nothing of it (error {found.error:.2f}), one with "
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
                "Is it another car's file? ridelog identify fits a car's numbers")
+
+
+def _explained_by_an_effect(found: AnotherCar, model: Model, known: Mapping[str, Effect], numbers: float) -> bool:
+    """Whether an effect, in the model's car, explains as much as another car does."""
+    from logger.lab.best_effect import error_with_best_effect
+
+    return error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) <= found.found_error
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:

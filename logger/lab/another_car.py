@@ -3,7 +3,8 @@
 Problem: with another car's file every effect that reduces the difference seems to be missing. Solution: where a model
 explains next to nothing of what was measured, cars with very different masses, springs, dampers and tires are tried. If
 one of them explains the record, and several of its numbers differ by far more than they are uncertain, the record is of
-another car: a missing effect changes few numbers.
+another car: a missing effect changes few numbers. A large change by one effect can look like several numbers, so that
+the other car has to explain more than any known effect does in a car with this one's numbers.
 """
 
 from __future__ import annotations
@@ -32,11 +33,13 @@ POOR_ERROR = 0.8
 class AnotherCar:
     """A car that explains a record far better than the model.
 
+    runs                  that were compared
     error, found_error    of the model, and of that car
     shares                by which its numbers differ from the model's, the farthest first, by name; one size that all
                           masses, springs and dampers share cannot be seen in accelerations, and is taken out
     """
 
+    runs: SimulatedRuns
     error: float
     found_error: float
     shares: dict[str, float]
@@ -70,7 +73,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
            and abs(logs[index]) > far_sigma * numbers]
     if found_error > explains or len(far) < several:
         return None
-    return AnotherCar(error, found_error,
+    return AnotherCar(some, error, found_error,
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from logger.api.bench import silent
+from logger.api.bench import known_effects, silent
 from logger.api.model_checks import check_model
 from logger.api.run_checks import lab_runs
 from logger.errors import BadInput
@@ -107,7 +107,7 @@ def made(kind: str, seed: int) -> tuple[list[Run], Model]:
 def refusal(runs: list[Run], model: Model) -> str | None:
     """Why a model and runs are refused; None: they are not."""
     try:
-        check_model("vehicle.yaml", model, SimulatedRuns(runs), silent)
+        check_model("vehicle.yaml", model, SimulatedRuns(runs), silent, known_effects(model, ())[0])
     except BadInput as error:
         return str(error)
     return None

@@ -79,9 +79,15 @@ def refitted_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[
 
     precision    of the prior of the car's numbers (p,)
     """
-    start = there[0].linear.state.logs
-    now = _Fit(start, [[np.zeros_like(k) for k in one.linear.state.record] for one in there],
-               [list(some) for some in changes], np.inf)
+    start, still = there[0].linear.state.logs, [[np.zeros_like(k) for k in one.linear.state.record] for one in there]
+    unmoved = sum(_deviance(one, some, k) for one, some, k in zip(there, changes, still, strict=True))
+    return min(unmoved, _moved_gain(there, changes, precision, _Fit(start, still, list(map(list, changes)), np.inf)))
+
+
+def _moved_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[Array]], precision: Array,
+                now: _Fit) -> float:
+    """Gain over the best fit that Gauss-Newton steps come to: they minimise squares by the levels of the noise, and
+    where a change is far above these a car that did not move may be more likely."""
     slopes = list(there)
     for _ in range(_MOST_SLOPES):
         found, hold = _fit_chord(there, slopes, changes, precision, now)

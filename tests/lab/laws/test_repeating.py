@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -70,22 +71,29 @@ def test_nothing_is_drafted_where_nothing_repeats() -> None:
     assert HUM.drafts(context) == [] == WHEEL_TURNS.drafts(context)
 
 
-def test_a_clipped_record_is_that_of_a_clipped_motion() -> None:
-    """Clipped in fine steps and filtered by another program: SciPy's resampling."""
+@pytest.mark.parametrize(("limits", "values"), [
+    (lambda motion: np.clip(motion, -2.5, 2.5), {"limit_mps2": 2.5}),
+    (lambda motion: motion / np.hypot(1.0, motion / 2.5), {"limit_mps2": 2.5, "sharpness_ratio": 2.0}),
+    (lambda motion: 2.5 * np.tanh(motion / 2.5), {"limit_mps2": 2.694, "sharpness_ratio": 2.231}),
+])
+def test_a_limited_record_is_that_of_a_limited_motion(limits: Callable[[Array], Array],
+                                                      values: dict[str, float]) -> None:
+    """Limited in fine steps and filtered by another program: SciPy's resampling. Of amplifiers that saturate as tanh
+    does, one bends much alike."""
     from scipy.signal import firwin, resample_poly
 
     from logger.lab.laws.families.family import LawContext
 
     posterior = posterior_of(secret_runs())
-    effect = CLIPPING.drafts(LawContext(posterior, posterior.start()))[0].effect
+    effect, = (one.effect for one in CLIPPING.drafts(LawContext(posterior, posterior.start()))
+               if [number.name for number in one.parameters] == [*values])
     assert isinstance(effect, RecordEffect)
     time_s = np.arange(16000) / 1600
     fine = 3 * np.sin(2 * np.pi * 1.3 * time_s) + 1.5 * np.sin(2 * np.pi * 9.1 * time_s)
     low_pass = firwin(16 * 40 + 1, 44.0, width=12.0, fs=1600)
-    clipped = resample_poly(np.clip(fine, -2.5, 2.5), 1, 16, window=low_pass)
+    limited = resample_poly(limits(fine), 1, 16, window=low_pass)
     accel = fine[::16]
     some = Recording(time_s[::16], np.zeros(1000), np.zeros(1000), accel)
-    found = effect.record(SimpleNamespace(limit_mps2=2.5), some)
-    off = (found - clipped)[100:-100]
-    assert np.sqrt(np.mean(off**2)) < 0.02 * np.std(accel - clipped)
-    np.testing.assert_allclose(effect.record(SimpleNamespace(limit_mps2=1e9), some), accel, atol=1e-9)
+    off = (effect.record(SimpleNamespace(**values), some) - limited)[100:-100]
+    assert np.sqrt(np.mean(off**2)) < 0.02 * np.std(accel - limited)
+    np.testing.assert_allclose(effect.record(SimpleNamespace(**{**values, "limit_mps2": 1e9}), some), accel, atol=1e-9)

@@ -51,3 +51,11 @@ def test_what_is_small_leaves_what_first_order_says() -> None:
     mixed, own = linear.cross_products(linear.whitened([change]))
     expected = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
     assert refitted_gain([there_of(drive)], [[change]], precision_of(drive)) == pytest.approx(expected, rel=0.05)
+
+
+def test_what_is_far_above_the_noise_leaves_no_more_than_a_car_that_did_not_move() -> None:
+    drive, rng = planned(0.02), np.random.default_rng(4)
+    change, there = rng.standard_normal(drive.run.count), there_of(drive)
+    bands, = there.linear.posterior.bands
+    unmoved = float(bands.freedom @ np.log1p(bands.power(change) / there.levels[0]))
+    assert refitted_gain([there], [[change]], precision_of(drive)) <= unmoved

@@ -1,0 +1,37 @@
+"""How much of some runs one effect explains at most, the car's numbers within what they are usually off by.
+
+Problem: a record of which a model explains next to nothing may be another car's, and may be this one's with a large
+change by one effect, as a sensor far behind the centre of gravity. Solution: one round of the search for effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from logger.lab.diagnosis import obstacles_of, refit
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.selection.screening import misalignment
+from logger.lab.selection.stepwise import Search
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.vehicle.effect import Chosen, Effect, ForceEffect
+from logger.vehicle.stepping_loop import COMPILED
+from logger.vehicle.vehicle import Vehicle
+
+
+def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Sequence[Chosen],
+                           known: Mapping[str, Effect], numbers: float) -> float:
+    """Error of this car with the one effect that explains most, its numbers refitted within their soft bounds; infinite
+    where none can be tried. Without the compiler forces are not, as each would take minutes."""
+    posterior = Posterior(runs, vehicle, Tolerance(numbers=numbers))
+    obstacles = obstacles_of(posterior, known, present)
+    tried = [one for name, one in known.items()
+             if name not in obstacles and (COMPILED or not isinstance(one, ForceEffect))]
+    if not tried:
+        return np.inf
+    start = posterior.start(present)
+    search = Search(tried, len(present), misalignment(posterior, start))
+    fits = search.round(refit(posterior, start), tried).fits
+    return min((posterior.error(one.found.state) for one in fits), default=np.inf)
