@@ -46,8 +46,8 @@ PROBES = 8
 is divided by that. A judgement: fits take a time in proportion."""
 
 SOLVED = 1e-3
-"""Of what they began with, this is left of the equations of the score: a share of it, where chance leaves the root of two
-in as many as there are samples, some per cent."""
+"""Of what they began with, this is left of the equations of the score. Chance leaves the score of a thousand samples
+uncertain by the root of two in so many, some per cent."""
 
 
 class NotOneRoad(ValueError):
@@ -87,7 +87,8 @@ class SameRoad:
 
     def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
                  start_vehicle: Vehicle | None = None, exact_places: bool = True) -> None:
-        start_vehicle, self.exact_places = start_vehicle or vehicle, exact_places
+        start_vehicle = start_vehicle or vehicle
+        self.tolerance, self.exact_places = tolerance, exact_places
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
         self.vehicle = replace(vehicle, contact_patch_m=start_vehicle.contact_patch_m)  # that is not free
         known = VehiclePrior.of(vehicle, tolerance)
