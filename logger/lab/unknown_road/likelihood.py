@@ -45,10 +45,6 @@ PROBES = 8
 """Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
 is divided by that. A judgement: fits take a time in proportion."""
 
-SOLVED = 1e-3
-"""Of what they began with, this is left of the equations of the score. Chance leaves the score of a thousand samples
-uncertain by the root of two in so many, some per cent."""
-
 
 class NotOneRoad(ValueError):
     """The drives are not over one road."""
@@ -105,7 +101,8 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(free_waviness=True, probes=PROBES, solved=SOLVED)
+        # Chance leaves the score of a thousand samples uncertain by some per cent: a thousandth may stay unsolved.
+        options = Options(free_waviness=True, probes=PROBES, solved=1e-3)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
