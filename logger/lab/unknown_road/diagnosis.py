@@ -20,6 +20,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.unknown_road.fisher_scoring import RoadFit, fit, inverse
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
+from logger.lab.unknown_road.placement import placed_by_road
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import Trial, screen
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
@@ -130,7 +131,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
             break
         taken.append(best)
         now = models[best.name]
-        now = replace(now, problem=now.problem.preconditioned(now.state))
+        now = (replace(now, problem=now.problem.preconditioned(now.state)) if problem.exact_places else
+               _placed_anew(now, progress))
         errors.append(now.problem.error(now.state))
         del remaining[best.name]
     usual = {one.chosen.effect.name: one for one in screen(
@@ -205,6 +207,18 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
         best = max(tries, key=lambda one: one.problem.gain(base.state, one.state, nodes=2))
         found[name] = fit(best.problem, best.state)
     return found
+
+
+def _placed_anew(now: RoadFit, progress: Progress) -> RoadFit:
+    """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
+    and the next effect would imitate that."""
+    progress("laying the drives on one distance anew")
+    old, state = now.problem, now.state
+    car = old.prior.vehicle(old.vehicle, state.logs)
+    runs = placed_by_road(old.runs, old.vehicle, old.tolerance, state.effects, car)
+    problem = SameRoad(runs, old.vehicle, old.tolerance, car, exact_places=False)
+    begin = problem.start(state.effects)
+    return fit(problem.preconditioned(begin), begin)
 
 
 def _with_effect(base: RoadFit, one: Chosen) -> RoadFitState:

@@ -45,10 +45,6 @@ PROBES = 8
 """Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
 is divided by that. A judgement: fits take a time in proportion."""
 
-SOLVED = 1e-3
-"""Of what they began with, this is left of the equations of the score: a share of it, where chance leaves the root of two
-in as many as there are samples, some per cent."""
-
 
 class NotOneRoad(ValueError):
     """The drives are not over one road."""
@@ -87,7 +83,8 @@ class SameRoad:
 
     def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
                  start_vehicle: Vehicle | None = None, exact_places: bool = True) -> None:
-        start_vehicle, self.exact_places = start_vehicle or vehicle, exact_places
+        start_vehicle = start_vehicle or vehicle
+        self.tolerance, self.exact_places = tolerance, exact_places
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
         self.vehicle = replace(vehicle, contact_patch_m=start_vehicle.contact_patch_m)  # that is not free
         known = VehiclePrior.of(vehicle, tolerance)
@@ -104,7 +101,8 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(free_waviness=True, probes=PROBES, solved=SOLVED)
+        # Chance leaves the score of a thousand samples uncertain by some per cent: a thousandth may stay unsolved.
+        options = Options(free_waviness=True, probes=PROBES, solved=1e-3)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]

@@ -25,25 +25,24 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_MOST_ROUNDS = 8
-_SMALL_M = 0.01
-"""Lags of this r.m.s. are no larger than their errors: a fiftieth of the shortest wave that a car feels."""
-
 
 def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, present: Sequence[Chosen] = (),
-                   start_vehicle: Vehicle | None = None) -> list[Run]:
+                   start_vehicle: Vehicle | None = None, rounds: int = 8, small_m: float = 0.01) -> list[Run]:
     """Runs with the distances at which the others agree with them. The first stays where it is; where windows do not
     correlate, so does the run.
+
+    rounds     so many at most
+    small_m    lags of this r.m.s. are no larger than their errors: a fiftieth of the shortest wave that a car feels
 
     NotOneRoad, ValueError as ``SameRoad`` and its ``start``.
     """
     found = list(runs)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(rounds):
         problem = SameRoad(found, vehicle, tolerance, start_vehicle)
         offsets_m = _offsets(problem, present)
         found = [replace(run, distance_m=run.distance_m + off_m)
                  for run, off_m in zip(found, offsets_m, strict=True)]
-        if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < _SMALL_M:
+        if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < small_m:
             break
     return found
 
