@@ -26,7 +26,7 @@ NAMES: dict[str, frozenset[str]] = {
     PLAY: frozenset({"damper_backlash"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
-    CORRECTION: frozenset({"record_factor", "clipping", "smoothed_profile"}),
+    CORRECTION: frozenset({"record_factor", "clipping"}),
     REPEATS: frozenset({"hum", "wheel_turns"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
     CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
