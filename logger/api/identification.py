@@ -342,12 +342,12 @@ def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: f
                  between: tuple[float, float] | None) -> Free:
     """A number of the road, of an effect or of the car. ValueError for one that none of them has."""
     from logger.identification.unknown_inputs import free_input, is_input
-    from logger.vehicle.effect_parameters import free_number, move_named
+    from logger.vehicle.effect_parameters import free_number, free_parameter_named
     from logger.vehicle.named_parameters import free
 
     if is_input(name):
         return free_input(road, name, start, between)
-    if (move := move_named(given.effects, name)) is not None:
+    if (move := free_parameter_named(given.effects, name)) is not None:
         return free_number(given.effects, move, start, between)
     return free(given.vehicle, name, start, between)
 

@@ -20,7 +20,7 @@ from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import move_named
+from logger.vehicle.effect_parameters import free_parameter_named
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
@@ -40,10 +40,10 @@ class DriveModel:
     """A car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle``, ``effects`` and
     ``road``.
 
-    A free number is the car's (``named_parameters.names``), an effect's (``effect_parameters.move_named``) or the
-    road's (``unknown_inputs``). The car comes to the first sample of a record at the speed it has there, over the road
-    that the track has there. ValueError for a name that none of them has a number of, or that sets what another one
-    sets.
+    A free number is the car's (``named_parameters.names``), an effect's
+    (``effect_parameters.free_parameter_named``) or the road's (``unknown_inputs``). The car comes to the first sample
+    of a record at the speed it has there, over the road that the track has there. ValueError for a name that none of
+    them has a number of, or that sets what another one sets.
 
     measured    (n,) per record, without its beginning [m/s2]
     """
@@ -54,7 +54,7 @@ class DriveModel:
         self.road, self.effects = road or RoadInput(), tuple(effects)
         wanted = [one.name for one in parameters]
         check_names(wanted, len(records))
-        self._moves = {name: move for name in wanted if (move := move_named(self.effects, name)) is not None}
+        self._moves = {name: move for name in wanted if (move := free_parameter_named(self.effects, name)) is not None}
         for name in wanted:
             if is_input(name):
                 read_input(self.road, name)

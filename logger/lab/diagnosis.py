@@ -39,7 +39,7 @@ from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.vehicle.effect import Chosen, Effect
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
 
@@ -276,6 +276,6 @@ def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> C
     """A candidate that was screened only, at the best strength of its trial."""
     trial = one.trials[0]
     there = cross_validate(base.linear, [change[None] for change in trial.change])
-    gain = trial.gain - len(moves_of([trial.one])) * float(np.log(base.posterior.freedom))
+    gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
     return Candidate(one.effect, trial.one.values, there.error, probability_by_chance(gain, count), gain,
                      before.deviance - there.deviance, ())

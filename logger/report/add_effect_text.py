@@ -32,7 +32,7 @@ def judgement(found: AddedEffects) -> list[str]:
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, its noise alone about {}")
     for one in found.new:
-        at = [parameter.name for parameter in one.effect.parameters if parameter.moves
+        at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
               and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
                       if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
         if at:

@@ -36,7 +36,7 @@ from logger.vehicle.vehicle import Vehicle
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_AT_END = 1e-3
+_AT_BOUND = 1e-3
 ON_A_RIG = "it needs a road and a speed, and the run is driven by time"
 """Why some effects cannot be tried on a rig."""
 _RESONANCE = "frequency_hz"  # what effects that resonate call it
@@ -112,28 +112,28 @@ class Parameter:
         return float(min(max(found, self.low), self.high))
 
     @property
-    def moves(self) -> bool:
+    def is_free(self) -> bool:
         """Whether a fit may move it."""
         return not (self.choices or self.given) and self.low < self.high
 
-    def usual_way(self, origin: float = 0.0) -> float:
+    def usual_range(self, origin: float = 0.0) -> float:
         """How far the values that it usually has lie from a coordinate: that of its start or, where that is there, the
         farthest that a search begins at, or the width of its range."""
         ways = [abs(self.coordinate(one) - origin) for one in (self.start, *self.trials)]
         return ways[0] or max(ways) or abs(self.coordinate(self.high) - self.coordinate(self.low))
 
-    def at_an_end(self, value: float) -> bool:
+    def at_bound(self, value: float) -> bool:
         """Whether a value is at an end of what it may be."""
         here = self.coordinate(value)
-        return any(abs(here - self.coordinate(end)) < _AT_END for end in (self.low, self.high))
+        return any(abs(here - self.coordinate(end)) < _AT_BOUND for end in (self.low, self.high))
 
-    def at_its_weakest(self, value: float) -> bool:
+    def at_weakest_bound(self, value: float) -> bool:
         """Whether a strength is at the end of its range beyond which lies the value at which it does nothing: within a
         small share of the usual way from there, on the scale that fits move on."""
         if self.null is None or self.low < self.null < self.high:
             return False
         weakest = self.coordinate(self.low if self.null <= self.low else self.high)
-        return abs(self.coordinate(value) - weakest) < _AT_END * self.usual_way(weakest)
+        return abs(self.coordinate(value) - weakest) < _AT_BOUND * self.usual_range(weakest)
 
 
 @dataclass(frozen=True)
@@ -310,14 +310,14 @@ class Chosen:
     file: str | None = None
 
     @property
-    def at_an_end(self) -> bool:
+    def at_bound(self) -> bool:
         """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
         can be no weaker: what looks like it is something else."""
-        numbers = [one for one in self.effect.parameters if one.moves]
-        if any(one.at_its_weakest(self.values[one.name]) for one in numbers):
+        numbers = [one for one in self.effect.parameters if one.is_free]
+        if any(one.at_weakest_bound(self.values[one.name]) for one in numbers):
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
-        return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
+        return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)
 
     def resonates_above(self, high_hz: float, by_flank: bool = False) -> bool:
         """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing.

@@ -1,7 +1,8 @@
 """Free parameters of effects: which there are, their coordinates, and effects with other coordinates.
 
 Problem: a fit varies a vector of coordinates, on suitable scales, and an effect is a frozen record with values by name.
-Solution: a ``Move`` is the index of a parameter of an effect; coordinates are those of ``Parameter.coordinate``.
+Solution: a ``FreeParameter`` is the index of a parameter of an effect; coordinates are those of
+``Parameter.coordinate``.
 Nothing here knows of any data.
 """
 
@@ -24,20 +25,21 @@ _LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Move:
+class FreeParameter:
     """A free parameter: index of the effect in the model, and of the parameter in the effect."""
 
     effect: int
     parameter: int
 
 
-def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
+def free_parameters_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[FreeParameter]:
     """Every parameter that a fit may vary, of all effects or of some."""
     chosen = range(len(effects)) if which is None else which
-    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.moves]
+    return [FreeParameter(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.is_free]
 
 
-def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
+def with_coordinates(effects: Sequence[Chosen], moves: Sequence[FreeParameter], coordinates: Array
+                     ) -> tuple[Chosen, ...]:
     """The effects with other coordinates (m,), on the scales of their parameters."""
     found = list(effects)
     for move, coordinate in zip(moves, coordinates, strict=True):
@@ -47,7 +49,7 @@ def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) 
     return tuple(found)
 
 
-def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
+def coordinates_of(effects: Sequence[Chosen], moves: Sequence[FreeParameter]) -> Array:
     """Coordinates (m,) of free parameters, on their scales."""
     places = []
     for move in moves:
@@ -57,7 +59,7 @@ def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     return np.array(places)
 
 
-def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float = _LOG_STEP,
+def steps_of(effects: Sequence[Chosen], moves: Sequence[FreeParameter], log_step: float = _LOG_STEP,
              share_step: float = _SHARE_STEP) -> Array:
     """Difference steps (m,) for derivatives, on the scales of the parameters; away from a bound.
 
@@ -69,14 +71,14 @@ def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float =
         parameter = effects[move.effect].effect.parameters[move.parameter]
         step = parameter.step
         if step is None:
-            size = max(abs(here), _LEAST_SHARE * parameter.usual_way())
+            size = max(abs(here), _LEAST_SHARE * parameter.usual_range())
             step = log_step if parameter.scale is Scale.LOG else share_step * size
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
         steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
     return np.array(steps)
 
 
-def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
+def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter | None:
     """The free parameter of that name; None for one that is of none of these effects.
 
     ValueError, which lists those there are, for a number that the effect lacks or that no fit may move.
@@ -87,14 +89,14 @@ def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
         return None
     index = names.index(effect)
     numbers = [one.name for one in effects[index].effect.parameters]
-    moves = moves_of(effects, [index])
-    if leaf not in numbers or Move(index, numbers.index(leaf)) not in moves:
+    moves = free_parameters_of(effects, [index])
+    if leaf not in numbers or FreeParameter(index, numbers.index(leaf)) not in moves:
         known = ", ".join(f"{effect}.{numbers[move.parameter]}" for move in moves) or "none of it"
         raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
-    return Move(index, numbers.index(leaf))
+    return FreeParameter(index, numbers.index(leaf))
 
 
-def free_number(effects: Sequence[Chosen], move: Move, start: float | None = None,
+def free_number(effects: Sequence[Chosen], move: FreeParameter, start: float | None = None,
                 bounds: tuple[float, float] | None = None) -> Free:
     """A free parameter as ``identification`` fits it: from its present value, within its range, unless others are
     given. ValueError as ``Free``, and for bounds beyond its range."""
@@ -110,7 +112,7 @@ def free_number(effects: Sequence[Chosen], move: Move, start: float | None = Non
 
 
 def _usual(parameter: Parameter, value: float) -> float:
-    return max(abs(value), parameter.usual_way())
+    return max(abs(value), parameter.usual_range())
 
 
 def slope_of(parameter: Parameter, value: float) -> float:

@@ -83,7 +83,7 @@ def _look_through(one: Parameter) -> None:
         raise ValueError(f"{one.name}: expected a step above 0, found {one.step}")
     if not one.trials:
         raise ValueError(f"{one.name}: expected trials, the values that a search begins at, as in ({one.start},)")
-    if one.moves and all(value == one.null for value in one.trials):
+    if one.is_free and all(value == one.null for value in one.trials):
         raise ValueError(f"{one.name}: expected trials away from {one.null}, where the effect does nothing")
     default = () if one.default is None else (one.default,)
     for value in (*one.trials, *one.choices, *default):

@@ -33,7 +33,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
 from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import free_number, move_named
+from logger.vehicle.effect_parameters import free_number, free_parameter_named
 from logger.vehicle.frequency_response import AxleResponse, body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free, names
@@ -232,7 +232,7 @@ def rubbing(figures: Figures) -> None:
     truth = {MASS: 875.0, FRICTION: FRICTION_N}
     law = shipped_effects()["dry_friction"]
     there = [chosen(law, {"friction_force_n": 60.0})]
-    move = move_named(there, FRICTION)
+    move = free_parameter_named(there, FRICTION)
     assert move is not None
     errors, times = [], []
     for seed in range(RUBBING_DRAWS):

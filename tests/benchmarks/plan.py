@@ -19,7 +19,7 @@ from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 from ..validation.simulator.cars import Axle, Car
 from ..validation.simulator.effects import EFFECTS
@@ -99,7 +99,7 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
     bench = bench_with(VEHICLE, runs, (), USUAL_TOLERANCE)
     posterior = bench.posterior(searches=True).without_soft_bounds()
     one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
-    gain = one.gain + len(moves_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
+    gain = one.gain + len(free_parameters_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
     return float(np.sqrt(max(gain, 0.0)))
 
 

@@ -22,7 +22,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.studies.drives import rav4
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
-from logger.vehicle.effect_parameters import free_number, move_named
+from logger.vehicle.effect_parameters import free_number, free_parameter_named
 from logger.vehicle.named_parameters import free
 
 from ..support.drives.bumps import bump_record, road_record
@@ -48,7 +48,7 @@ def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], r
     road = road or RoadInput()
     numbers = []
     for name, start in starts.items():
-        move = move_named(effects, name)
+        move = free_parameter_named(effects, name)
         if is_input(name):
             numbers.append(free_input(road, name, start))
         else:
@@ -165,12 +165,12 @@ def test_noise_that_roads_make_is_that_of_the_car_with_its_effects() -> None:
 def test_numbers_that_effects_do_not_have(name: str, message: str) -> None:
     there = [rubbing(60.0), effect("sensor_bandwidth", cutoff_hz=30.0), effect("wheel_lift")]
     with pytest.raises(ValueError, match=message):
-        move_named(there, name)
+        free_parameter_named(there, name)
 
 
 def test_a_number_stays_within_what_it_may_be() -> None:
     there = [rubbing(60.0)]
-    move = move_named(there, FRICTION)
+    move = free_parameter_named(there, FRICTION)
     assert move is not None
     number = free_number(there, move)
     assert (number.start, number.low, number.high, number.by_factors) == (60.0, 0.0, 2000.0, False)

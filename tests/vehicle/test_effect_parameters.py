@@ -10,14 +10,14 @@ import pytest
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import (
-    Move,
+    FreeParameter,
     coordinates_of,
     free_number,
-    move_named,
-    moved,
-    moves_of,
+    free_parameter_named,
+    free_parameters_of,
     slope_of,
     steps_of,
+    with_coordinates,
 )
 
 EFFECTS = shipped_effects()
@@ -25,14 +25,14 @@ USUAL = [chosen(effect, effect.usual) for effect in EFFECTS.values()]
 
 
 def test_every_number_that_moves_is_found_by_its_name() -> None:
-    for move in moves_of(USUAL):
+    for move in free_parameters_of(USUAL):
         one = USUAL[move.effect].effect
-        assert move_named(USUAL, f"{one.name}.{one.parameters[move.parameter].name}") == move
-    assert move_named(USUAL, "sprung_mass_kg") is None
+        assert free_parameter_named(USUAL, f"{one.name}.{one.parameters[move.parameter].name}") == move
+    assert free_parameter_named(USUAL, "sprung_mass_kg") is None
 
 
 def test_every_number_is_free_from_where_it_stands() -> None:
-    for move in moves_of(USUAL):
+    for move in free_parameters_of(USUAL):
         parameter = USUAL[move.effect].effect.parameters[move.parameter]
         value = USUAL[move.effect].values[parameter.name]
         one = free_number(USUAL, move)
@@ -41,8 +41,8 @@ def test_every_number_is_free_from_where_it_stands() -> None:
 
 
 def test_coordinates_there_and_back() -> None:
-    moves = moves_of(USUAL)
-    back = moved(USUAL, moves, coordinates_of(USUAL, moves))
+    moves = free_parameters_of(USUAL)
+    back = with_coordinates(USUAL, moves, coordinates_of(USUAL, moves))
     for one, other in zip(back, USUAL, strict=True):
         assert dict(one.values) == pytest.approx(dict(other.values))
 
@@ -56,7 +56,7 @@ def test_slopes_are_those_of_the_coordinates() -> None:
 
 
 def test_a_strength_that_is_large_may_be_known_as_roughly_as_a_size() -> None:
-    friction = free_number([chosen(EFFECTS["dry_friction"], {"friction_force_n": 60.0})], Move(0, 0))
+    friction = free_number([chosen(EFFECTS["dry_friction"], {"friction_force_n": 60.0})], FreeParameter(0, 0))
     assert friction.weakest_at(10.0) * friction.unit == pytest.approx(30.0)
     assert friction.weakest_at(600.0) * friction.unit == pytest.approx(300.0)
 
@@ -75,7 +75,7 @@ def test_numbers_that_begin_at_nothing_are_stepped_and_those_that_cannot_move_ar
             return np.ones_like(s)
 
     effects = [chosen(Own(), {"mass_kg": 0.0, "width_m": 0.0, "fixed_hz": 5.0})]
-    moves = moves_of(effects)
+    moves = free_parameters_of(effects)
     assert [move.parameter for move in moves] == [0, 1]
     assert steps_of(effects, moves) == pytest.approx([0.02 * 0.1 * 20, 0.02 * 0.1 * 3])
-    assert effects[0].at_an_end and not chosen(Own(), {"mass_kg": 1.0, "width_m": 1.0, "fixed_hz": 5.0}).at_an_end
+    assert effects[0].at_bound and not chosen(Own(), {"mass_kg": 1.0, "width_m": 1.0, "fixed_hz": 5.0}).at_bound

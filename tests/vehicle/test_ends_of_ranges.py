@@ -13,15 +13,15 @@ EFFECTS = shipped_effects()
 def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
     bending, roll = EFFECTS["body_bending"], EFFECTS["roll"]
     usual = {"frequency_hz": 21.0, "damping_ratio": 0.05, "participation": 0.5}
-    assert not chosen(bending, usual).at_an_end
-    assert chosen(bending, usual | {"frequency_hz": 60.0}).at_an_end
-    assert chosen(bending, usual | {"damping_ratio": 0.003}).at_an_end
-    assert not chosen(bending, usual | {"participation": 10.0}).at_an_end  # a strength, which may be large
+    assert not chosen(bending, usual).at_bound
+    assert chosen(bending, usual | {"frequency_hz": 60.0}).at_bound
+    assert chosen(bending, usual | {"damping_ratio": 0.003}).at_bound
+    assert not chosen(bending, usual | {"participation": 10.0}).at_bound  # a strength, which may be large
     shapes = {one.name: one.high for one in roll.parameters}
     bandwidth = EFFECTS["sensor_bandwidth"]
-    assert chosen(bandwidth, {"cutoff_hz": 2000.0, "order": 2.0}).at_an_end  # where it does nothing
-    assert not chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_an_end
-    assert not chosen(roll, shapes).at_an_end  # it has no strength that could make up for a shape
+    assert chosen(bandwidth, {"cutoff_hz": 2000.0, "order": 2.0}).at_bound  # where it does nothing
+    assert not chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_bound
+    assert not chosen(roll, shapes).at_bound  # it has no strength that could make up for a shape
 
 
 STRENGTHS = [(name, one.name) for name, effect in EFFECTS.items() for one in effect.parameters
@@ -31,9 +31,9 @@ STRENGTHS = [(name, one.name) for name, effect in EFFECTS.items() for one in eff
 @pytest.mark.parametrize(("name", "strength"), STRENGTHS)
 def test_a_strength_is_at_its_weakest_at_one_end_and_not_where_it_is_usual(name: str, strength: str) -> None:
     one = next(one for one in EFFECTS[name].parameters if one.name == strength)
-    ends = [one.at_its_weakest(value) for value in (one.low, one.high)]
+    ends = [one.at_weakest_bound(value) for value in (one.low, one.high)]
     assert sorted(ends) == [False, True] and ends[0] == (one.null == one.low)
-    assert not any(one.at_its_weakest(value) for value in (one.start, *one.trials))
+    assert not any(one.at_weakest_bound(value) for value in (one.start, *one.trials))
     weakest = one.coordinate(one.low if ends[0] else one.high)
     tenth = one.value(weakest + 0.1 * (one.coordinate(one.start) - weakest))
-    assert not one.at_its_weakest(tenth)  # whatever its unit
+    assert not one.at_weakest_bound(tenth)  # whatever its unit

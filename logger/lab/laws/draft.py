@@ -73,7 +73,7 @@ class Draft:
     @property
     def strengths(self) -> tuple[str, ...]:
         """Names of the numbers at whose null the law does nothing."""
-        return tuple(one.name for one in self.parameters if one.moves and one.null is not None)
+        return tuple(one.name for one in self.parameters if one.is_free and one.null is not None)
 
     def text(self, values: Mapping[str, float] | None = None, said: Sequence[str] = ()) -> str:
         """The law's file.

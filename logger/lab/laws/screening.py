@@ -13,7 +13,7 @@ from logger.lab.laws.draft import Draft
 from logger.lab.likelihood.map_fit import effect_slopes
 from logger.lab.selection.screening import Baseline, Screened, Trial, screen
 from logger.vehicle.effect import Misalignment, chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, moved
+from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, with_coordinates
 
 
 def screen_law(base: Baseline, draft: Draft, misalignment: Misalignment) -> Screened:
@@ -29,7 +29,7 @@ def screen_law(base: Baseline, draft: Draft, misalignment: Misalignment) -> Scre
 
 def free_count(one: Screened) -> int:
     """Number of free parameters of an effect."""
-    return sum(parameter.moves for parameter in one.effect.parameters)
+    return sum(parameter.is_free for parameter in one.effect.parameters)
 
 
 def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) -> Trial:
@@ -37,7 +37,8 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     linear, state = base.linear, base.state
     effects = (*state.effects, chosen(draft.effect, values))
     last = len(effects) - 1
-    moves = [Move(last, place) for place, one in enumerate(draft.effect.parameters) if one.name in draft.strengths]
+    moves = [FreeParameter(last, place) for place, one in enumerate(draft.effect.parameters)
+             if one.name in draft.strengths]
     slopes = effect_slopes(linear, effects, state.logs, moves, state.record, base.rough)
     white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(state.logs, white)
@@ -47,6 +48,6 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     scale = np.where(size > 0, size, 1.0)
     step = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-8, hermitian=True) @ (gradient / scale) / scale
     without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
-    there = moved(effects, moves, coordinates_of(effects, moves) + step[p:])
+    there = with_coordinates(effects, moves, coordinates_of(effects, moves) + step[p:])
     change = [step[p:] @ one for one in slopes]
     return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p], change)

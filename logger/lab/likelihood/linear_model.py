@@ -20,7 +20,7 @@ from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
 from logger.lab.likelihood.whittle import Whitener
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 Array = npt.NDArray[np.float64]
 
@@ -190,7 +190,7 @@ class LinearModel:
         the record's errors, G. Schwarz's (Annals of Statistics 6, 1978) for the numbers of effects."""
         posterior, state = self.posterior, self.state
         return (posterior.deviance(state) + posterior.cost(state) + self.occam_factor
-                + len(moves_of(state.effects)) * float(np.log(posterior.freedom)))
+                + len(free_parameters_of(state.effects)) * float(np.log(posterior.freedom)))
 
     @property
     def occam_factor(self) -> float:

@@ -23,7 +23,13 @@ from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
+from logger.vehicle.effect_parameters import (
+    FreeParameter,
+    coordinates_of,
+    free_parameters_of,
+    steps_of,
+    with_coordinates,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -75,7 +81,7 @@ def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int 
     """
     posterior, fresh = start.posterior, numbers is None
     numbers = posterior.number_slopes(start.state, posterior.prior.steps) if numbers is None else numbers
-    moves = moves_of(start.state.effects)
+    moves = free_parameters_of(start.state.effects)
     best = now = start.with_number_slopes(numbers)
     least = best.score
     enough = max(CONVERGED, min_gain)
@@ -195,7 +201,8 @@ class _Point:
     cost: float
 
 
-def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[Move], small_gain: float = 0.15) -> State:
+def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[FreeParameter], small_gain: float = 0.15
+                     ) -> State:
     """Levenberg-Marquardt steps on the car's numbers and the free ones of the effects, with the most likely distance
     errors to first order at each."""
     own: list[Array] | None = None
@@ -205,7 +212,7 @@ def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[Move], s
     predict = linear.posterior.predictor(state)
 
     def evaluate(x: Array) -> _Point:
-        effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs
+        effects, logs = with_coordinates(state.effects, moves, x[p:]), x[:p] if p else state.logs
         record = linear.state.record
         if realigns and known is not None:
             # The distance error compensates an effect that shifts a run: predicted without it, no step would gain.
@@ -228,7 +235,7 @@ def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[Move], s
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
 
 
-def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[Move],
+def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[FreeParameter],
                   record: Sequence[Array], fine: Sequence[Array]) -> list[Array]:
     """Derivatives of predictions by the effects' numbers, on the scales of the parameters: (m, n) per run, with these
     record errors, by differences of rough simulations, which are near enough.
@@ -238,14 +245,14 @@ def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, m
     posterior = linear.posterior
     predict = partial(posterior.predict, logs=logs, record=record, rough=True)
     before = predict(effects) if posterior.car(effects, logs).rubs else fine
-    return derivatives(lambda there: predict(moved(effects, moves, there)), coordinates_of(effects, moves),
+    return derivatives(lambda there: predict(with_coordinates(effects, moves, there)), coordinates_of(effects, moves),
                        steps_of(effects, moves), before)
 
 
 def own_slopes(linear: LinearModel) -> list[Array] | None:
     """Derivatives of a model's predictions by the numbers of its effects: (m, n) per run; None where none is free."""
     state = linear.state
-    moves = moves_of(state.effects)
+    moves = free_parameters_of(state.effects)
     return effect_slopes(linear, state.effects, state.logs, moves, state.record, state.predictions) if moves else None
 
 

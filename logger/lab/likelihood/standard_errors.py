@@ -15,7 +15,7 @@ import numpy.typing as npt
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of, slope_of
+from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, free_parameters_of, slope_of
 from logger.vehicle.effect_sizes import grows_with_mass
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -31,7 +31,7 @@ def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     linear, state = found.without_soft_bounds(), found.state
     covariance = _covariance(linear)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return (with_standard_errors(state.effects, moves_of(state.effects), deviations[linear.count:]),
+    return (with_standard_errors(state.effects, free_parameters_of(state.effects), deviations[linear.count:]),
             deviations[: linear.count])
 
 
@@ -39,7 +39,7 @@ def number_errors(found: LinearModel) -> NumberErrors:
     """Standard errors and correlations of the numbers of the car and of its effects, in their own units; as
     ``standard_errors``."""
     linear, state = found.without_soft_bounds(), found.state
-    prior, moves = linear.posterior.prior, moves_of(state.effects)
+    prior, moves = linear.posterior.prior, free_parameters_of(state.effects)
     vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
     names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
     for move in moves:
@@ -74,7 +74,7 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
             state.effects, state.logs).rubs:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]
-    for move in moves_of(state.effects):
+    for move in free_parameters_of(state.effects):
         one = state.effects[move.effect]
         parameter = one.effect.parameters[move.parameter]
         value = one.values[parameter.name]
@@ -86,7 +86,7 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
     return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
-def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,
+def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParameter], deviations: Array,
                 share: float = 1e-4) -> tuple[Chosen, ...]:
     """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
     linear over such a share of a number."""

@@ -10,7 +10,7 @@ from logger.lab.likelihood.posterior import State
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         linear = base.linear.hold_fixed(trial.one.effect.replaces)
         state = State((*base.state.effects, trial.one), posterior.prior.clip_to_soft_bounds(trial.logs),
                       linear.state.record, linear.size, [])
-    state = optimise_numbers(linear, state, moves_of(state.effects))
+    state = optimise_numbers(linear, state, free_parameters_of(state.effects))
     there = relinearise(posterior, state, linear.numbers, score)
     found = MapFit.of(there)
     return CandidateFit(found, score - found.score)

@@ -23,7 +23,7 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, moved
+from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, with_coordinates
 from logger.vehicle.named_parameters import read
 
 Array = npt.NDArray[np.float64]
@@ -173,7 +173,7 @@ def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, 
     """Values of those parameters of an effect that another one has as well, clipped to their ranges: a resonance keeps
     its frequency when it is attributed to something else."""
     return {one.name: min(max(values[one.name], one.low), one.high)
-            for one in effect.parameters if one.moves and one.name in values}
+            for one in effect.parameters if one.is_free and one.name in values}
 
 
 def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
@@ -197,9 +197,9 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     nominal = np.zeros_like(base.state.logs)
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
-    shape = next((one.name for one in effect.parameters if one.moves and one.null is None), "")
+    shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
     for values in trials:
-        choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.moves)
+        choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.is_free)
         one = chosen(effect, values)
         ways = ([_trial_at_values(base, one, base.state.logs)] if effect.replaces else
                 _trials_at_best_strength(base, one))
@@ -301,12 +301,12 @@ def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:
 def scale_strength(one: Chosen, strength: float) -> Chosen | None:
     """The effect with its first strength times a factor, on its scale from the null on; None without a strength."""
     for place, parameter in enumerate(one.effect.parameters):
-        if parameter.null is None or not parameter.moves:
+        if parameter.null is None or not parameter.is_free:
             continue
-        move = Move(0, place)
+        move = FreeParameter(0, place)
         null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
         here = float(coordinates_of([one], [move])[0])
-        return moved([one], [move], np.array([null + strength * (here - null)]))[0]
+        return with_coordinates([one], [move], np.array([null + strength * (here - null)]))[0]
     return None
 
 

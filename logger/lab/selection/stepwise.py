@@ -33,7 +33,7 @@ from logger.lab.selection.screening import (
     without_effect,
 )
 from logger.vehicle.effect import Chosen, Effect, Misalignment
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
 
@@ -219,7 +219,7 @@ class Search:
 
     def _complexity(self, one: Chosen) -> tuple[bool, int]:
         """Order of simplicity: effects that the records show by themselves first, then by their free parameters."""
-        return not one.effect.is_seen(one.values, self.misalignment), len(moves_of([one]))
+        return not one.effect.is_seen(one.values, self.misalignment), len(free_parameters_of([one]))
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted; kept for the model that was asked for last."""
@@ -337,7 +337,7 @@ def is_outside_data(posterior: Posterior, one: Chosen) -> bool:
     seen by its flank below, unless a record was filtered, which looks the same."""
     runs = posterior.runs.runs
     filtered = any(run.facts.pass_band_hz is not None for run in runs)
-    return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
+    return one.at_bound or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
 
 
 def _fit_all_roughly(pool: ThreadPoolExecutor, score: float,

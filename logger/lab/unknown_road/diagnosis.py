@@ -24,7 +24,7 @@ from logger.lab.unknown_road.placement import placed_by_road
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import Trial, screen
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
@@ -241,7 +241,7 @@ def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, 
     """The last effect of a state as one of so many candidates. Its gain in minus twice the log of the likelihood, less
     what its numbers cost (G. Schwarz 1978), is that in the evidence."""
     one = state.effects[-1]
-    gain -= len(moves_of([one])) * float(np.log(problem.samples))
+    gain -= len(free_parameters_of([one])) * float(np.log(problem.samples))
     return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
 
 

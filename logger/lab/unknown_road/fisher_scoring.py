@@ -14,7 +14,13 @@ import numpy.typing as npt
 
 from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
-from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
+from logger.vehicle.effect_parameters import (
+    FreeParameter,
+    coordinates_of,
+    free_parameters_of,
+    steps_of,
+    with_coordinates,
+)
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -31,7 +37,7 @@ class RoadFit:
     """
 
     state: RoadFitState
-    moves: tuple[Move, ...]
+    moves: tuple[FreeParameter, ...]
     data: Array
     information: Array
     problem: SameRoad
@@ -46,14 +52,14 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
     falling        the information, which takes most of the time, is kept from step to step as long as the expected gain
                    falls to this share or less
     """
-    moves = moves_of(state.effects)
+    moves = free_parameters_of(state.effects)
     p, q = len(state.logs), len(moves)
     here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
     low, high, longest = _limits(state.effects, moves, len(here), p)
     low[-1] = np.log(problem.least_mps2)
 
     def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
-        return here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+        return here[:p], with_coordinates(state.effects, moves, here[p : p + q]), here[p + q :]
 
     data, last_gain = np.empty((0, 0)), 0.0
     for count in range(steps):
@@ -96,7 +102,7 @@ def inverse(information: Array, ridge: float = 1e-6) -> Array:
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 
-def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
+def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[FreeParameter], logs: Array,
            step: float = 1e-3) -> tuple[Complex, Complex]:
     """A response (x, f) and its derivatives (p + q, x, f) by the logs and the moves, over steps of this share."""
     gains = problem.response(effects, logs)
@@ -109,11 +115,11 @@ def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: S
     for index, own_step in enumerate(steps_of(effects, moves, step, step)):
         shifted = here.copy()
         shifted[index] += own_step
-        slopes.append((problem.response(moved(effects, moves, shifted), logs) - gains) / own_step)
+        slopes.append((problem.response(with_coordinates(effects, moves, shifted), logs) - gains) / own_step)
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 
-def _limits(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int,
+def _limits(effects: Sequence[Chosen], moves: Sequence[FreeParameter], count: int, first: int,
             longest_log: float = 0.5) -> tuple[Array, Array, Array]:
     """Bounds and longest step of each number (count,); those of the moves begin at ``first``."""
     low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
@@ -121,5 +127,5 @@ def _limits(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first:
         parameter = effects[move.effect].effect.parameters[move.parameter]
         low[index], high[index] = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
         if parameter.scale is not Scale.LOG:
-            longest[index] = max(parameter.usual_way(), 0.5 * abs(coordinates_of(effects, [move])[0]))
+            longest[index] = max(parameter.usual_range(), 0.5 * abs(coordinates_of(effects, [move])[0]))
     return low, high, longest

@@ -17,7 +17,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import effect_slopes
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.secret_runs import EFFECTS
@@ -44,7 +44,7 @@ def case() -> Case:
     effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
     state = posterior.state_at(effects, logs, record)
     linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
-    own = effect_slopes(linear, effects, logs, moves_of(effects), linear.state.record, state.predictions)
+    own = effect_slopes(linear, effects, logs, free_parameters_of(effects), linear.state.record, state.predictions)
     return Case(posterior, state, linear, linear.whitened(own))
 
 
@@ -108,7 +108,7 @@ def test_the_gradient_is_that_of_the_objective() -> None:
     one = case()
     assert one.linear.numbers is not None
     numbers, logs = one.linear.numbers, one.state.logs
-    own = effect_slopes(one.linear, one.state.effects, logs, moves_of(one.state.effects), one.state.record,
+    own = effect_slopes(one.linear, one.state.effects, logs, free_parameters_of(one.state.effects), one.state.record,
                         one.state.predictions)
 
     def objective(x: Array) -> float:

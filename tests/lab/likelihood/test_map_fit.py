@@ -14,7 +14,7 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
-from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
+from logger.vehicle.effect_parameters import coordinates_of, free_parameters_of, with_coordinates
 from logger.vehicle.named_parameters import changed, read
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
@@ -80,10 +80,10 @@ def test_nothing_near_a_fit_is_likelier() -> None:
     linear, posterior, state = damped(), damped().posterior, damped().state
     here = linear.objective(state.predictions, state.logs)
     known = 1 / np.sqrt(np.diag(linear.information(state.logs)))
-    moves = moves_of(state.effects)
+    moves = free_parameters_of(state.effects)
     coordinates = coordinates_of(state.effects, moves)
     beside = [(state.effects, state.logs + way * row) for row in np.diag(0.5 * known) for way in (1, -1)]
-    beside += [(moved(state.effects, moves, coordinates + way * 15.0), state.logs) for way in (1, -1)]
+    beside += [(with_coordinates(state.effects, moves, coordinates + way * 15.0), state.logs) for way in (1, -1)]
     for effects, logs in beside:
         there = posterior.predict(effects, logs, state.record)
         assert linear.objective(there, logs) > here - 0.5 * CONVERGED

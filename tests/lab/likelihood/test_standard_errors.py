@@ -15,7 +15,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.standard_errors import standard_errors, with_standard_errors
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
-from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.effect_sizes import grows_with_mass
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
@@ -104,7 +104,7 @@ def test_an_error_at_a_bound_is_not_halved(name: str, key: str, value: float | N
     value = parameter.high if value is None else value
     error = 50.0 * parameter.high if error is None else error
     one = chosen(effect, {**effect.usual, key: value})
-    (with_error,) = with_standard_errors((one,), moves_of((one,)), np.full(len(effect.parameters), 50.0))
+    (with_error,) = with_standard_errors((one,), free_parameters_of((one,)), np.full(len(effect.parameters), 50.0))
     assert with_error.standard_errors[key] == pytest.approx(error, rel=1e-3)
 
 

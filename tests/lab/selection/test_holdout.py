@@ -16,7 +16,7 @@ from logger.lab.likelihood.signals import deviance
 from logger.lab.selection.holdout import cross_validate, folds
 from logger.runs import Run, normalised_rms
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
+from logger.vehicle.effect_parameters import coordinates_of, free_parameters_of, with_coordinates
 
 from ...support.lab.secret_runs import hidden, posterior_of, secret_runs
 
@@ -59,12 +59,12 @@ def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     """Error and deviance of models whose numbers were fitted to convergence, by true predictions, without each set of
     stretches in turn; distances stay as they are."""
     posterior, state = found.posterior, found.state
-    runs, moves, p = posterior.runs.runs, moves_of(state.effects), len(state.logs)
+    runs, moves, p = posterior.runs.runs, free_parameters_of(state.effects), len(state.logs)
     here = np.concatenate([state.logs, coordinates_of(state.effects, moves)])
     scale = np.concatenate([posterior.prior.deviations, np.maximum(0.1 * np.abs(here[p:]), 1e-3)])
 
     def residuals(x: Array) -> list[Array]:
-        there: tuple[Chosen, ...] = moved(state.effects, moves, x[p:])
+        there: tuple[Chosen, ...] = with_coordinates(state.effects, moves, x[p:])
         predicted = posterior.predict(there, x[:p], state.record)
         return posterior.residuals_of(predicted)
 
@@ -92,7 +92,7 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
     posterior = posterior_of(secret_runs(there, lasts_s=12.0))
     linear = fit(align(posterior, posterior.start(tried)))
     state = linear.state
-    own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.record,
+    own = effect_slopes(linear, state.effects, state.logs, free_parameters_of(tried), state.record,
                         state.predictions) if tried else None
     quick = cross_validate(linear, own)
     error, lack = unseen_when_refitted(linear)

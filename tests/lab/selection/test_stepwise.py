@@ -122,12 +122,12 @@ def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Ba
 
 def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> None:
     posterior = offset_base.posterior
-    at_an_end = hidden("occupant", frequency_hz=EFFECTS["occupant"].parameters[1].high)
-    state = posterior.state_at([at_an_end], offset_base.state.logs)
+    ended_occupant = hidden("occupant", frequency_hz=EFFECTS["occupant"].parameters[1].high)
+    state = posterior.state_at([ended_occupant], offset_base.state.logs)
     one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     model = refine(offset_base.score, one, rounds=1).found
     ended = replace(one, found=MapFit.of(fit(LinearModel(posterior, state), model.numbers, rounds=0)), gain=1e9)
-    assert at_an_end.at_an_end and ended.effect.name == "occupant"
+    assert ended_occupant.at_bound and ended.effect.name == "occupant"
     assert not search(FEW).is_accepted(offset_base, ended)
 
 
