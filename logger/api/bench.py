@@ -217,7 +217,8 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     found = Bench(word, model, runs, effects, files, numbers)
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
-    predictions = check_model(word, model, runs, warn, effects, anyway, numbers)
+    shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
+    predictions = check_model(word, model, runs, warn, shipped, anyway, numbers)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 

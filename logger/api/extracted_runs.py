@@ -229,7 +229,8 @@ def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: 
     near = aside_m <= ASIDE_M
     if not near.any():
         return f": the nearest fix is {aside_m.min():.0f} m aside of it"
-    return (f": only {np.ptp(driven_m[near]):.0f} m of the drive are within {ASIDE_M:g} m of it, whose places go over "
+    near_m = np.diff(driven_m)[near[1:] & near[:-1]].sum()
+    return (f": only {near_m:.0f} m of the drive are within {ASIDE_M:g} m of it, whose places go over "
             f"{np.ptp(line.distance_m):.0f} m")
 
 

@@ -195,6 +195,7 @@ def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequ
                  known: Mapping[str, Effect], numbers: float) -> Iterator[str]:
     """That the runs are of another car, which explains them as no effect does, and how it differs."""
     from logger.lab.another_car import another_car
+    from logger.vehicle.stepping_loop import COMPILED
 
     mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
@@ -204,7 +205,8 @@ def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequ
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: this one says "
                f"next to nothing of it (error {found.error:.2f}), one with "
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
-               "Is it another car's file? ridelog identify fits a car's numbers")
+               "Is it another car's file? ridelog identify fits a car's numbers"
+               + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
 
 
 def _explained_by_an_effect(found: AnotherCar, model: Model, known: Mapping[str, Effect], numbers: float) -> bool:

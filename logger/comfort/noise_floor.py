@@ -33,7 +33,8 @@ sqrt(1/4 - 1/12)."""
 
 # Expected largest of a white noise's moving means over 1 s in a window, in their own deviations, by its length [s]:
 # simulated, 100 samples a second (tests/comfort/test_noise_floor.py).
-_LARGEST_OF_MOVING = ((0.0, 0.3, 1.0, 2.0, 5.0, 10.0, 30.0), (0.0, 0.53, 1.04, 1.46, 1.95, 2.28, 2.76))
+_LARGEST_OF_MOVING = ((0.0, 0.3, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0),
+                      (0.0, 0.53, 1.04, 1.46, 1.95, 2.28, 2.76, 3.06, 3.29))
 
 
 @dataclass(frozen=True)

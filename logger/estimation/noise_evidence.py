@@ -24,7 +24,10 @@ from logger.estimation.normal_distribution import distribution
 
 Array = npt.NDArray[np.float64]
 
-_LEVELS_PER_STEP = 64  # of the integral over a parked car's level: finer than some 1000 toggling readings show it
+_LEVELS_PER_STEP = 64  # of the integral over a parked car's level: finer than _MOST_PARKED toggling readings show it
+_MOST_PARKED = 1000
+"""A stand counts as so many readings at most, ten seconds: in longer ones the level drifts and what shakes the car is
+not independent from reading to reading, and their evidence would fall by more than a belief can follow."""
 _LEAST_SHARE = 1e-30
 _LEAST_PROBABILITY = 0.0027  # beyond 3 deviations: what is farther out is a hole that the solution has not found yet
 
@@ -47,7 +50,7 @@ def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
     """Log evidence (g,) of a parked car's readings for noises (g,), given as logarithms of steps: at most that of
     smaller noises, which something else that shook the car may have joined.
 
-    steps, counts    (k,) numbers of neighbouring steps, and how many readings were on each
+    steps, counts    (k,) numbers of neighbouring steps, and how many readings were on each; a long stand is scaled down
 
     The level may have lain anywhere: Z = integral over the level of the product of each reading's probability.
     """
@@ -56,7 +59,8 @@ def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
     half = 0.5 / np.exp(log_noise)[:, None, None]
     near = np.abs(from_level)  # in the lower tail differences keep their digits
     share = distribution(half - near) - distribution(-half - near)
-    by_level = np.log(np.maximum(share, _LEAST_SHARE)) @ counts
+    weights = counts * min(1.0, _MOST_PARKED / counts.sum())
+    by_level = np.log(np.maximum(share, _LEAST_SHARE)) @ weights
     most = by_level.max(axis=1)
     evidence = most + np.log(np.exp(by_level - most[:, None]).mean(axis=1))
     at_most: Array = np.maximum.accumulate(evidence[::-1])[::-1]

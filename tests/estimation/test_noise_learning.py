@@ -217,6 +217,32 @@ def test_an_upper_bound_leaves_the_belief_below_it_as_it_was() -> None:
     assert 0.5 < learner.belief.log_std <= 1.0
 
 
+def readings_of_a_stand(noise: float, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Steps and how many of so many readings were on each, of a level within a step and a noise, in steps."""
+    found = np.rint(0.2 + noise * np.random.default_rng(seed).standard_normal(count))
+    steps = np.arange(found.min(), found.max() + 1)
+    return steps, np.array([np.count_nonzero(found == one) for one in steps], dtype=np.float64)
+
+
+@pytest.mark.parametrize("count", [1000, 60_000, 240_000])
+def test_however_long_a_stand_it_only_bounds_the_noise(count: int) -> None:
+    """What shakes an idling car is not the sensor's: less stays possible, and what was learnt stays known."""
+    shaken = NoiseLearner(USUAL, USUAL, STEP)
+    shaken.take(parked_evidence(*readings_of_a_stand(0.25 / STEP, count, 1), shaken.log_noise - np.log(STEP)))
+    assert shaken.belief.noise_rms_mps2 < 0.25
+    assert abs(shaken.belief.log_mean - USUAL.log_mean) < 1.5 * shaken.belief.log_std
+    rng = np.random.default_rng(2)
+    learnt = NoiseLearner(USUAL, USUAL, STEP)
+    for _ in range(60):
+        expected = rng.uniform(-1, 1, 200)
+        low = STEP * (np.round((expected + rng.normal(0, 0.3, 200)) / STEP) - 0.5)
+        learnt.take(interval_evidence(expected, np.full(200, 1e-3), low, low + STEP, learnt.log_noise))
+    before = learnt.belief
+    learnt.take(parked_evidence(*readings_of_a_stand(0.3 / STEP, count, 3), learnt.log_noise - np.log(STEP)))
+    assert abs(learnt.belief.log_mean - before.log_mean) < 2 * before.log_std
+    assert learnt.belief.log_std < 2 * before.log_std
+
+
 def test_within_a_service_that_runs_for_weeks_each_drive_begins_less_certain() -> None:
     learner = NoiseLearner(USUAL, USUAL, 0.0)
     for _ in range(40):

@@ -142,8 +142,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     return UnknownRoadDiagnosis(
         (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
         _with_errors(now)[len(present):], tuple(errors),
-        tuple(zip(now.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
-        noise.deviation_mps2 / problem.size_mps2, untried, road,
+        tuple(zip(before.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
+        noise.deviation_mps2 / now.problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
         _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
@@ -211,12 +211,16 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
 
 def _placed_anew(now: RoadFit, progress: Progress) -> RoadFit:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
-    and the next effect would imitate that."""
+    and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
+    where they are."""
     progress("laying the drives on one distance anew")
     old, state = now.problem, now.state
     car = old.prior.vehicle(old.vehicle, state.logs)
-    runs = placed_by_road(old.runs, old.vehicle, old.tolerance, state.effects, car)
-    problem = SameRoad(runs, old.vehicle, old.tolerance, car, exact_places=False)
+    try:
+        runs = placed_by_road(old.runs, old.vehicle, old.tolerance, state.effects, car)
+        problem = SameRoad(runs, old.vehicle, old.tolerance, car, exact_places=False)
+    except NotOneRoad:
+        return replace(now, problem=old.preconditioned(state))
     begin = problem.start(state.effects)
     return fit(problem.preconditioned(begin), begin)
 

@@ -31,7 +31,8 @@ class RoadFit:
     """A fitted state, with the information on its numbers.
 
     moves          free parameters of its effects
-    data           information of the drives on the logs, the moves (on their scales) and the roads' numbers (m, m)
+    data           information of the drives on the logs, the moves (on their scales) and the roads' numbers (m, m), at
+                   the last step for which it was computed
     information    of drives and priors (m, m)
     problem        with a preconditioner for states near this one
     """
@@ -48,9 +49,9 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
     """Fit the most probable state, by so many scoring steps from a state at most.
 
     converged      the fit ends before a step of a smaller expected gain in the log of the probability
-    many_rounds    equations that take more iterations get a new preconditioner
+    many_rounds    equations that take more iterations get a new preconditioner, which takes about as long as they
     falling        the information, which takes most of the time, is kept from step to step as long as the expected gain
-                   falls to this share or less
+                   falls to this share or less: at a half steps converge still, if no longer quadratically
     """
     moves = free_parameters_of(state.effects)
     p, q = len(state.logs), len(moves)

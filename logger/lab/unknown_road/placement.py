@@ -28,8 +28,8 @@ Array = npt.NDArray[np.float64]
 
 def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, present: Sequence[Chosen] = (),
                    start_vehicle: Vehicle | None = None, rounds: int = 8, small_m: float = 0.01) -> list[Run]:
-    """Runs with the distances at which the others agree with them. The first stays where it is; where windows do not
-    correlate, so does the run.
+    """Runs with the distances at which the others agree with them, but for a constant of some metres, which is a number
+    of the road (``RoadFitState.roads``). The first stays where it is; where windows do not correlate, so does the run.
 
     rounds     so many at most
     small_m    lags of this r.m.s. are no larger than their errors: a fiftieth of the shortest wave that a car feels

@@ -96,4 +96,6 @@ def test_a_limited_record_is_that_of_a_limited_motion(limits: Callable[[Array], 
     some = Recording(time_s[::16], np.zeros(1000), np.zeros(1000), accel)
     off = (effect.record(SimpleNamespace(**values), some) - limited)[100:-100]
     assert np.sqrt(np.mean(off**2)) < 0.02 * np.std(accel - limited)
-    np.testing.assert_allclose(effect.record(SimpleNamespace(**{**values, "limit_mps2": 1e9}), some), accel, atol=1e-9)
+    for far in (1e9, np.inf):
+        beyond = SimpleNamespace(**{**values, "limit_mps2": far})
+        np.testing.assert_allclose(effect.record(beyond, some), accel, atol=1e-9)

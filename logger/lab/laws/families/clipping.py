@@ -24,7 +24,7 @@ _BENT = """
 def limited(p, accel):
     # Far beyond the limit the power is the same to any digit, and would overflow.
     size = np.minimum(np.abs(accel) / p.limit_mps2, 1e6)
-    return np.sign(accel) * p.limit_mps2 * size / (1.0 + size**p.sharpness_ratio) ** (1.0 / p.sharpness_ratio)
+    return accel / (1.0 + size**p.sharpness_ratio) ** (1.0 / p.sharpness_ratio)
 """
 _METHOD = """def record(self, p, recording):
     accel = recording.accel_z_mps2
