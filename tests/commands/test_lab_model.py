@@ -230,7 +230,8 @@ def test_a_car_that_was_refitted_is_judged_by_what_was_given(
 ) -> None:
     asked: list[float] = []
 
-    def same_road(_runs: object, vehicle: Vehicle, _tolerance: object, stands: Vehicle) -> None:
+    def same_road(_runs: object, vehicle: Vehicle, _tolerance: object, stands: Vehicle,
+                  **_places: object) -> None:
         asked.extend((vehicle.sprung_mass_kg, stands.sprung_mass_kg))
         raise ValueError("enough")
 
