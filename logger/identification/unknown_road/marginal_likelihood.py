@@ -51,9 +51,6 @@ Array = npt.NDArray[np.float64]
 
 _SHORTEST_CPM = 4.0
 _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
-_INFORMATION_SOLVED = 0.01
-"""Of what they began with, this is left of the equations of the information: it is off by the square of that, a hundred
-times less than a few probes leave it uncertain by."""
 
 
 class UnknownRoad:
@@ -202,7 +199,7 @@ class UnknownRoad:
         total = np.zeros((0, 0))
         for probe in range(len(white)):
             changed = self._changes(model, white[probe : probe + 1], [one[probe : probe + 1] for one in rest])
-            roads, solved, _ = self._solve(model, changed, self._nearby, solved=_INFORMATION_SOLVED)
+            roads, solved, _ = self._solve(model, changed, self._nearby)
             part = roads @ roads.T + model.variance * np.sum([one @ one.T for one in solved], axis=0)
             total = part if probe == 0 else total + part
         return np.asarray(total / (2 * len(white)))
@@ -260,8 +257,8 @@ class UnknownRoad:
         return self.drives[0].rate_hz
 
     def _solve(self, model: DrivesModel, readings: Sequence[Array], nearby: Preconditioner | None = None,
-               rounds: int | None = None, solved: float | None = None) -> tuple[Array, list[Array], int]:
-        return solve(model, readings, self.grid.count, solved or self._options.solved, rounds, nearby)
+               rounds: int | None = None) -> tuple[Array, list[Array], int]:
+        return solve(model, readings, self.grid.count, self._options.solved, rounds, nearby)
 
 
 def _highest_cpm(drive: Drive) -> float:

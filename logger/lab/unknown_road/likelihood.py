@@ -101,8 +101,7 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
-        # Chance leaves the score of a thousand samples uncertain by some per cent: a thousandth may stay unsolved.
-        options = Options(free_waviness=True, probes=PROBES, solved=1e-3)
+        options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
