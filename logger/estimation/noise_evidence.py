@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.normal_distribution import distribution
+from logger.estimation.normal_distribution import probability_between
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _LEVELS_PER_STEP = 64  # of the integral over a parked car's level: finer than _
 _MOST_PARKED = 1000
 """A stand counts as so many readings at most, ten seconds: in longer ones the level drifts and what shakes the car is
 not independent from reading to reading, and their evidence would fall by more than a belief can follow."""
-_LEAST_SHARE = 1e-30
+_LEAST_SHARE = 1e-30  # so that its logarithm is finite
 _LEAST_PROBABILITY = 0.0027  # beyond 3 deviations: what is farther out is a hole that the solution has not found yet
 
 
@@ -39,9 +39,7 @@ def interval_evidence(expected: Array, others: Array, low: Array, high: Array, l
     low, high           (n,) bounds of each reading [m/s2]
     """
     deviation = np.sqrt(others + np.exp(2 * log_noise)[:, None])
-    below, above = (low - expected) / deviation, (high - expected) / deviation
-    mirrored = below > 0  # differences in the lower tail keep their digits
-    share = distribution(np.where(mirrored, -below, above)) - distribution(np.where(mirrored, -above, below))
+    share = probability_between((low - expected) / deviation, (high - expected) / deviation)
     evidence: Array = np.log(np.maximum(share, _LEAST_PROBABILITY)).sum(axis=1)
     return evidence
 
@@ -55,10 +53,8 @@ def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
     The level may have lain anywhere: Z = integral over the level of the product of each reading's probability.
     """
     levels = np.arange(steps.min() - 0.5, steps.max() + 0.5, 1 / _LEVELS_PER_STEP) + 0.5 / _LEVELS_PER_STEP
-    from_level = (steps - levels[:, None]) / np.exp(log_noise)[:, None, None]
-    half = 0.5 / np.exp(log_noise)[:, None, None]
-    near = np.abs(from_level)  # in the lower tail differences keep their digits
-    share = distribution(half - near) - distribution(-half - near)
+    noise, from_level = np.exp(log_noise)[:, None, None], steps - levels[:, None]
+    share = probability_between((from_level - 0.5) / noise, (from_level + 0.5) / noise)
     weights = counts * min(1.0, _MOST_PARKED / counts.sum())
     by_level = np.log(np.maximum(share, _LEAST_SHARE)) @ weights
     most = by_level.max(axis=1)

@@ -44,6 +44,12 @@ def distribution(u: Array) -> Array:
     return np.where(u > 0, 1 - tail, tail)
 
 
+def probability_between(low: Array, high: Array) -> Array:
+    """Standard normal probability between two bounds (any one shape), with a small relative error in both tails."""
+    mirrored = low > 0  # differences in the lower tail keep their digits
+    return distribution(np.where(mirrored, -low, high)) - distribution(np.where(mirrored, -high, low))
+
+
 def within(mean: Array, variance: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Mean and variance of a normal variable that is known to lie between two bounds; arrays of one shape.
 

@@ -10,6 +10,7 @@ from logger.estimation.normal_distribution import (
     density,
     distribution,
     mean_absolute,
+    probability_between,
     variance_of_mean_absolute,
     within,
 )
@@ -32,6 +33,12 @@ def test_density_and_distribution_far_into_the_lower_tail() -> None:
     u = np.linspace(-37.0, 9.0, 2001)
     assert distribution(u) == pytest.approx(norm.cdf(u), rel=2e-7, abs=0)
     assert density(u) == pytest.approx(norm.pdf(u), rel=1e-12, abs=0)
+
+
+def test_a_probability_between_bounds_keeps_its_digits_in_both_tails() -> None:
+    low = np.array([-9.0, -2.0, -0.5, 0.3, 4.0, 8.5])
+    exact = np.where(low > 0, norm.sf(low) - norm.sf(low + 0.5), norm.cdf(low + 0.5) - norm.cdf(low))
+    assert probability_between(low, low + 0.5) == pytest.approx(exact, rel=1e-5)
 
 
 def test_distribution_takes_infinities() -> None:
