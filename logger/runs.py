@@ -17,6 +17,8 @@ Bools = npt.NDArray[np.bool_]
 
 NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
 """What a sample may be: none, a reading, or one that only says that there was at least as much."""
+BY_ROAD, BY_RECEIVER = "road", "receiver"
+"""By what the places of a run were found (``RecordFacts.places_by``)."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
 EVEN_SAMPLES = 1e-3
@@ -53,7 +55,8 @@ class RecordFacts:
     place_std_m              standard error of a place on the profile [m]
     delay_s, delay_std_s     of the receiver, and its standard error; taken out [s]
     pass_band_hz             frequencies, the lowest and the highest, between which the record is to be believed [Hz]
-    places_by                "road": places were found by the road as this vehicle's model feels it; "receiver"
+    places_by                ``BY_ROAD`` where places were found by the road as this vehicle's model feels it, or
+                             ``BY_RECEIVER``
     vehicle                  that vehicle
     source                   the name of the file that it was made of
     signals                  what more was measured

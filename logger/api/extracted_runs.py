@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.runs import CLIPPED, NO_READING, READING, RecordFacts
+from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
 from logger.store.formats.profile_file import Profile, read_places, read_profile
@@ -334,7 +334,7 @@ def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: Measured
     by_road = None if found is None else found.by_road
     write_run_facts(folder, replace(
         recorded.facts, place_std_m=place_std_m, delay_s=receiver.delay_s, delay_std_s=receiver.std_s,
-        places_by={None: None, True: "road", False: "receiver"}[by_road],
+        places_by={None: None, True: BY_ROAD, False: BY_RECEIVER}[by_road],
         vehicle=recorded.model.vehicle.name if by_road else None, source=source))
     metres = float(np.ptp(drive.distance_m))
     gaps = int(np.count_nonzero(np.diff((drive.usable == NO_READING).astype(int)) == 1))

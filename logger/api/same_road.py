@@ -16,7 +16,7 @@ from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.runs import UNKNOWN
+from logger.runs import BY_RECEIVER, UNKNOWN
 from logger.runs import Run as Record
 from logger.store.formats import drive_file, vehicle_file
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _PLACES_EVERY_M = 10.0
-_RECEIVER = "receiver"
 _LEAST_SHARED_M = 50.0
 """Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
 
@@ -97,7 +96,7 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
         check_distances(drive, file)
     facts = UNKNOWN
     if all(_counts_for_itself(one) for one, _ in drives):
-        drives, facts = _on_one_distance(drives), replace(UNKNOWN, places_by=_RECEIVER)
+        drives, facts = _on_one_distance(drives), replace(UNKNOWN, places_by=BY_RECEIVER)
     return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat, facts=facts)
                          for one, name in drives])
 
@@ -166,7 +165,7 @@ def diagnosed(
                            "too")
     effects, _ = known_effects(model, effect_files)
     try:
-        if by_receiver := all(one.facts.places_by == _RECEIVER for one in records):
+        if by_receiver := all(one.facts.places_by == BY_RECEIVER for one in records):
             notify("laying the drives on one distance by the road that they felt")
             records = placed_by_road(records, given, off, model.effects, model.vehicle)
         problem = SameRoad(records, given, off, model.vehicle, exact_places=not by_receiver)

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
-from logger.runs import RECEIVER_ERROR_LASTS_S, Run
+from logger.runs import BY_RECEIVER, RECEIVER_ERROR_LASTS_S, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -106,7 +106,7 @@ class RecordError:
         """The record error of a run."""
         lasts_s = (run.count - 1) / run.rate_hz
         pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
-        delay_std_s = run.facts.delay_std_s or None if run.facts.places_by == "receiver" else None
+        delay_std_s = run.facts.delay_std_s or None if run.facts.places_by == BY_RECEIVER else None
         late = [run.speed_mps] if delay_std_s else []
         basis = np.vstack([_cubic_b_splines(pieces, run.count), *late, run.distance_m - run.distance_m[0],
                            -_roughness(run)])

@@ -45,7 +45,7 @@ class RoadFit:
 
 
 def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: float = 0.1,
-           many_rounds: int = 8, falling: float = 0.5) -> RoadFit:
+        many_rounds: int = 8, falling: float = 0.5) -> RoadFit:
     """Fit the most probable state, by so many scoring steps from a state at most.
 
     converged      the fit ends before a step of a smaller expected gain in the log of the probability

@@ -15,7 +15,7 @@ import yaml
 
 from logger.errors import BadInput
 from logger.files import write_text
-from logger.runs import UNKNOWN, RecordFacts, Signal
+from logger.runs import BY_RECEIVER, BY_ROAD, UNKNOWN, RecordFacts, Signal
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
 RUN = "run.yaml"
@@ -65,7 +65,7 @@ def read_run_facts(folder: Path) -> RecordFacts:
         UNKNOWN, **numbers,
         place_std_m=said["place_std_m"].number(0) if "place_std_m" in said else None,
         pass_band_hz=_band(said["pass_band_hz"]) if "pass_band_hz" in said else None,
-        places_by=places["by"].choice("road", "receiver") if places else None,
+        places_by=places["by"].choice(BY_ROAD, BY_RECEIVER) if places else None,
         vehicle=places["vehicle"].text() if "vehicle" in places else None,
         source=said["source"].text() if "source" in said else None,
         signals=tuple(_signal(name, node) for name, node in said["signals"].mapping().items()
