@@ -158,8 +158,8 @@ def _moves(run: Run, prediction: Array) -> bool:
 
 def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
-    for run, around, below in zip(runs.runs, followed.around, followed.below_at_hand, strict=True):
-        if around.is_upside_down and below.turned > below.correlation:
+    for k, (run, around) in enumerate(zip(runs.runs, followed.around, strict=True)):
+        if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
             yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
                    f"the model (correlation {around.turned:.2f})")
 

@@ -127,8 +127,8 @@ def test_stretches_four_times_as_rough_as_others(sensor: Sensor, least_r2: float
 
 @pytest.mark.parametrize(("window_m", "place_std_m"),
                          [(WINDOW_M, 2.0), *slow((WINDOW_M, 0.5), (4 * WINDOW_M, 2.0))])
-def test_a_misplaced_window_is_as_uncertain_as_windows_on_either_side_differ(window_m: float,
-                                                                                    place_std_m: float) -> None:
+def test_a_misplaced_window_is_as_uncertain_as_windows_on_either_side_differ(
+        window_m: float, place_std_m: float) -> None:
     """On three roads that are eight times as rough every other 150 m, whose windows that far behind and that far ahead
     are estimated from shifted distances: half of what lies between them, window by window and as a root mean square."""
     added, differences = [], []

@@ -107,10 +107,13 @@ def _words(broken: AssertionError) -> str:
     return str(broken) or str(traceback.extract_tb(broken.__traceback__)[-1].line)
 
 
-def cases_for_tests(hazards: Sequence[Hazard], quick: int = 1_000_000) -> list[Any]:
-    """Each fault with each of its few cases; of these all but the first so many are slow tests."""
-    return [one for hazard in hazards for one in [*((hazard, case) for case in hazard.some()[:quick]),
-                                                  *slow(*((hazard, case) for case in hazard.some()[quick:]))]]
+def cases_for_tests(hazards: Sequence[Hazard], quick: int | None = None) -> list[Any]:
+    """Each fault with each of its few cases; of these all but the first so many are slow tests, where that is said."""
+    found: list[Any] = []
+    for hazard in hazards:
+        cases = [(hazard, case) for case in hazard.some()]
+        found += cases if quick is None else [*cases[:quick], *slow(*cases[quick:])]
+    return found
 
 
 def label(value: object) -> str:
