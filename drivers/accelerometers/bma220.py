@@ -17,6 +17,7 @@ from array import array
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import sqrt
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -54,7 +55,7 @@ from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
 from drivers.sources import US_PER_S, ChipSource, Deadlines, Played, Source
 
 BASE_RATE_HZ = 100
-NOISE_MPS2 = 0.1  # r.m.s., beside its steps; no data sheet states it
+NOISE_MPS2 = 0.1  # r.m.s., beside its steps, through the filter that goes with 100 Hz; no data sheet states it
 LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some more in the kernel
 
 RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
@@ -279,7 +280,7 @@ class Bma220Config:
     i2c_bus: int | Path = 1
     range_g: int = 2
     bandwidth_hz: int | None = None
-    oversample: int = 1
+    oversample: int = 4
 
     def __post_init__(self) -> None:
         self.chip  # noqa: B018 - SettingsError for what the chip cannot have
@@ -317,8 +318,9 @@ class _Bma220(Accelerometer[Bma220Config]):
         return Bma220Decoder(settings.range_g)
 
     def readings(self, settings: Bma220Config) -> Readings:
-        """Coarse steps."""
-        return Readings(NOISE_MPS2, mps2_per_count(settings.range_g), settings.oversample)
+        """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate."""
+        hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.oversample, 1))
+        return Readings(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.oversample)
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
         """Range, scale, filter, rate."""
@@ -330,8 +332,8 @@ class _Bma220(Accelerometer[Bma220Config]):
         return {"range_g": settings.range_g, "oversample": settings.oversample}
 
     def recorded(self, header: Mapping[str, Any], settings: Bma220Config, is_given: bool) -> Bma220Config:
-        """Range and rate are the recording's."""
-        range_g, oversample = (header.get(key, getattr(settings, key)) for key in ("range_g", "oversample"))
+        """Range and rate are the recording's; one that says nothing of the rate was read 100 times a second."""
+        range_g, oversample = header.get("range_g", settings.range_g), header.get("oversample", 1)
         if type(range_g) is not int or type(oversample) is not int:
             raise SettingsError("expected whole numbers for 'range_g' and 'oversample'")
         return replace(settings, range_g=range_g, oversample=oversample)
