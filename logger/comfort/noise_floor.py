@@ -76,7 +76,8 @@ class NoiseFloor:
         noise_mps2    of a reading, before rounding; ``log_std`` is its standard error, a share of it
         """
         rounding = self._step_mps2**2 / 12
-        if max(noise_mps2**2, raw.accel_rms_mps2**2 - rounding / self._reads) < (BLURRED_FROM_STEPS * self._step_mps2)**2:
+        ride = raw.accel_rms_mps2**2 - rounding / self._reads
+        if max(noise_mps2**2, ride) < (BLURRED_FROM_STEPS * self._step_mps2)**2:
             return NO_FIGURES
         power = self._power * (noise_mps2**2 + rounding) / self._reads
         shared = 2 * log_std * self._power * noise_mps2**2 / self._reads
