@@ -14,9 +14,10 @@ oversample: what reading the chip several times per sample gains, at +-2 to +-8 
 grows with the chip's filter from 0.1 m/s2 at 32 Hz, and gravity at each place within a step on each road.
 
 Without --all, a part of all combinations of noise, range and speed, drawn so that each value meets most of the others:
-some ten minutes. With it all of them, in an order of no meaning, so that the first of them stand for all: --results keeps
-each drive, and goes on after those that it has; --minutes begins no row after that time. --reads: the chip is read so often
-per sample in "drives", 4 as it is usually set; a row's noise is that of one read per sample, more go through a wider filter.
+some ten minutes. With it all of them, in an order of no meaning, so that the first of them stand for all: --results
+keeps each drive, and goes on after those that it has; --minutes begins no row after that time. --reads: the chip is
+read so often per sample in "drives", 4 as it is usually set; a row's noise is that of one read per sample, more go
+through a wider filter.
 
 R2 and bias are of 25 ft windows over the roads of a row; "in 1" and "in 2" the shares of them within one and two of
 their standard errors. A noise counts as found within two of its standard errors. Far below a step only a bound is
@@ -245,8 +246,8 @@ def drives(figures: Figures, extent: Extent) -> None:
         off += deviations
     for range_g, ones in sorted(by_range.items()):
         found = score(pooled([one.windows for one in ones]))
-        print(f"{range_g} g: in 1 {found.in_one:.3f}, in 2 {found.in_two:.3f}, bias {found.bias:+.1%}, R2 {found.r2:.3f} "
-              f"of {found.count} windows on {len(ones)} roads")
+        print(f"{range_g} g: in 1 {found.in_one:.3f}, in 2 {found.in_two:.3f}, bias {found.bias:+.1%}, "
+              f"R2 {found.r2:.3f} of {found.count} windows on {len(ones)} roads")
     figures.at_least("noise within two standard errors", float(np.mean(np.abs(off) <= 2)), 0.95, "")
     whole = score(pooled([one.windows for one in learnt]))
     figures.at_most("learnt: in 1 off 0.683", abs(whole.in_one - 0.683), 0.04, "")
