@@ -310,7 +310,7 @@ class RoadEstimator:
                 if weighted is not None:
                     log_std = self.noise.log_std if self.noise is not None else 0.0
                     place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std,
-                                      self._road.scale_log_std)
+                                      self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
