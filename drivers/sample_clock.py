@@ -92,7 +92,7 @@ class SampleClock:
     OTHER_TOLERANCE = 0.02
     STEADY = 4
     # Share of samples lost without being noticed, times the period. Measured on drives at 150 to 400 Hz with 1 in 50 or
-    # 2 in 100 lost (0.5 to 1.3 times 100 us): IRI 0.6 to 4.9 % too high, at 40 us by 1 % where one or two are lost at once.
+    # 2 in 100 lost (50 to 130 us): IRI 0.6 to 4.9 % too high, in proportion; by 1 % where one or two are lost at once.
     HIDDEN_US, HIDDEN_EVERY = 40.0, 4  # looked for every so many blocks: it costs more than all the rest
     STEPS_MAX = 1.5  # measured on drives at 100 Hz: 1 loss a second makes IRI 1 to 2.4 % too high, 1.5 3 %, 3 to 13 %
 
@@ -277,7 +277,9 @@ class SampleClock:
 
     def _are_losses_hidden(self, slope_us: float) -> bool:
         """Whether the comb of the arrivals shows that a sensor faster than the profile's loses more samples than were
-        noticed: at even intervals they look like a slower clock, on which all arrivals lie."""
+        noticed: at even intervals they look like a slower clock, on which all arrivals lie. (Of 120 sensors of 105 to
+        800 Hz that lost nothing, read directly, none; of 180 through adapters those 9 that were 1 to 5 % slower than
+        the ticks of the timer.)"""
         points, slowest_us = self._pieces, self.SLOWEST * self._nominal_us
         if len(points) < self.BLOCKS_SEEN * self.PIECES or not self._nominal_us / self.FASTEST <= slope_us < slowest_us:
             return False

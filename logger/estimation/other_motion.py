@@ -4,14 +4,12 @@ Problem. What the road does not explain of coarse readings was taken for their n
 Solution. Such motion has lines; noise and rounding have none. Residuals of a road that has been found are white where
 nothing else moves the car, or less where the road took some of them. Where, over 20 s and more, a narrow band of
 their periodogram (Welch 1967) is more than chance makes of white ones, the car has a motion m of its own, whose
-spectrum M is what is above the noise N. Road and m are then found by turns: m is the most probable one for what the road
-leaves, (1 / M + W) m = W e in the waves of m, with W the weights of the readings, and is taken off the readings of which
-the road is found. A rough road that hides a line has it in itself already: what is felt stays right.
+spectrum M is what is above the noise N. Road and m are then found by turns: m is the most probable one for what the
+road leaves, (1 / M + W) m = W e in the waves of m, with W the weights of the readings, and is taken off the readings
+of which the road is found. A rough road that hides a line has it in itself already: what is felt stays right.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt

@@ -67,7 +67,8 @@ class RidePlace:
     spectrum         of the road there, ``log_level_std`` the standard error of its log level
     sensor           as it is believed to be, ``noise_log_std`` the standard error of its noise, a share of it
     scale_log_std    share by which the ride may be off because of that
-    other_psd        (f,) of what else moves the car, one-sided, at the frequencies of a block [(m/s2)2/Hz]; None: nothing
+    other_psd        (f,) spectrum of what else moves the car, one-sided, at the frequencies of a block [(m/s2)2/Hz];
+                     None: nothing
     """
 
     speed_mps: float
