@@ -56,6 +56,8 @@ class SampleClock:
        samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
        neither, nor on a line with the losses that were noticed, the profile's own rate is taken; a device of another
        rate is refused until it has kept one through ``STEADY`` findings in a row.
+       Losses of a sensor that is faster than the profile's are not dated by the comb: where it shows more of them than
+       were noticed, by ``HIDDEN_US`` and more, no sample is dated (as in 6).
     6. Too many losses. Where steps come close together, a place between two is as likely as the true one, and the
        period can no longer be distinguished from the losses. Once there were more than ``STEPS_MAX`` in a
        ``LOOK_AHEAD_US``, on average over the last ``BLOCKS`` blocks, and until there are half as many, the line is
@@ -89,6 +91,9 @@ class SampleClock:
     FIND_ERROR = 0.01
     OTHER_TOLERANCE = 0.02
     STEADY = 4
+    # Share of samples lost without being noticed, times the period. Measured on drives at 150 to 400 Hz with 1 in 50 or
+    # 2 in 100 lost (50 to 130 us): IRI 0.6 to 4.9 % too high, in proportion; by 1 % where one or two are lost at once.
+    HIDDEN_US, HIDDEN_EVERY = 40.0, 4  # looked for every so many blocks: it costs more than all the rest
     STEPS_MAX = 1.5  # measured on drives at 100 Hz: 1 loss a second makes IRI 1 to 2.4 % too high, 1.5 3 %, 3 to 13 %
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:
@@ -106,7 +111,8 @@ class SampleClock:
         self._steady_needed = 0
         self._steps = 0
         self._steps_by_block: list[int] = []
-        self.too_many_lost = False
+        self.too_many_lost = self._hides_losses = False
+        self._looked = 0
         self.refused_hz: float | None = None
         self.resyncs = 0
         self.lost = 0
@@ -262,13 +268,30 @@ class SampleClock:
             return None  # of a faster sensor with its lines lost at random, all would be found, too many to date any
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
         count = points[-1].number - points[0].number
-        above_us = instants_us - slope_us * np.array([point.number for point in points], dtype=np.float64)
-        if np.ptp(above_us) < 0.5 * slope_us:
-            return None  # they lie on a line; where one is lost, they leave it by a period
+        if _are_on_a_line(points, slope_us):
+            return None
         period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
         if period_us is None or period_us > self._nominal_us / self.SLOWEST:
             return None
         return period_us
+
+    def _are_losses_hidden(self, slope_us: float) -> bool:
+        """Whether the comb of the arrivals shows that a sensor faster than the profile's loses more samples than were
+        noticed: at even intervals they look like a slower clock, on which all arrivals lie. (Of 120 sensors of 105 to
+        800 Hz that lost nothing, read directly, none; of 180 through adapters those 9 that were 1 to 5 % slower than
+        the ticks of the timer.)"""
+        points, slowest_us = self._pieces, self.SLOWEST * self._nominal_us
+        if len(points) < self.BLOCKS_SEEN * self.PIECES or not self._nominal_us / self.FASTEST <= slope_us < slowest_us:
+            return False
+        if _are_on_a_line(points, slope_us):
+            return False
+        instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
+        count = points[-1].number - points[0].number
+        period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
+        if period_us is None:
+            return False
+        hidden = 1 - period_us / slope_us - (points[-1].lost - points[0].lost) / max(count, 1)
+        return hidden * period_us > (self.HIDDEN_US / 2 if self._hides_losses else self.HIDDEN_US)
 
     def _take_period(self, period_us: float) -> None:
         self._period_us = min(max(period_us, self._shortest_us), self._longest_us)
@@ -340,9 +363,10 @@ class SampleClock:
         self._number += self._index
         self._steps_by_block, self._steps = [*self._steps_by_block, self._steps][-self.BLOCKS :], 0
         most = self.STEPS_MAX * self.BLOCKS * self.BLOCK_US / self.LOOK_AHEAD_US
-        self.too_many_lost = sum(self._steps_by_block) > (most / 2 if self.too_many_lost else most)
+        too_many = sum(self._steps_by_block) > (most / 2 if self.too_many_lost else most)
         if len(self._points) >= 3:
             self._look_at_the_rate()
+        self.too_many_lost = too_many or self._hides_losses
         climb_us = min(self.GAIN * max(least_us, 0.0) / self._block, self._climb_us_max)
         self._begin_block(self._base_us + self._step_us * self._index + self._pulled_us, self._period_us + climb_us)
 
@@ -364,6 +388,9 @@ class SampleClock:
         slope_us, spread_us = _slope(self._points, with_lost=True)
         if came_us > self._nominal_us / self.SLOWEST:
             self._lose_line(find=True)
+        self._looked += 1
+        if self._looked % self.HIDDEN_EVERY == 0:
+            self._hides_losses = self._are_losses_hidden(came_us)
         comb_us = self._comb(self._pieces, came_us)
         if comb_us is not None:
             if not self._shortest_us <= comb_us <= self._longest_us:
@@ -404,6 +431,12 @@ class SampleClock:
         times: Times = np.maximum.accumulate(np.maximum(whole, self._last_us + 1)) + steps
         self._last_us = int(times[-1])
         return times
+
+
+def _are_on_a_line(points: list[_Point], slope_us: float) -> bool:
+    """Where a sample is lost, they leave it by a period."""
+    above_us = [point.arrival_us - slope_us * point.number for point in points]
+    return max(above_us) - min(above_us) < 0.5 * slope_us
 
 
 def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:

@@ -129,7 +129,7 @@ def comfort(
     ('a_little_uncomfortable', 0.32)
     """
     from logger.api.weightings import weighting_named, weightings
-    from logger.comfort.ride_comfort import ride_comfort
+    from logger.comfort.ride_comfort import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
     from logger.report.comfort_text import as_json, lines
     from logger.report.record_checks_text import checks_json, checks_lines
 
@@ -143,7 +143,10 @@ def comfort(
     try:
         found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal), daily_hours, taken_hz)
     except ValueError as error:
-        raise BadInput(f"{name}: {error}") from None
+        is_file = not isinstance(record, (Record, Run))
+        can_be_laid = is_file and taken_hz is None and LEAST_TAKEN_HZ <= ride.rate_hz < LOWEST_RATE_HZ
+        hint = f" (--resample takes {LEAST_TAKEN_HZ:g} or more)" if can_be_laid else ""
+        raise BadInput(f"{name}: {error}{hint}") from None
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
     return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, used.name,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,

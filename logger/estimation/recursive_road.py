@@ -20,6 +20,7 @@ from logger.estimation.iri_posterior import steady_motion, vehicle_error_varianc
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
+from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
     GaussianReadings,
     bounds,
@@ -33,6 +34,7 @@ from logger.estimation.quantisation import (
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
 
 Array = npt.NDArray[np.float64]
@@ -61,15 +63,17 @@ _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 @dataclass(frozen=True)
 class SolvedBlock:
     """road      (k,) rfft of the elevations on the block's grid [m]
-    accel_mps2   (t,) what the car does on it
+    accel_mps2   (t,) what the car does on it, and what else moves it
     variance     of a reading, noise, rounding and the car's own error, while it moved [(m/s2)2]
     seen         (n,) 1 at the points of the grid that were driven over while there were readings, else 0
+    other_psd    (f,) spectrum of what else moves it, one-sided, at the block's frequencies [(m/s2)2/Hz]; None: nothing
     """
 
     road: ComplexArray
     accel_mps2: Array
     variance: float
     seen: Array
+    other_psd: Array | None = None
 
 
 class FollowedRoad:
@@ -87,6 +91,7 @@ class FollowedRoad:
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
         self._spacing_m = spacing_m
+        self._other = OtherMotion()
         self._belief = Belief(COMMON_ROAD)
         self._learner: NoiseLearner | None = None
         if noise is not None:
@@ -103,6 +108,7 @@ class FollowedRoad:
         self._gaussian: GaussianReadings | None = None
         self._centre_mps2, self._accel_variance = 0.0, 0.0
         self._like_noise = 0.0
+        self._other.restart()
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
@@ -157,6 +163,7 @@ class FollowedRoad:
     def move_on(self, fresh: Samples) -> None:
         """The next block is without its oldest samples, and has these behind."""
         self._unscored += len(fresh)
+        self._other.move_on(fresh.reading_mps2.size)
         if self._gaussian is None:
             return
         guess = self._expected_of(fresh)
@@ -229,17 +236,19 @@ class FollowedRoad:
         there = _levelled(spectrum, local)
         variance = readings.variance + vehicle_error_variance(
             block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads
-        ) + reads * beyond_variance
+        ) + reads * (beyond_variance + self._other.variance_left)
         weight = np.where(each, 1 / variance, 0.0)
         seen_share = block.seen_points(read) / block.count
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
-        solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
+        solution = block.solve(readings.value_mps2 - self._other.motion_mps2, weight, spectrum, local, steps, start)
 
         moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain, taken = solution.gain, np.ones(block.count)
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(samples), reads)
+            solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
+            motion = self._other.beside(motion)
             others, drift_variance = cavity(motion, variance), solution.drift_variance
             self._centre_mps2, self._accel_variance = float(solution.drift_mps2[-1]), motion.variance
             if moving.any():
@@ -271,8 +280,20 @@ class FollowedRoad:
             self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
+        other_psd = None if self._other.psd is None else self._other.psd[:len(samples) // 2 + 1]
         return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
-                           mean_variance / reads, seen)
+                           mean_variance / reads, seen, other_psd)
+
+    def _with_other_motion(
+        self, solution: Solution, readings: GaussianReadings, weight: Array, motion: SteadyMotion, learns: bool
+    ) -> Solution:
+        """The solution with what moves the car beside the road, as far as it leaves that; its spectrum follows where
+        it ``learns``."""
+        residual = readings.value_mps2 - solution.fitted_mps2
+        if learns:
+            self._other.learn(residual, weight, motion)
+        self._other.find(residual, weight)
+        return replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
 
     def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:

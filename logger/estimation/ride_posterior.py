@@ -67,6 +67,8 @@ class RidePlace:
     spectrum         of the road there, ``log_level_std`` the standard error of its log level
     sensor           as it is believed to be, ``noise_log_std`` the standard error of its noise, a share of it
     scale_log_std    share by which the ride may be off because of that
+    other_psd        (f,) spectrum of what else moves the car, one-sided, at the frequencies of a block [(m/s2)2/Hz];
+                     None: nothing
     """
 
     speed_mps: float
@@ -76,6 +78,7 @@ class RidePlace:
     sensor: Sensor
     noise_log_std: float
     scale_log_std: float = 0.0
+    other_psd: Array | None = None
 
 
 class RidePosterior:
@@ -100,10 +103,13 @@ class RidePosterior:
         """The acceleration (count,) of a block, weighted; its first seconds are those of a start."""
         return np.fft.irfft(np.fft.rfft(accel_mps2) * self._response, self._count)
 
-    def knowledge(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> RideKnowledge:
-        """For readings of this variance [(m/s2)2] at this speed [m/s]."""
+    def knowledge(self, speed_mps: float, spectrum: RoadSpectrum, variance: float, other_psd: Array | None = None
+                  ) -> RideKnowledge:
+        """For readings of this variance [(m/s2)2] at this speed [m/s]; ``other_psd`` as in ``RidePlace``."""
         per_cpm = self._car.power(speed_mps) * spectrum.psd_of(LOG_WAVES)
         ride = np.interp(self._f_hz / speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / speed_mps
+        if other_psd is not None:
+            ride = ride + np.interp(self._f_hz, _frequencies_hz(self._count, self._rate_hz), _thinned(other_psd))
         noise = 2 * variance / self._rate_hz
         wiener_gain = ride / (ride + noise)
         step_hz = self._rate_hz / _LINES
@@ -123,11 +129,11 @@ class RidePosterior:
         weighted_mps2    (t,) most probable weighted acceleration
         unread           (t,) there was no reading
         """
-        knows = self.knowledge(place.speed_mps, place.spectrum, place.variance)
+        knows = self.knowledge(place.speed_mps, place.spectrum, place.variance, place.other_psd)
         rough = hypot(_rough_log_std(knows.accel_variance, place.sensor), place.scale_log_std)
         if rough > _MOST_ROUGH:
             return None
-        louder = self.knowledge(place.speed_mps, raised(place.spectrum), place.variance)
+        louder = self.knowledge(place.speed_mps, raised(place.spectrum), place.variance, place.other_psd)
         numbers = np.flatnonzero(inside)
         span = slice(max(int(numbers[0]) - self._running + 1, 0), int(numbers[-1]) + 1)
         mean = weighted_mps2[span]
@@ -163,6 +169,11 @@ class RidePosterior:
 
 def _frequencies_hz(count: int, rate_hz: float) -> Array:
     return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+
+
+def _thinned(psd: Array) -> Array:
+    """With each frequency as the mean of its own neighbourhood, so that every second one has the power of all."""
+    return np.convolve(psd, (0.25, 0.5, 0.25), mode="same")
 
 
 def _deviation(knows: RideKnowledge, unread: Bools) -> Array:

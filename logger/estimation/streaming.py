@@ -319,7 +319,7 @@ class RoadEstimator:
                     # Of a sample, which has that share of a reading's noise.
                     log_std = self.noise.log_std / self._reads if self.noise is not None else 0.0
                     place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std,
-                                      self._road.scale_log_std)
+                                      self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)

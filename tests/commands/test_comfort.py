@@ -131,7 +131,8 @@ def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pyte
         (["--weighting", "wx"], 100, 2, f"weighting 'wx': expected one of {WEIGHTINGS}"),
         (["--daily-hours", "25"], 100, 2, "at most 24 hours, found 25"),
         (["--daily-hours", "nan"], 100, 2, "at most 24 hours, found nan"),
-        ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50"),
+        ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50 \(--resample takes 40 or more\)"),
+        ([], 39, 2, r"ride\.csv: expected at least 80 samples a second, found 39$"),
         ([], 100, 0.5, r"ride\.csv: expected at least 1 s, found 0\.5 s"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.sample_clock import SampleClock
+from drivers.sample_clock import NO_TIME, SampleClock
 from drivers.sampling_comb import is_ticked
 
 
@@ -67,3 +67,24 @@ def test_no_loss_is_seen_where_there_is_none(rate_hz: int, timer_us: float) -> N
         clock.feed(some)
     assert clock.lost + clock.resyncs <= 1
     assert not clock.too_many_lost
+
+
+def undated_share(rate_hz: int, kept: np.ndarray) -> float:
+    """Of the samples of a sensor of this rate that are kept (n,), after the first ten seconds."""
+    taken_us = np.flatnonzero(kept) * (1e6 / rate_hz)
+    clock = SampleClock(100, 0.02)
+    times_us = np.concatenate([clock.feed(some) for some in np.array_split(as_read(taken_us), 400)])
+    return float(np.mean(times_us[10 * rate_hz:] == NO_TIME))
+
+
+@pytest.mark.parametrize("rate_hz", [110, 125, 150, 200, 250, 400])
+@pytest.mark.parametrize(("every", "count"), [(50, 1), (100, 2), (25, 1)])
+def test_even_losses_of_a_faster_sensor_are_no_slower_clock(rate_hz: int, every: int, count: int) -> None:
+    assert undated_share(rate_hz, np.arange(rate_hz * 60) % every >= count) > 0.95
+
+
+@pytest.mark.parametrize(("rate_hz", "lost"), [(110, 0.0), (150, 0.0), (200, 0.0), (400, 0.0), (200, 0.003),
+                                               (250, 0.003), (400, 0.003)])
+def test_few_losses_by_chance_leave_a_faster_sensor_dated(rate_hz: int, lost: float) -> None:
+    kept = np.random.default_rng(4).random(rate_hz * 60) >= lost
+    assert undated_share(rate_hz, kept) < 0.1

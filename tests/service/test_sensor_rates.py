@@ -65,7 +65,8 @@ def test_single_lines_lost_by_a_fast_sensor_are_seen(rate_hz: int) -> None:
 
 
 @pytest.mark.parametrize(("rate_hz", "every", "count"), [
-    (100, 50, 1), (104, 50, 1), *slow((100, 100, 1), (100, 100, 2), (100, 25, 1), (98, 50, 1))
+    (100, 50, 1), (104, 50, 1), (200, 100, 2),
+    *slow((100, 100, 1), (100, 100, 2), (100, 25, 1), (98, 50, 1), (125, 50, 1), (150, 50, 1), (150, 100, 2))
 ])
 def test_rows_with_lines_lost_at_even_intervals_are_right_or_flagged(rate_hz: int, every: int, count: int) -> None:
     """They look like a slower sensor."""
