@@ -63,7 +63,7 @@ RIGHT: dict[str, Right] = {
     "place_damper": Right((BY_BOTH,), "a force by travel and rate together"),
     "stribeck_friction": Right((FRICTION, BY_RATE), "a force by rate that falls; friction"),
     "rebound_stop": Right((BY_TRAVEL,), "a force by travel and rate, in extension"),
-    "inerter": Right((INERTIA, MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way with time"),
+    "inerter": Right((INERTIA, MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way"),
     "hydraulic_mount": Right((INERTIA, MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
     "wheel_absorber": Right((MASS,), "a mass on a spring at each wheel"),
     "tire_warming": Right((CHANGE,), "the tires' stiffness changes with time"),
