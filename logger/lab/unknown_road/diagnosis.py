@@ -23,7 +23,7 @@ from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoa
 from logger.lab.unknown_road.placement import placed_by_road
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import Trial, screen
-from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, RoadEffect, chosen
 from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
@@ -160,6 +160,8 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "the road has to be known under the right wheels too"
         if name in [one.effect.name for one in present]:
             why = "the model has it"
+        elif why is None and isinstance(effect, RoadEffect):
+            why = "it is about a profile, and there is none"
         elif why is None and isinstance(effect, DriveEffect):
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None and not (effect.reshapes or problem.exact_places):
