@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 
 from logger.vehicle.effect import Chosen
 
@@ -58,7 +58,8 @@ def numbers_of(one: Chosen) -> str:
 
 
 def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:
-    return f"{measured(value, errors.get(name))} {unit_of(name)}".rstrip()
+    unseen = " (these runs do not show it)" * (errors.get(name) == inf)
+    return f"{measured(value, errors.get(name))} {unit_of(name)}".rstrip() + unseen
 
 
 def chance(p_value: float) -> str:

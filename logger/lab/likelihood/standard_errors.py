@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import own_slopes
+from logger.lab.likelihood.map_fit import own_slopes, range_of
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, free_parameters_of, slope_of
 from logger.vehicle.effect_sizes import grows_with_mass
@@ -89,7 +89,8 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
 def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParameter], deviations: Array,
                 share: float = 1e-4) -> tuple[Chosen, ...]:
     """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
-    linear over such a share of a number."""
+    linear over such a share of a number. One that is larger than a number's whole range is infinite: nothing is known
+    of the number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
@@ -98,5 +99,6 @@ def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParamete
         high, low = parameter.value(here + step), parameter.value(here - step)
         way = abs(parameter.coordinate(high) - parameter.coordinate(low))
         rise = abs(high - low) / way if way > 0 else 0.0
-        errors[move.effect] = {**errors[move.effect], parameter.name: float(rise * deviation)}
+        error = float(rise * deviation) if deviation < range_of(parameter) else np.inf
+        errors[move.effect] = {**errors[move.effect], parameter.name: error}
     return tuple(replace(one, standard_errors=found) for one, found in zip(effects, errors, strict=True))
