@@ -7,7 +7,7 @@ from typing import Any
 
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.unexplained import Shape
-from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
 from logger.report.band_text import band_json
@@ -69,12 +69,17 @@ def untested(found: Diagnosis) -> list[str]:
     """Effects that these runs cannot show, and which drive would."""
     lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
     lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
-              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed. To see it: "
+              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed{_alike(one)}. To see it: "
               f"{one.effect.shown_by}."
               for one in found.undetectable[:_MOST_HIDDEN]]
     if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
         lines.append(f"These runs could also miss: {', '.join(rest)}.")
     return lines
+
+
+def _alike(one: Undetectable) -> str:
+    """What of the car hides an effect."""
+    return f": {one.alike}, within its tolerance, does nearly the same" if one.alike else ""
 
 
 def groups(found: Diagnosis) -> list[list[str]]:
