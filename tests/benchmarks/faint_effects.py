@@ -4,11 +4,12 @@ shares nothing with the lab, under so much noise that they stand out by 5, 6 and
     python -m tests.benchmarks.faint_effects
     python -m tests.benchmarks.faint_effects --effect dry_friction --deviations 5 --seeds 3
 
-What can be named is bounded: noise alone may look like one of twenty effects in one search of a thousand. Where there is
-noise alone, an effect with k numbers gains chi-squared with k degrees of freedom in minus twice the log-likelihood, and
-each shape that it is sought at is one more trial: an effect of one number has to gain 16.4, which are 4.1 deviations, one
-of two numbers with six shapes 23.4 (4.8), one of three 26.5 (5.1). What is found scatters by one deviation around what
-stands out. Effects that shift runs are judged by the bound of the evidence alone, which asks for 5.4.
+What can be named is bounded: noise alone may look like one of twenty effects in one search of a thousand. Where there
+is noise alone, an effect with k numbers gains chi-squared with k degrees of freedom in minus twice the log-likelihood,
+and each shape that it is sought at is one more trial: an effect of one number has to gain 16.4, which are 4.1
+deviations, one of two numbers with six shapes 23.4 (4.8), one of three 26.5 (5.1). What is found scatters by one
+deviation around what stands out. Effects that shift runs are judged by the bound of the evidence alone, which asks for
+5.4.
 """
 
 from __future__ import annotations

@@ -26,12 +26,14 @@ Array = npt.NDArray[np.float64]
 def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
 
-    Both include the priors: a number that the runs say nothing of is as uncertain as before.
+    Both include the priors: a number of the car that the runs say nothing of is as uncertain as before. An error that
+    is larger than the whole range of an effect's number is infinite.
     """
     linear, state = found.without_soft_bounds(), found.state
-    covariance = _covariance(linear)
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return (with_standard_errors(state.effects, free_parameters_of(state.effects), deviations[linear.count:]),
+    deviations = np.sqrt(np.maximum(np.diag(_covariance(linear)), 0.0))
+    own, moves = deviations[linear.count:], free_parameters_of(state.effects)
+    ranges = [range_of(state.effects[move.effect].effect.parameters[move.parameter]) for move in moves]
+    return (with_standard_errors(state.effects, moves, np.where(own < ranges, own, np.inf)),
             deviations[: linear.count])
 
 
@@ -89,8 +91,7 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
 def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParameter], deviations: Array,
                 share: float = 1e-4) -> tuple[Chosen, ...]:
     """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
-    linear over such a share of a number. One that is larger than a number's whole range is infinite: nothing is known
-    of the number."""
+    linear over such a share of a number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
@@ -99,6 +100,5 @@ def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParamete
         high, low = parameter.value(here + step), parameter.value(here - step)
         way = abs(parameter.coordinate(high) - parameter.coordinate(low))
         rise = abs(high - low) / way if way > 0 else 0.0
-        error = float(rise * deviation) if deviation < range_of(parameter) else np.inf
-        errors[move.effect] = {**errors[move.effect], parameter.name: error}
+        errors[move.effect] = {**errors[move.effect], parameter.name: float(rise * deviation)}
     return tuple(replace(one, standard_errors=found) for one, found in zip(effects, errors, strict=True))

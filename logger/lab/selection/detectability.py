@@ -18,9 +18,9 @@ from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
 DETECTABLE_SIGMA = 6.0
 """An effect of a smaller expected significance may be missed among twenty. Derived: where noise alone looks like one of
-them in one search of a thousand, an effect of one number has to gain 16.4 in minus twice the log-likelihood (chi-squared
-with one degree of freedom), one of three numbers with six starts 26.5: 4.1 to 5.1 deviations. What is found scatters by
-one deviation around what is expected."""
+them in one search of a thousand, an effect of one number has to gain 16.4 in minus twice the log-likelihood
+(chi-squared with one degree of freedom), one of three numbers with six starts 26.5: 4.1 to 5.1 deviations. What is
+found scatters by one deviation around what is expected."""
 _NO_CHANGE = 0.1  # standard deviations, a sixtieth of what is detectable: the vehicle has these values already
 
 
@@ -28,7 +28,7 @@ _NO_CHANGE = 0.1  # standard deviations, a sixtieth of what is detectable: the v
 class Undetectable:
     """An effect whose expected significance at its usual strength, in standard deviations, is too small.
 
-    alike    the number of the car that hides it, doing nearly the same within its tolerance; None: it is faint by itself
+    alike    the number of the car that hides it, doing nearly the same within its tolerance; None: it is faint itself
     """
 
     effect: Effect
