@@ -99,8 +99,7 @@ class Diagnosis:
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
     tolerance            share by which the car's masses, springs and dampers may well be off
-    rough_file           whether most of those that were measured are off by more than they were taken to be at first
-    farthest_sigma       how far the number is off that is farthest, in standard deviations of its prior
+    rough_file           whether they turned out to be off by more, on the whole, than they were taken to be at first
     """
 
     runs: tuple[str, ...]
@@ -125,7 +124,6 @@ class Diagnosis:
     coloured: bool = False
     tolerance: float = 0.04
     rough_file: bool = False
-    farthest_sigma: float = 0.0
 
     @property
     def exceeds_noise(self) -> bool:
@@ -159,16 +157,20 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    found = assess(posterior, effects, present, *search_effects(posterior, effects, present, progress, workers))
-    if not found.rough_file or not posterior.may_be_rough:
-        return found
-    # Numbers that are held back where they are not make effects of what they would explain.
-    progress("most of the car's numbers are off by more than their tolerance: again with a wider one")
-    rough = posterior.with_rough_file()
-    again = assess(rough, effects, present, *search_effects(rough, effects, present, progress, workers))
-    # A few numbers that are far off even so are not explained by a rough file.
-    return replace(again, rough_file=True) if again.farthest_sigma < FARTHEST_SIGMA else replace(
-        found, rough_file=False)
+    def searched(posterior: Posterior) -> tuple[Search, Selection, LinearModel]:
+        search, selection = search_effects(posterior, effects, present, progress, workers)
+        return search, *_fit_finely(search, selection)
+
+    found = searched(posterior)
+    if posterior.may_be_rough and _is_off_on_the_whole(found[-1]):
+        # Numbers that are held back where they are not make effects of what they would explain.
+        progress("the car's numbers are off by more than their tolerance: again with a wider one")
+        wider = posterior.with_rough_file()
+        again = searched(wider)
+        # A few numbers that are far off even so are not explained by a rough file.
+        if not wider.prior.any_beyond(again[-1].state.logs, FARTHEST_SIGMA):
+            return replace(_assess(wider, effects, present, *again), rough_file=True)
+    return _assess(posterior, effects, present, *found)
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -187,14 +189,18 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
 def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
            selection: Selection) -> Diagnosis:
     """The diagnosis by the result of a search, which is fitted again by a fine simulation."""
+    return _assess(posterior, effects, present, search, *_fit_finely(search, selection))
+
+
+def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
+            selection: Selection, after: LinearModel) -> Diagnosis:
+    """The diagnosis by the result of a search and the model that was fitted finely."""
     progress, tried = search.progress, search.effects
     nominal = posterior.start(present)
-    progress("fitting it finely")
-    selection, after = _fit_finely(search, selection)
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
-    effects_found, errors = standard_errors(after)
+    effects_found, _ = standard_errors(after)
     progress("what these runs could not show")
     excess = excess_over_noise(fine, state, FALSE_ALARM)
     baseline = fine.start(present)
@@ -213,9 +219,12 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
         car=fitted_car(fine, baseline, state), tolerance=BAND_SIGMA * posterior.tolerance.numbers,
-        rough_file=posterior.prior.mostly_beyond_band(state.logs, errors),
-        farthest_sigma=float(np.abs(state.logs / posterior.prior.deviations).max()),
     )
+
+
+def _is_off_on_the_whole(after: LinearModel) -> bool:
+    """Whether the car's numbers lie beyond their tolerance on the whole."""
+    return after.posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1])
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:
@@ -239,6 +248,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
     that are at an end of their range then are dropped."""
+    search.progress("fitting it finely")
     fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
         state = selection.now.state

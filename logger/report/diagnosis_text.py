@@ -28,9 +28,9 @@ def summary(found: Diagnosis) -> list[str]:
     removed = removed_words(found.removed, found.band)
     lines = list(removed)
     if found.rough_file:
-        lines.append("Most of the car's masses, springs and dampers are off by more than their tolerance. They were "
-                     f"taken to be good to {found.tolerance:.0%} instead: the vehicle's file is a rough one, "
-                     "and small changes of the car cannot be seen with it (ridelog identify measures its numbers).")
+        lines.append("On the whole the car's masses, springs and dampers are off by more than their tolerance. They "
+                     f"were taken to be good to {found.tolerance:.0%} instead: the vehicle's file is a rough one, and "
+                     "small changes of the car cannot be seen with it (ridelog identify measures its numbers).")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:

@@ -113,7 +113,11 @@ class VehiclePrior:
         ends = _SOFT_BOUND_SIGMA * self.deviations
         return np.clip(logs, -ends, ends) if self.soft_bounds else logs
 
-    def mostly_beyond_band(self, logs: Array, errors: Array) -> bool:
+    def any_beyond(self, logs: Array, deviations: float) -> bool:
+        """Whether a mass, spring or damper lies farther off than so many standard deviations (p,)."""
+        return bool((np.abs(logs / self.deviations)[~is_length(self.names)] > deviations).any())
+
+    def off_on_the_whole(self, logs: Array, errors: Array) -> bool:
         """Whether the masses, springs and dampers that were measured, by these standard errors (p,), lie beyond the
         band that they may well be off by, on the whole (r.m.s.): then it is the file that is rough, and not an effect
         that is missing."""

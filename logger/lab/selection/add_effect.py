@@ -158,11 +158,10 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     (base_fit, errors_before), (effect_fit, errors_after) = (
         _fit_without_soft_bounds(unbounded, one) for one in (before, after))
     prior, nominal = posterior.prior, posterior.vehicle
-    if given.may_be_rough and prior.mostly_beyond_band(effect_fit.state.logs, errors_after):
+    if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
         wider = given.with_rough_file()
         rough = add(wider, present, added, candidates)
-        if all(abs(np.log(one.found / one.nominal)) < FARTHEST_SIGMA * deviation
-               for one, deviation in zip(rough.numbers, wider.prior.deviations, strict=True)):
+        if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), FARTHEST_SIGMA):
             return rough
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
         after.state.logs, base_fit.state.logs, effect_fit.state.logs))
