@@ -160,7 +160,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
-        "tolerance": found.tolerance, "rough_file": found.rough_file,
+        "tolerance": found.tolerance, "rough_file": found.rough_file, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},
