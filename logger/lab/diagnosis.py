@@ -35,6 +35,7 @@ from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
@@ -150,6 +151,11 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     ValueError where the vehicle lacks what an effect needs.
     """
     search, selection = search_effects(posterior, effects, present, progress, workers)
+    below = below_filter_without_delay(search, selection)
+    if below is not None:
+        progress("the records were filtered forth and back: searching below that")
+        posterior = below
+        search, selection = search_effects(posterior, effects, present, progress, workers)
     return assess(posterior, effects, present, search, selection)
 
 
