@@ -37,6 +37,7 @@ from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
+from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
@@ -157,20 +158,27 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    def searched(posterior: Posterior) -> tuple[Search, Selection, LinearModel]:
-        search, selection = search_effects(posterior, effects, present, progress, workers)
-        return search, *_fit_finely(search, selection)
+    def searched(posterior: Posterior) -> tuple[Search, Selection]:
+        return search_effects(posterior, effects, present, progress, workers)
 
-    found = searched(posterior)
-    if posterior.may_be_rough and _is_off_on_the_whole(found[-1]):
+    search, selection = searched(posterior)
+    below = below_filter_without_delay(search, selection)
+    if below is not None:
+        progress("the records were filtered forth and back: searching below that")
+        posterior = below
+        search, selection = searched(posterior)
+    selection, after = _fit_finely(search, selection)
+    if posterior.may_be_rough and _is_off_on_the_whole(after):
         # Numbers that are held back where they are not make effects of what they would explain.
         progress("the car's numbers are off by more than their tolerance: again with a wider one")
         wider = posterior.with_rough_file()
-        again = searched(wider)
+        search_again, selection_again = searched(wider)
+        selection_again, after_again = _fit_finely(search_again, selection_again)
         # A few numbers that are far off even so are not explained by a rough file.
-        if not wider.prior.any_beyond(again[-1].state.logs, FARTHEST_SIGMA):
-            return replace(_assess(wider, effects, present, *again), rough_file=True)
-    return _assess(posterior, effects, present, *found)
+        if not wider.prior.any_beyond(after_again.state.logs, FARTHEST_SIGMA):
+            found = _assess(wider, effects, present, search_again, selection_again, after_again)
+            return replace(found, rough_file=True)
+    return _assess(posterior, effects, present, search, selection, after)
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),

@@ -200,6 +200,11 @@ class Effect(ABC):
         names = [one.name for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
 
+    def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
+        """Values that delay slow motions so much that distances which were fitted without it have absorbed the delay: a
+        search tries them with its delay taken out of the distances. Of each kind, those that do more and more."""
+        return []
+
     def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
         """Whether something else than the model's error speaks for it at these values."""
         return False
