@@ -93,12 +93,12 @@ def deviance(problem: SameRoad, state: RoadFitState) -> float:
         n = np.maximum(grid.wave_number_cpm, 0.01)
         psd = np.exp(own[0]) * CM3_M3 * (n / 0.2) ** -own[1]
         psd[0] = 0.0
-        table = problem.table(state.gains)
+        drives = iter(problem.tables(state.gains))
         rows = []
         for number, crossing in enumerate(road.crossings):
             off = 0.0 if number == 0 else own[1 + number]
             waves = np.sqrt(psd / (2 * grid.spacing_m)) * np.exp(2j * np.pi * grid.wave_number_cpm * off)
-            response = table.responses(np.zeros(0), crossing.f_hz)[0]
+            response = next(drives).responses(np.zeros(0), crossing.f_hz)[0]
             rows.append(crossing.readings(crossing.under_axles(np.eye(grid.count), waves), response).T)
         matrix = np.concatenate(rows)
         covariance = matrix @ matrix.T + np.exp(2 * own[-1]) * np.eye(len(matrix))
