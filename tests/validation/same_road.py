@@ -3,10 +3,10 @@
     python -m tests.validation.same_road --sensor serial --drives 3 --cases 2 dry_friction none
     python -m tests.validation.same_road --sensor bma220 --drives 2 --cases 4 --extracted none
 
-Each case hides one effect (or nothing), of a simulator that shares nothing with ridelog. With ``--extracted`` the drives
-are recorded bytes, extracted without a profile. An answer is right if what it names first, or says that it cannot be
-distinguished from that, is what was hidden; false if it names another; undecided if it names nothing. Seeds as in
-``examine``.
+Each case hides one effect (or nothing), of a simulator that shares nothing with ridelog. With ``--extracted`` the
+drives are recorded bytes, extracted without a profile. An answer is right if what it names first, or says that it
+cannot be distinguished from that, is what was hidden, and it names no more; false if it names another; undecided if it
+names nothing. Seeds as in ``examine``.
 """
 
 from __future__ import annotations

@@ -121,8 +121,8 @@ class SameRoad:
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
-        """The response (d, x, f) of the car with these numbers and effects, in each of the ``motions``. ValueError if no
-        linear car stands in for it."""
+        """The response (d, x, f) of the car with these numbers and effects, in each of the ``motions``. ValueError if
+        no linear car stands in for it."""
         return responses_of(self.car(effects, logs), self.rate_hz, self.motions)
 
     def is_linear(self, effects: Sequence[Chosen], logs: Array) -> bool:
@@ -177,7 +177,8 @@ class SameRoad:
             other._roads.append(road)
         return other
 
-    def _at(self, tables: Sequence[Tabulated], roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
+    def _at(self, tables: Sequence[Tabulated], roads: Array,
+            ) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
         """Every stretch under a car of these responses: its road, its numbers, their indices among those of all roads,
         and the runs of its drives."""
         first = 0
