@@ -64,7 +64,8 @@ def main() -> int:
                 vehicle = (folder / "exact" / "vehicle.yaml").resolve()
                 runs = [str(one) for one in sorted((folder / "exact").glob("run*"))]
                 if options.extracted:
-                    dumps = [str(dump) for dump, _ in write_field(made, options.sensor, vehicle, folder)]
+                    dumps = [str(dump) for dump, _ in
+                             write_field(made, options.sensor, vehicle, folder, one_road=True)]
                     found, _ = asked(["extract", *dumps, "--out", str(folder / "runs"), "--json"], in_process=False)
                     runs = [one["run"] for one in found["runs"]]
                 said, took = asked(["diagnose", "--same-road", "--json", "--vehicle", str(vehicle), *runs],

@@ -215,17 +215,21 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
     each start goes on.
 
     most, share, least    so many at most, of those whose gain is this share of the largest, and so much
-    starts                so many trials at their own values; the best one also at its best strength, which holds for
-                          small changes only
+    starts                so many trials at their own values, those whose gain is half of the best one's or more; this
+                          also at its best strength, which holds for small changes only
+
+    What gains less by its first steps than its numbers cost is not fitted further.
     """
     enough = max([least, *(share * ones[0].gain for ones in ranked.values())])
     found = {}
     for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
         progress(f"fitting {name}")
-        begins = [ranked[name][0].best, *(trial.chosen for trial in ranked[name][:starts])]
+        first = ranked[name][0]
+        begins = [first.best, *(one.chosen for one in ranked[name][:starts] if one.gain > 0.5 * first.gain)]
         tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
-        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state, nodes=2))
-        found[name] = fit(best.problem, best.state)
+        gains = [one.problem.gain(base.state, one.state, nodes=2) for one in tries]
+        best = tries[int(np.argmax(gains))]
+        found[name] = fit(best.problem, best.state) if max(gains) > _cost(best.problem, best.state) else best
     return found
 
 
@@ -262,11 +266,16 @@ def _candidates(base: RoadFit, models: Mapping[str, RoadFit], count: int, error:
                                              and abs(other.gain - one.gain) < INDISTINGUISHABLE)) for one in found]
 
 
+def _cost(problem: SameRoad, state: RoadFitState) -> float:
+    """What the numbers of the last effect of a state cost of its gain."""
+    return len(free_parameters_of([state.effects[-1]])) * float(np.log(problem.samples))
+
+
 def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
     """The last effect of a state as one of so many candidates. Its gain in minus twice the log of the likelihood, less
     what its numbers cost (G. Schwarz 1978), is that in the evidence."""
     one = state.effects[-1]
-    gain -= len(free_parameters_of([one])) * float(np.log(problem.samples))
+    gain -= _cost(problem, state)
     return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted,
                      stands_in=not problem.is_linear([one], state.logs))
 
