@@ -1,7 +1,8 @@
 """Replay speed and memory: the demonstration drive through the whole chain, with files, on one core.
 
-The drive is a BMA220's. It is also counted in seconds of the processor, start of the command and all, for the plain car
-and for one with a nonlinear effect.
+The drive is a BMA220's. It is also counted in seconds of the processor, start of the command and all, for the plain car,
+for one with each nonlinear effect, and for one whose file also has standard errors, as ``ridelog add-effect`` writes it.
+The command runs from compiled bytecode, as an installed one does, whatever ``PYTHONDONTWRITEBYTECODE`` says here.
 """
 
 from __future__ import annotations
