@@ -46,8 +46,8 @@ _REACH = 6.0
 _POINTS, _POINTS_OF_TWO = 601, 61
 _MOST_TURNS, _NEAR_ENOUGH = 60, 5e-3
 _WAY = 0.5  # of each turn, so that friction does not swing between stuck and free
-# From slopes that are nearly right the first turns go all the way. Of what a tenth more friction changes in the response
-# two of them leave out 7 % on a road of class A and 3 % or less on rougher ones.
+# From slopes that are nearly right the first turns go all the way. Of what a tenth more friction changes in the
+# response two of them leave out 7 % on a road of class A and 3 % or less on rougher ones.
 _WHOLE_TURNS = 2
 # Slopes of a car that does not move are asked over motions as small as these: a car's engine moves it more.
 _LEAST_TRAVEL_M, _LEAST_RATE_MPS = 1e-7, 1e-6
