@@ -179,7 +179,7 @@ class RoadEstimator:
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
         if car in self._kept:
             return self._kept[car]
-        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in self._off])
+        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd, car) for one in self._off])
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[car] = _Answers(
