@@ -149,7 +149,7 @@ class Extent:
 
     def windows_at(self, mph: int) -> int:
         """Of each road."""
-        return max(self.windows, ceil(self.seconds * mph * MPH_MPS / WINDOW_M))
+        return max(self.windows, 10 * ceil(self.seconds * mph * MPH_MPS / WINDOW_M / 10))
 
 
 SMALL = Extent(
