@@ -29,7 +29,10 @@ _MOST_PARKED = 1000
 """A stand counts as so many readings at most, ten seconds: in longer ones the level drifts and what shakes the car is
 not independent from reading to reading, and their evidence would fall by more than a belief can follow."""
 _LEAST_SHARE = 1e-30  # so that its logarithm is finite
-_LEAST_PROBABILITY = 0.0027  # beyond 3 deviations: what is farther out is a hole that the solution has not found yet
+_LEAST_PROBABILITY = 1e-6
+"""Beyond 4.75 deviations: what is farther out is a hole that the solution has not found yet. Not nearer: where readings
+toggle about one edge, the few on a third step, 3 to 4 deviations out where the noise is a third to a quarter of one,
+are all that tells how much noise there is; were they no less probable with less noise, it would come out too small."""
 
 
 def interval_evidence(expected: Array, others: Array, low: Array, high: Array, log_noise: Array) -> Array:

@@ -114,12 +114,12 @@ class Kept:
 def _plain(logged: Logged) -> dict[str, Any]:
     columns = {one.name: getattr(logged.windows, one.name).tolist() for one in fields(Windows)}
     noise = logged.noise and [logged.noise.log_mean, logged.noise.log_std]
-    return {"windows": columns, "was": logged.was.tolist(), "noise": noise}
+    return {"windows": columns, "where_it_was": logged.where_it_was.tolist(), "noise": noise}
 
 
 def _logged(plain: dict[str, Any]) -> Logged:
     windows = Windows(**{name: np.array(column, dtype=np.float64) for name, column in plain["windows"].items()})
-    return Logged(windows, np.array(plain["was"]), NoiseBelief(*plain["noise"]) if plain["noise"] else None)
+    return Logged(windows, np.array(plain["where_it_was"]), NoiseBelief(*plain["noise"]) if plain["noise"] else None)
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Extent:
 
     def windows_at(self, mph: int) -> int:
         """Of each road."""
-        return max(self.windows, ceil(self.seconds * mph * MPH_MPS / WINDOW_M))
+        return max(self.windows, 10 * ceil(self.seconds * mph * MPH_MPS / WINDOW_M / 10))
 
 
 SMALL = Extent(

@@ -334,3 +334,16 @@ def test_a_car_that_swings_or_is_worked_at_bounds_nothing() -> None:
         estimator.push(reading, np.ones(count, dtype=bool), np.zeros(count), np.zeros(count))
         estimator.finish()
     assert estimator.noise_stretches == 0
+
+
+@pytest.mark.parametrize("noise_steps", [0.28, 0.32, 0.38])
+def test_the_few_readings_on_a_third_step_tell_the_noise(noise_steps: float) -> None:
+    """A level at an edge, which toggles for any noise: the noise that makes most of what was read, known to be the true
+    one, is found, though only some readings in a thousand tell."""
+    rng = np.random.default_rng(round(100 * noise_steps))
+    count = 40_000
+    reading = np.rint(0.5 + noise_steps * rng.standard_normal(count))
+    assert 5e-5 < np.mean((reading < 0) | (reading > 1)) < 0.02
+    log_noise = np.log(np.linspace(0.15, 0.6, 451))
+    evidence = interval_evidence(np.full(count, 0.5), np.full(count, 1e-6), reading - 0.5, reading + 0.5, log_noise)
+    assert np.exp(log_noise[np.argmax(evidence)]) == pytest.approx(noise_steps, rel=0.04)
