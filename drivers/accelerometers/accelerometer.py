@@ -56,7 +56,8 @@ class Decoder(Protocol):
 class Readings:
     """What single readings are.
 
-    noise_mps2    r.m.s. noise on the 100 Hz grid, before it is rounded [m/s2], above 0
+    noise_mps2    r.m.s. noise of a reading, before it is rounded [m/s2], above 0; on the 100 Hz grid for a source that
+                  samples by its own clock
     step_mps2     one count of a reading at the rate at which it is read [m/s2]; 0: below twice the noise, which blurs
                   it, or not known
     oversample    readings a second over 100, for a source that is read by the host's clock; 1 for one that samples by

@@ -17,6 +17,7 @@ from array import array
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import sqrt
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -54,8 +55,9 @@ from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
 from drivers.sources import US_PER_S, ChipSource, Deadlines, Played, Source
 
 BASE_RATE_HZ = 100
-NOISE_MPS2 = 0.1  # r.m.s., beside its steps; no data sheet states it
+NOISE_MPS2 = 0.1  # r.m.s., beside its steps, through the filter that goes with 100 Hz; no data sheet states it
 LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some more in the kernel
+USUAL_OVERSAMPLE = 4  # a quarter of the time of such a bus; the estimator stays 100 times as fast as the drive
 
 RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
 FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
@@ -274,12 +276,12 @@ def _bus(node: SettingNode) -> int | Path:
 
 @dataclass(frozen=True)
 class Bma220Config:
-    """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; ``bandwidth_hz`` None means automatic."""
+    """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; None means automatic."""
 
     i2c_bus: int | Path = 1
     range_g: int = 2
     bandwidth_hz: int | None = None
-    oversample: int = 1
+    oversample: int | None = None
 
     def __post_init__(self) -> None:
         self.chip  # noqa: B018 - SettingsError for what the chip cannot have
@@ -287,7 +289,14 @@ class Bma220Config:
     @property
     def chip(self) -> Bma220Settings:
         """The driver's settings."""
-        return Bma220Settings(range_g=self.range_g, bandwidth_hz=self.bandwidth_hz, oversample=self.oversample)
+        return Bma220Settings(range_g=self.range_g, bandwidth_hz=self.bandwidth_hz, oversample=self.reads)
+
+    @property
+    def reads(self) -> int:
+        """Readings per sample of 100 Hz; of a recorded drive one, unless the settings say how it was read."""
+        if self.oversample is not None:
+            return self.oversample
+        return USUAL_OVERSAMPLE if isinstance(self.i2c_bus, int) else 1
 
 
 class _Bma220(Accelerometer[Bma220Config]):
@@ -300,7 +309,7 @@ class _Bma220(Accelerometer[Bma220Config]):
         "i2c_bus": Special(_bus, ("1", "0")),
         "range_g": OneOf(tuple(RANGE_CODES)),
         "bandwidth_hz": OrNone("auto", OneOf(BANDWIDTHS_HZ)),
-        "oversample": Whole(1, LARGEST_OVERSAMPLE),
+        "oversample": OrNone("auto", Whole(1, LARGEST_OVERSAMPLE)),
     }
     event_bytes = SAMPLE_BYTES
 
@@ -317,21 +326,22 @@ class _Bma220(Accelerometer[Bma220Config]):
         return Bma220Decoder(settings.range_g)
 
     def readings(self, settings: Bma220Config) -> Readings:
-        """Coarse steps."""
-        return Readings(NOISE_MPS2, mps2_per_count(settings.range_g), settings.oversample)
+        """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate."""
+        hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.reads, 1))
+        return Readings(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
         """Range, scale, filter, rate."""
         return {"verified": True, "range_g": settings.range_g, "mps2_per_count": mps2_per_count(settings.range_g),
-                "bandwidth_hz": settings.chip.filter_hz, "oversample": settings.oversample}
+                "bandwidth_hz": settings.chip.filter_hz, "oversample": settings.reads}
 
     def header(self, settings: Bma220Config) -> dict[str, Any]:
         """Range and rate."""
-        return {"range_g": settings.range_g, "oversample": settings.oversample}
+        return {"range_g": settings.range_g, "oversample": settings.reads}
 
     def recorded(self, header: Mapping[str, Any], settings: Bma220Config, is_given: bool) -> Bma220Config:
-        """Range and rate are the recording's."""
-        range_g, oversample = (header.get(key, getattr(settings, key)) for key in ("range_g", "oversample"))
+        """Range and rate are the recording's; one that says nothing of the rate was read 100 times a second."""
+        range_g, oversample = header.get("range_g", settings.range_g), header.get("oversample", 1)
         if type(range_g) is not int or type(oversample) is not int:
             raise SettingsError("expected whole numbers for 'range_g' and 'oversample'")
         return replace(settings, range_g=range_g, oversample=oversample)

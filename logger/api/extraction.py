@@ -78,7 +78,7 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
 
 def _facts(sensor: Instrument, config: Config) -> RecordFacts:
     range_g = sensor.description.get("range_g")
-    return RecordFacts(step_mps2=sensor.sensor.step_mps2 or None,
+    return RecordFacts(step_mps2=sensor.on_grid(sensor.sensor.noise_rms_mps2).step_mps2 or None,
                        range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2, noise_mps2=_noise_mps2(sensor, config))
 
 
@@ -86,7 +86,8 @@ def _noise_mps2(sensor: Instrument, config: Config) -> float | None:
     """Of the sensor, where it was set or learnt; None: nobody knows."""
     if config.accelerometer.noise_mps2 is None:
         return None
-    return sensor.noise.noise_rms_mps2 if sensor.noise is not None else sensor.sensor.noise_rms_mps2
+    of_one = sensor.noise.noise_rms_mps2 if sensor.noise is not None else sensor.sensor.noise_rms_mps2
+    return sensor.on_grid(of_one).noise_rms_mps2
 
 
 class _NoRows:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from math import log
+from statistics import median
 from typing import TYPE_CHECKING
 
 from logger.errors import BadInput
@@ -166,13 +167,15 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
-    if it is one, and all runs agree, below the bounce as well."""
+    if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body moves with the
+    road whatever is missing, but one run holds few such waves."""
     clear = [(run.name, around.gain, below.gain) for run, around, below in
              zip(runs.runs, followed.around, followed.below, strict=True) if around.is_clear]
     for name, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
         of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
-        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for _, *gains in clear for one in gains):
+        gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
+        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for one in gains):
             yield (f"{name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the model "
                    f"says: {what} in {unit}")
 

@@ -39,12 +39,14 @@ class SameRoadDiagnosis(Diagnosis):
     run_errors       by name of the run: error before, and with the effects that were found
     taken_by_road    effects that another road would imitate, and the share of their information that remains with it
     not_tried        effects that could not be tried, and why
+    undecided        effects that explain a little, but may only imitate something else that is missing
     cannot_tell      sentences: what these drives do not show
     """
 
     run_errors: Mapping[str, tuple[float, float]]
     taken_by_road: Mapping[str, float]
     not_tried: Mapping[str, str]
+    undecided: tuple[str, ...]
     cannot_tell: tuple[str, ...]
 
 
@@ -53,8 +55,8 @@ def diagnose_same_road(
     effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Notify = silent,
 ) -> SameRoadDiagnosis:
     """Which physical effect a model lacks, where no profile is known: from two drives or more over one road, at
-    different speeds. Only effects that keep the car linear are tried; profiles are not read. It takes from seconds to
-    minutes.
+    different speeds. Effects that bend the car's laws are tried by linear ones that stand in for them; profiles are
+    not read. It takes from seconds to minutes.
 
     vehicle, tolerance    as in ``compare``
     runs                  as in ``compare``, without profiles; their distances count from the same place, to about 3 m,
@@ -79,7 +81,7 @@ def diagnose_same_road(
     return SameRoadDiagnosis(
         "\n".join(same_road_lines(found, names, None)), summary, **diagnosis_fields(summary),
         run_errors=dict(zip(names, found.by_run, strict=True)), taken_by_road=summary["taken_by_road"],
-        not_tried=summary["not_tried"], cannot_tell=tuple(cannot_tell(found)))
+        not_tried=summary["not_tried"], undecided=tuple(summary["undecided"]), cannot_tell=tuple(cannot_tell(found)))
 
 
 def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
@@ -94,17 +96,22 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
         file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
         check_record(drive, file, [one for one, _ in drives[:number]])
         check_distances(drive, file)
-    facts = UNKNOWN
-    if all(_counts_for_itself(one) for one, _ in drives):
-        drives, facts = _on_one_distance(drives), replace(UNKNOWN, places_by=BY_RECEIVER)
+    by_receiver = any(one.facts.places_by == BY_RECEIVER for one, _ in drives)
+    if any(_counts_for_itself(one) for one, _ in drives) and all(_was_extracted(one) for one, _ in drives):
+        drives, by_receiver = _on_one_distance(drives), True
+    facts = replace(UNKNOWN, places_by=BY_RECEIVER) if by_receiver else UNKNOWN
     return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat, facts=facts)
                          for one, name in drives])
 
 
+def _was_extracted(drive: drive_file.Drive) -> bool:
+    """Whether a drive was extracted, and has positions."""
+    return drive.facts.source is not None and drive.lat_deg is not None and bool(np.isfinite(drive.lat_deg).all())
+
+
 def _counts_for_itself(drive: drive_file.Drive) -> bool:
-    """Whether a drive was extracted without a profile, so that its distance begins where it did, and has positions."""
-    counts = drive.facts.source is not None and drive.facts.places_by is None
-    return counts and drive.lat_deg is not None and bool(np.isfinite(drive.lat_deg).all())
+    """Whether that was without a profile, so that its distance begins where it did."""
+    return _was_extracted(drive) and drive.facts.places_by is None
 
 
 def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tuple[drive_file.Drive, str]]:
@@ -165,7 +172,7 @@ def diagnosed(
                            "too")
     effects, _ = known_effects(model, effect_files)
     try:
-        if by_receiver := all(one.facts.places_by == BY_RECEIVER for one in records):
+        if by_receiver := any(one.facts.places_by == BY_RECEIVER for one in records):
             notify("laying the drives on one distance by the road that they felt")
             records = placed_by_road(records, given, off, model.effects, model.vehicle)
         problem = SameRoad(records, given, off, model.vehicle, exact_places=not by_receiver)

@@ -52,10 +52,12 @@ class NoiseFloor:
     """For readings ``rate_hz`` a second whose weighting has the gain (n,) at frequencies evenly from 0 to half of that.
 
     step_mps2    that readings are rounded to; 0: none
+    reads        so many such readings are thinned out to one of the ``rate_hz``
     """
 
-    def __init__(self, gain: Array, rate_hz: float, step_mps2: float) -> None:
+    def __init__(self, gain: Array, rate_hz: float, step_mps2: float, reads: int = 1) -> None:
         self._step_mps2 = step_mps2
+        self._reads = reads
         self._rate_hz = rate_hz
         covariance = np.fft.irfft(gain**2)
         self._power = float(covariance[0])
@@ -74,10 +76,11 @@ class NoiseFloor:
         noise_mps2    of a reading, before rounding; ``log_std`` is its standard error, a share of it
         """
         rounding = self._step_mps2**2 / 12
-        if max(noise_mps2**2, raw.accel_rms_mps2**2 - rounding) < (BLURRED_FROM_STEPS * self._step_mps2)**2:
+        ride = raw.accel_rms_mps2**2 - rounding / self._reads
+        if max(noise_mps2**2, ride) < (BLURRED_FROM_STEPS * self._step_mps2)**2:
             return NO_FIGURES
-        power = self._power * (noise_mps2**2 + rounding)
-        shared = 2 * log_std * self._power * noise_mps2**2
+        power = self._power * (noise_mps2**2 + rounding) / self._reads
+        shared = 2 * log_std * self._power * noise_mps2**2 / self._reads
         running = round(self._rate_hz)  # MTVV is over 1 s
         squares = self._squares(raw.count, raw.a_w_mps2, power, shared)
         mtvv_mps2 = self._less_chance(raw, power, max(squares.mean, 0.0) / raw.count, running)

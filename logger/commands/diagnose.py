@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help=f"list all candidates, not the first {_SHOWN}")
     parser.add_argument("--same-road", action="store_true",
                         help="no profile is known: two runs or more (folders, or drive.csv files) over one road, at "
-                             "different speeds; only effects that keep the car linear are tried")
+                             "different speeds; what bends its laws is tried by linear stand-ins")
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
 
 

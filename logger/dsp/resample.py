@@ -41,6 +41,8 @@ class GridRun:
     Sample k lies at t0_us + k / rate_hz, in whole microseconds counted from the first sample of its stretch.
     nearest: the reading nearest to it as it was read, or the value itself where readings were thinned out;
     clipped: that reading was at the end of its range; bridged: it stands where a reading was missing.
+    each, each_clipped: (n, k) for a grid that k readings per sample were thinned out to, the readings from the sample
+    on up to the next, NaN where one was missing; None where they were not.
     new_start: the first sample of all or the first after a hole; otherwise it follows the run before it.
     """
 
@@ -51,6 +53,8 @@ class GridRun:
     clipped: Bools
     bridged: Bools
     new_start: bool
+    each: Floats | None = None
+    each_clipped: Bools | None = None
 
 
 @dataclass(frozen=True)
@@ -229,7 +233,8 @@ class Decimator:
     The filter is symmetric, and an output is given the time of its middle; it comes half a filter later (85 ms).
     A run is taken to have stood at its first value before it began and to stay at its last after it ended, so
     the slow run covers the same stretch. An output is clipped when one of the ``factor`` inputs about it is, and
-    bridged when half of them are: one reading that came late is no hole. Factor 1 passes everything through.
+    bridged when half of them are: one reading that came late is no hole. Factor 1 passes everything through. The
+    readings themselves are given along.
     Raises ValueError for a factor below 1.
 
     The work is laid out like that of ``logger.dsp.sections``: one matrix for a fixed block, zeros for what has
@@ -246,6 +251,7 @@ class Decimator:
         for row in range(BLOCK):
             self._rows[row, row * factor : row * factor + len(taps)] = taps
         self._inputs = np.zeros(self._rows.shape[1])
+        self._each = np.zeros((2, 0))
         self._last: float | None = None
 
     def push(self, run: GridRun) -> list[GridRun]:
@@ -257,13 +263,16 @@ class Decimator:
             ready += self.flush()
             self._begin(run)
         self._last = float(run.values[-1])
-        return ready + self._advance(run.values, np.stack([run.clipped, run.bridged]))
+        own = np.stack([np.where(run.bridged, np.nan, run.nearest), run.clipped])
+        return ready + self._advance(run.values, np.stack([run.clipped, run.bridged]), own)
 
     def flush(self) -> list[GridRun]:
         """The end of the current run. What is pushed later has to start a new run."""
         if self._last is None:
             return []
-        rest = self._advance(np.full(self._half, self._last), np.zeros((2, self._half), dtype=np.bool_))
+        own = np.zeros((2, self._half))
+        own[0] = np.nan
+        rest = self._advance(np.full(self._half, self._last), np.zeros((2, self._half), dtype=np.bool_), own)
         self._last = None
         return rest
 
@@ -272,10 +281,12 @@ class Decimator:
         self._inputs[: self._half] = run.values[0]
         self._filled, self._given = self._half, 0
         self._marks = np.zeros((2, self._factor // 2), dtype=np.bool_)
+        self._each = np.zeros((2, 0))
         self._next_us, self._new_start = run.t0_us, True
 
-    def _advance(self, values: Floats, marks: npt.NDArray[np.bool_]) -> list[GridRun]:
+    def _advance(self, values: Floats, marks: Bools, own: Floats) -> list[GridRun]:
         self._marks = np.concatenate([self._marks, marks], axis=1)
+        self._each = np.concatenate([self._each, own], axis=1)
         pieces = []
         size, span = len(self._inputs), 2 * self._half + 1
         done = 0
@@ -299,8 +310,10 @@ class Decimator:
         used = len(values) * self._factor
         shares = self._marks[:, :used].reshape(2, len(values), self._factor).mean(axis=2)
         clipped, bridged = shares[0] > 0.0, shares[1] >= BRIDGED_SHARE
-        run = GridRun(self._next_us, SLOW_RATE_HZ, values, values, clipped, bridged, self._new_start)
-        self._marks = self._marks[:, used:]
+        each, each_clipped = self._each[:, :used].reshape(2, len(values), self._factor)
+        run = GridRun(self._next_us, SLOW_RATE_HZ, values, values, clipped, bridged, self._new_start, each,
+                      each_clipped > 0)
+        self._marks, self._each = self._marks[:, used:], self._each[:, used:]
         self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
         self._new_start = False
         return run

@@ -32,6 +32,10 @@ class GridSamples:
     weighted_mps2 that through the frequency weighting, running_rms_mps2 the running r.m.s. of it. present: the
     accelerometer delivered it (False: missing); interpolated: rebuilt from its neighbours over a short hole; settled:
     the filters have forgotten their start.
+
+    each_mps2: (n, k) the readings that the estimate of the road is made of, from the sample on up to the next: the
+    reading itself, or all where the sensor is read k times per sample; each_usable and each_at_end: the reading is one,
+    and 1 for one at the top of the range, -1 at the bottom, else 0.
     """
 
     t_us: npt.NDArray[np.int64]
@@ -43,6 +47,9 @@ class GridSamples:
     interpolated: Bools
     settled: Bools
     clipped: Bools
+    each_mps2: Floats
+    each_usable: Bools
+    each_at_end: Floats
 
     def __len__(self) -> int:
         return len(self.t_us)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import exp, log
 
 import numpy as np
@@ -24,6 +24,9 @@ HIGHEST_HZ = 42.0  # recorders pass less from here on
 _SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
 WAVE_NUMBERS_CPM = np.geomspace(0.004, 3.3, 300)
 LOG_WAVES = log_waves(WAVE_NUMBERS_CPM)
+# Steps of 4 %: a fifth of the width of a resonance with a tenth of critical damping.
+_TABLE_HZ = np.geomspace(0.1, 1.05 * HIGHEST_HZ, 160)
+_LOG_TABLE_HZ = np.log(_TABLE_HZ)
 WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBERS_CPM[0])
 
 
@@ -98,11 +101,34 @@ class CarResponse:
         instead, as a share of its own (o, n). Where the gain is nothing that may be any number; speeds as ``power``."""
         key = round(log(speed_mps) * _SPEEDS_PER_E)
         if key not in self._changes:
-            speed_mps = exp(key / _SPEEDS_PER_E)
-            f_hz = WAVE_NUMBERS_CPM * speed_mps
-            own, *others = (one.response(f_hz, speed_mps) for one in (self._car, *self._off))
+            f_hz = WAVE_NUMBERS_CPM * exp(key / _SPEEDS_PER_E)
+            own, *others = (one.gain(f_hz) for one in self._axles)
             self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(f_hz))
         return self._changes[key]
+
+    @cached_property
+    def _axles(self) -> list[_Axles]:
+        """Its own axles, and those of the cars that it may be instead."""
+        return [_Axles(one) for one in (self._car, *self._off)]
+
+
+class _Axles:
+    """How a car answers the road under each axle, looked up in a table over frequency: delays and contact patch, which
+    turn quickly with the wave number, are put in at each speed."""
+
+    def __init__(self, car: LinearCar) -> None:
+        structure = car.structure
+        behind_m, axle = np.unique(structure.behind_m, return_inverse=True)
+        by_wheel = car.by_wheel(_TABLE_HZ)
+        self._by_axle = [by_wheel[:, axle == one].sum(axis=1) for one in range(len(behind_m))]
+        self._shift = (np.exp(-2j * np.pi * behind_m[:, None] * WAVE_NUMBERS_CPM)
+                       * np.sinc(WAVE_NUMBERS_CPM * structure.contact_patch_m))
+
+    def gain(self, f_hz: Array) -> ComplexArray:
+        """From the road under the front axle to the reading (n,) [1/s2], ``f_hz`` (n,) at ``WAVE_NUMBERS_CPM``."""
+        at = np.log(f_hz)
+        looked_up = [np.interp(at, _LOG_TABLE_HZ, one) for one in self._by_axle]
+        return np.asarray(sum(one * shift for one, shift in zip(looked_up, self._shift, strict=True)))
 
 
 @lru_cache(maxsize=32)

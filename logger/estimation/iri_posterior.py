@@ -62,12 +62,15 @@ def vehicle_error_variance(
     return density * rate_hz / (2 * speed_mps)
 
 
-def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
-                  ) -> SteadyMotion:
-    """What such a road makes of the car, at the frequencies of ``count`` readings (even)."""
+def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int,
+                  reads: int = 1) -> SteadyMotion:
+    """What such a road makes of the car, at the frequencies of ``count`` samples (even) that are read ``reads`` times
+    each: nothing above half the rate of the samples."""
     per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
     f_hz = _frequencies_hz(count, rate_hz)
-    return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
+    psd = np.zeros(count // 2 * reads + 1)
+    psd[:len(f_hz)] = np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0)
+    return SteadyMotion(psd, rate_hz * reads)
 
 
 @lru_cache(maxsize=4)

@@ -32,15 +32,14 @@ _STEPS = 4
 
 
 class OtherMotion:
-    """In blocks of readings ``rate_hz`` a second, one after another and all of one length.
+    """In blocks of readings, one after another and all of one length.
 
     motion_mps2    (count,) most probable one in this block; 0 where there is none
     psd            (f,) its spectrum, one-sided, at the block's frequencies [(m/s2)2/Hz]; None: there is none
     variance_left  what the readings leave open of it [(m/s2)2]
     """
 
-    def __init__(self, rate_hz: float) -> None:
-        self._rate_hz = rate_hz
+    def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
@@ -48,13 +47,14 @@ class OtherMotion:
         self.motion_mps2: Array | float = 0.0
         self.psd: Array | None = None
         self.variance_left = 0.0
+        self._rate_hz = 0.0
         self._power: Array | None = None
         self._heard = 0
 
-    def move_on(self, samples: int) -> None:
+    def move_on(self, readings: int) -> None:
         """The next block is without so many of the oldest."""
         if not isinstance(self.motion_mps2, float):
-            self.motion_mps2 = np.concatenate([self.motion_mps2[samples:], np.zeros(samples)])
+            self.motion_mps2 = np.concatenate([self.motion_mps2[readings:], np.zeros(readings)])
 
     def beside(self, road: SteadyMotion) -> SteadyMotion:
         """All that moves the car, as of one steady motion."""
@@ -87,13 +87,14 @@ class OtherMotion:
             before = size
         self.motion_mps2 = np.fft.irfft(gain * waves, count)
 
-    def learn(self, residual_mps2: Array, weight: Array, road_psd: Array) -> None:
+    def learn(self, residual_mps2: Array, weight: Array, road: SteadyMotion) -> None:
         """What a block says of its spectrum.
 
         residual_mps2    (count,) what the road leaves of the readings, this motion in it [m/s2]
         weight           (count,) one over their variance [(m/s2)-2], 0 where there are none
-        road_psd         (f,) of the motion that the road makes, one-sided [(m/s2)2/Hz]
+        road             the motion that the road makes, at the rate of the readings
         """
+        self._rate_hz, road_psd = road.rate_hz, road.psd
         count, span = len(weight), np.flatnonzero(weight)
         if len(span) < count // 2:
             return

@@ -35,7 +35,7 @@ from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.steady_motion import SteadyMotion
-from logger.estimation.time_grid import RATE_HZ, Samples
+from logger.estimation.time_grid import RATE_HZ, Samples, between
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -79,6 +79,7 @@ class SolvedBlock:
 class FollowedRoad:
     """One road after another, as one car and one sensor find them, on a distance grid of ``spacing_m``.
 
+    sensor           of single readings, of which there may be several per sample: y of t samples
     vehicle_error    share that each axle's gain may be off, because no file fits a car
     noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's is right
     """
@@ -90,7 +91,7 @@ class FollowedRoad:
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
         self._spacing_m = spacing_m
-        self._other = OtherMotion(RATE_HZ)
+        self._other = OtherMotion()
         self._belief = Belief(COMMON_ROAD)
         self._learner: NoiseLearner | None = None
         if noise is not None:
@@ -162,20 +163,21 @@ class FollowedRoad:
     def move_on(self, fresh: Samples) -> None:
         """The next block is without its oldest samples, and has these behind."""
         self._unscored += len(fresh)
-        self._other.move_on(len(fresh))
+        self._other.move_on(fresh.reading_mps2.size)
         if self._gaussian is None:
             return
         guess = self._expected_of(fresh)
+        count = len(guess.variance)
         self._gaussian = GaussianReadings(
-            np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
-            np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
+            np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
+            np.concatenate([self._gaussian.variance[count:], guess.variance]),
         )
 
     def _expected_of(self, fresh: Samples) -> GaussianReadings:
         """What readings say of accelerations of which no other tells yet: they go on as they were."""
-        centre = np.full(len(fresh), self._centre_mps2)
-        nothing = GaussianReadings(centre, np.full(len(fresh), np.inf))
-        low, high = bounds(fresh.reading_mps2, fresh.at_end, self._sensor.step_mps2)
+        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self._sensor.step_mps2)
+        centre = np.full(len(low), self._centre_mps2)
+        nothing = GaussianReadings(centre, np.full(len(low), np.inf))
         return improved(nothing, low, high, centre, self._accel_variance, self._sensor)
 
     def parked(self, reading_mps2: Array) -> None:
@@ -202,13 +204,14 @@ class FollowedRoad:
     def take_off(self, change_mps2: Array) -> None:
         """From here on readings come with so much less (t,) of what is not the linear car's."""
         if self._gaussian is not None:
+            change_mps2 = between(change_mps2, len(self._gaussian.value_mps2) // len(change_mps2))
             self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
 
     def solved(self, block: Block, samples: Samples, read: Bools, beyond_mps2: Array | float = 0.0,
                beyond_variance: float = 0.0, turns: int = 1, is_last: bool = True) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_mps2`` (t,)
-        what was taken off the readings, ``beyond_variance`` how uncertain that is [(m/s2)2], ``turns`` how often the
-        block is solved, which share rounds and steps, and ``is_last`` whether this is the last time."""
+        or one for all what was taken off the readings, ``beyond_variance`` how uncertain that is [(m/s2)2], ``turns``
+        how often the block is solved, which share rounds and steps, and ``is_last`` whether this is the last time."""
         rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
@@ -226,23 +229,24 @@ class FollowedRoad:
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``, of how
         much roughness scatters once per block, the last time."""
-        readings = self._as_gaussian(samples)
+        readings, reads = self._as_gaussian(samples), samples.reading_mps2.shape[1]
+        each = np.repeat(read, reads) & samples.usable.ravel()
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
         local = self._local.at(first, block.count).variance
         there = _levelled(spectrum, local)
         variance = readings.variance + vehicle_error_variance(
-            block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
-        ) + beyond_variance + self._other.variance_left
-        weight = np.where(read, 1 / variance, 0.0)
+            block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads
+        ) + reads * (beyond_variance + self._other.variance_left)
+        weight = np.where(each, 1 / variance, 0.0)
         seen_share = block.seen_points(read) / block.count
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         solution = block.solve(readings.value_mps2 - self._other.motion_mps2, weight, spectrum, local, steps, start)
 
-        moving = block.moving & read
+        moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain, taken = solution.gain, np.ones(block.count)
         if self._is_coarse:
-            motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
+            motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(samples), reads)
             solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
             motion = self._other.beside(motion)
             others, drift_variance = cavity(motion, variance), solution.drift_variance
@@ -251,8 +255,8 @@ class FollowedRoad:
                 even = even_variance(motion, others[moving], variance[moving])
                 gain = gain * (mean_variance / even)
                 drift_variance = solution.drift_variance * (even / mean_variance)
-                as_read = samples.reading_mps2 + beyond_mps2
-                beyond = _beyond_two(as_read[moving], self._step_mps2)
+                as_read = samples.reading_mps2.ravel() + _at_each(beyond_mps2, reads)
+                beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
                 # Sharp readings come where the road shook the car: what they show must be judged by what they can.
                 taken = block.about(np.where(moving, others / (others + variance), 0.0))
@@ -269,15 +273,16 @@ class FollowedRoad:
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
-            self._gaussian = self._improved(readings, samples, read, solution, others + drift_variance, usable)
+            self._gaussian = self._improved(readings, samples, each, solution, others + drift_variance, usable)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())
             self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
-        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, mean_variance, seen,
-                           self._other.psd)
+        other_psd = None if self._other.psd is None else self._other.psd[:len(samples) // 2 + 1]
+        return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
+                           mean_variance / reads, seen, other_psd)
 
     def _with_other_motion(
         self, solution: Solution, readings: GaussianReadings, weight: Array, motion: SteadyMotion, learns: bool
@@ -286,34 +291,35 @@ class FollowedRoad:
         it ``learns``."""
         residual = readings.value_mps2 - solution.fitted_mps2
         if learns:
-            self._other.learn(residual, weight, motion.psd)
+            self._other.learn(residual, weight, motion)
         self._other.find(residual, weight)
         return replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
 
     def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
             noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
-            return GaussianReadings(samples.reading_mps2, np.full(len(samples), noise))
-        return first_guess(samples.reading_mps2, self._sensor) if self._gaussian is None else self._gaussian
+            return GaussianReadings(samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, noise))
+        return first_guess(samples.reading_mps2.ravel(), self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
         self, readings: GaussianReadings, samples: Samples, read: Bools, solution: Solution, others: Array,
         usable: Bools | None
     ) -> GaussianReadings:
-        """Another round for the bounds, with the variance (t,) that all other readings leave of each acceleration. The
-        noise is learnt of the readings that are ``usable`` (t,), if any."""
-        low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
+        """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration; the
+        readings that are ``read`` (y,) count. The noise is learnt of those that are ``usable`` (y,), if any."""
+        low, high = bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._sensor.step_mps2)
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
         if usable is not None:
             expected = without_own(readings, solution.fitted_mps2, fitted_variance)
-            self._learn_from_bounds(*expected, low, high, usable)
+            self._learn_from_bounds(*expected, low, high, usable, samples.reading_mps2.shape[1])
         return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
 
-    def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
+    def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools, reads: int
+                           ) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""
-        last = len(usable) - _SETTLED_SAMPLES
-        part = slice(max(last - self._unscored, 0), last)
+        last = len(usable) - _SETTLED_SAMPLES * reads
+        part = slice(max(last - self._unscored * reads, 0), last)
         inner = usable[part] & np.isfinite(high[part] - low[part])
         self._unscored = 0
         expected, others, low, high = (row[part][inner] for row in (expected, others, low, high))
@@ -344,6 +350,11 @@ class FollowedRoad:
         local = self._local.at(first, count)
         there = _levelled(self._belief.spectrum, local.variance)
         return there, sqrt(self._belief.log_level_std**2 + float(local.log_error.mean()))
+
+
+def _at_each(row: Array | float, reads: int) -> Array | float:
+    """A row by samples, or one number, by readings."""
+    return between(row, reads) if isinstance(row, np.ndarray) else row
 
 
 def _beyond_two(reading_mps2: Array, step_mps2: float) -> int:

@@ -29,6 +29,7 @@ import numpy.typing as npt
 
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.road_spectrum import RoadSpectrum, log_waves
+from logger.estimation.time_grid import at_readings
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -49,9 +50,9 @@ class Solution:
     """waves     (k,) rfft of the innovations v on the distance grid
     road         (k,) rfft of the elevations there [m]
     innovations  (n,) v itself, point by point
-    fitted_mps2  (t,) the readings that this road and the drift explain
-    drift_mps2   (t,) the drift alone
-    drift_variance    (t,) that the readings leave of it, were the road known [(m/s2)2]
+    fitted_mps2  (y,) the readings that this road and the drift explain
+    drift_mps2   (y,) the drift alone
+    drift_variance    (y,) that the readings leave of it, were the road known [(m/s2)2]
     gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
@@ -65,26 +66,28 @@ class Solution:
 
 
 class TimeGrid:
-    """What is the same for every block of ``count`` samples (even) at ``rate_hz``: how the car answers the road under
-    each axle, by frequency, and what drift looks like."""
+    """What is the same for every block of ``count`` samples (even) at ``rate_hz``, each read ``reads`` times at even
+    steps: how the car answers the road under each axle, by frequency, and what drift looks like."""
 
-    def __init__(self, car: CarResponse, count: int, rate_hz: float) -> None:
+    def __init__(self, car: CarResponse, count: int, rate_hz: float, reads: int = 1) -> None:
         self.car = car
         self.rate_hz = rate_hz
+        self.reads = reads
         self.by_axle = car.by_axle(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
         in_a_step = np.zeros_like(self.by_axle)
         in_a_step[:, 1:] = self.by_axle[:, 1:] / np.arange(1, self.by_axle.shape[1])
         power = np.fft.irfft(1j * in_a_step) ** 2
         self.step_power = np.fft.rfft(power / power.sum(axis=1, keepdims=True))
         half_waves = np.arange(1, int(2 * _DRIFT_BELOW_HZ * count / rate_hz) + 1)
-        phase = pi * half_waves * (np.arange(count)[:, None] + 0.5) / count
-        self.drift = np.hstack([np.ones((count, 1)), np.cos(phase)])
+        phase = pi * half_waves * (np.arange(count * reads)[:, None] + 0.5) / (count * reads)
+        self.drift = np.hstack([np.ones((count * reads, 1)), np.cos(phase)])
         # The constant is gravity: nothing is known of it. The rest is small.
         self.drift_precision = np.array([1e-6, *np.full(len(half_waves), _DRIFT_MPS2**-2)])
 
 
 class Block:
-    """One stretch of a drive on a uniform time grid, ready to be solved for readings, weights and spectra.
+    """One stretch of a drive on a uniform time grid of t samples, ready to be solved for its y readings, a whole
+    multiple of that, weights and spectra.
 
     distance_m    (t,) where the front axle is, not decreasing
     spacing_m     of the distance grid
@@ -136,8 +139,8 @@ class Block:
     ) -> Solution:
         """The most probable road.
 
-        reading_mps2    (t,) readings
-        weight          (t,) one over the variance of each, 0 where there is none [(m/s2)-2]
+        reading_mps2    (y,) readings
+        weight          (y,) one over the variance of each, 0 where there is none [(m/s2)-2]
         relative_variance    (count,) of the road at each point, about 1
         steps           of conjugate gradients (Hestenes and Stiefel), from ``start`` or from a flat road
         start           ``waves`` of an earlier solution of this block to go on from, or ``carried_over`` ones
@@ -226,6 +229,7 @@ class Block:
 
     def _gain(self, weight: Array) -> Array:
         """Information on each wave where the road is seen, were the speeds mixed evenly along it."""
+        weight = self._per_sample(weight)
         moving = self.moving & (weight > 0)
         slowest = self._speed_class.min()
         by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
@@ -247,8 +251,9 @@ class Block:
         return int(self._advance @ read)
 
     def about(self, row: Array) -> Array:
-        """Mean (count,) of a row (t,) over the readings that show a step of the road at each point, as much as they do
+        """Mean (count,) of a row (y,) over the readings that show a step of the road at each point, as much as they do
         with either axle; between the nearest where none does."""
+        row = self._per_sample(row) / self._grid.reads
         back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.step_power), len(row))
         points = self._points.ravel()
         weight = np.bincount(points, self._shares.ravel(), self.count)
@@ -256,8 +261,12 @@ class Block:
         passed = np.flatnonzero(weight)
         return np.interp(np.arange(self.count), passed, total[passed] / weight[passed])
 
+    def _per_sample(self, row: Array) -> Array:
+        """Sum (t,) of a row (y,) over the readings of each sample."""
+        return row.reshape(-1, self._grid.reads).sum(axis=1)
+
     def driven(self, road: ComplexArray) -> Array:
-        """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
+        """A r: the readings (y,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
         return self._read(self.under(road))
 
     def under(self, road: ComplexArray) -> ComplexArray:
@@ -265,21 +274,22 @@ class Block:
         return self._under(np.fft.irfft(road * self._averaged, self.count))
 
     def transposed(self, row: Array) -> ComplexArray:
-        """A' times a row (t,) in time, as an rfft."""
+        """A' times a row (y,) in time, as an rfft."""
         return np.fft.rfft(self._scattered(row)) * self._averaged
 
     def _read(self, under: ComplexArray) -> Array:
         first, *others = under * self._grid.by_axle
         for one in others:
             first += one
-        return np.fft.irfft(first, len(self._front))
+        return at_readings(first, len(self._front), self._grid.reads)
 
     def _under(self, elevation: Array) -> ComplexArray:
         low, high = elevation.take(self._points) * self._shares
         return np.fft.rfft(low + high)
 
     def _scattered(self, row: Array) -> Array:
-        back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.by_axle), len(row))
+        count = len(self._front)
+        back = np.fft.irfft(np.fft.rfft(row)[:count // 2 + 1] * np.conj(self._grid.by_axle), count)
         return np.asarray(np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count), np.float64)
 
 

@@ -35,7 +35,7 @@ from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.time_grid import RATE_HZ, Samples
+from logger.estimation.time_grid import RATE_HZ, Samples, between
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar, MovedCar
 
@@ -120,7 +120,7 @@ class RoadEstimator:
     """Readings of a body accelerometer in, IRI of windows out, some seconds late.
 
     car          with its effects, and where its sensor sits
-    sensor       noise and step of the readings
+    sensor       noise and step of a reading
     window_m     length of a window [m]
     place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
     vehicle_error    share that each axle's gain may be off: readings are not trusted beyond it, which keeps waves that
@@ -133,6 +133,7 @@ class RoadEstimator:
     off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
                      that have nothing to do with one another
     driven_share     way that was driven over what the distance says; windows are of that distance
+    reads            readings of each sample; more than one only where the sensor is coarse
     """
 
     def __init__(
@@ -149,7 +150,11 @@ class RoadEstimator:
         ride_ahead_m: float = 0.0,
         off: Sequence[KnownCar] = (),
         driven_share: float = 1.0,
+        reads: int = 1,
     ) -> None:
+        if reads > 1 and not sensor.is_coarse:
+            raise ValueError("expected one reading per sample, for the noise blurs the steps")
+        self._reads = reads
         self._car, self._off = car, tuple(off)
         self._driven_share = driven_share
         window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
@@ -174,12 +179,12 @@ class RoadEstimator:
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
         if car in self._kept:
             return self._kept[car]
-        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in self._off])
+        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd, car) for one in self._off])
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[car] = _Answers(
             car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
-            TimeGrid(response, BLOCK_SAMPLES, RATE_HZ),
+            TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
             RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None,
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
         return self._kept[car]
@@ -199,7 +204,7 @@ class RoadEstimator:
         self._road.next_drive()
 
     def _restart(self) -> None:
-        self._waiting = Samples.unread(0, 0.0, 0.0)
+        self._waiting = Samples.unread(0, 0.0, 0.0, self._reads)
         self._heard = 0
         self._samples: Samples | None = None
         self._road.restart()
@@ -208,12 +213,13 @@ class RoadEstimator:
         self._gathered: list[_Piece] = []
 
     def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
-        """More readings, arrays (n,) on an unbroken grid of 100 Hz.
+        """More readings, arrays (n,) on an unbroken grid of 100 Hz; the first three (n, reads) where each sample has
+        several, at even steps from the sample on.
 
         reading_mps2    up positive; gravity may be in it; anything where it is not usable
         usable          there is a reading
         at_end          1 where it is at the top of the sensor's range, -1 at the bottom, else 0
-        distance_m      where the front axle is [m], not decreasing
+        distance_m      (n,) where the front axle is [m], not decreasing
 
         Returns the windows that have become certain, in order and without gaps, from the first whole one on.
         """
@@ -233,7 +239,9 @@ class RoadEstimator:
         unless readings are taken as bounds."""
         if not self._takes_bounds:
             usable = usable & (at_end == 0)
-        return Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
+        shape = (len(distance_m), self._reads)
+        return Samples(np.where(usable, reading_mps2, 0.0).reshape(shape), usable.reshape(shape),
+                       at_end.reshape(shape), distance_m)
 
     def finish(self) -> list[WindowEstimate]:
         """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
@@ -241,7 +249,7 @@ class RoadEstimator:
         estimates: list[WindowEstimate] = []
         if last is not None:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
-            after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
+            after = Samples.unread(count, float(last.distance_m[-1]), 0.0, self._reads)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
         self._road.driven_off()
@@ -250,7 +258,7 @@ class RoadEstimator:
 
     def _hop(self, fresh: Samples) -> list[WindowEstimate]:
         if self._samples is None:
-            self._samples = Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m)
+            self._samples = Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m, self._reads)
             windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
@@ -269,8 +277,8 @@ class RoadEstimator:
         both = self._samples.part(BLOCK_SAMPLES - 2 * len(fresh), BLOCK_SAMPLES)
         if both.distance_m[-1] > both.distance_m[0]:
             self._road.driven_off()
-        elif both.usable.all() and not both.at_end.any():
-            self._road.parked(fresh.reading_mps2)
+        elif both.read.all() and not both.at_end.any():
+            self._road.parked(fresh.reading_mps2[fresh.usable])
 
     def _due(self, samples: Samples) -> Iterator[int]:
         """Numbers of the pieces that the car is far enough past."""
@@ -282,7 +290,7 @@ class RoadEstimator:
     def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
         block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
-        read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
+        read = samples.read & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
@@ -308,7 +316,8 @@ class RoadEstimator:
                 level = self._road.level_at(number * self._points - back, back + self._points + 1)
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
                 if weighted is not None:
-                    log_std = self.noise.log_std if self.noise is not None else 0.0
+                    # Of a sample, which has that share of a reading's noise.
+                    log_std = self.noise.log_std / self._reads if self.noise is not None else 0.0
                     place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std,
                                       self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
@@ -327,7 +336,8 @@ class RoadEstimator:
         turns = _TURNS if self._road.begun else _FIRST_TURNS
         for turn in range(turns):
             block = self._driven(block)
-            linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
+            beyond = between(self._beyond, self._reads).reshape(-1, self._reads)
+            linear = replace(samples, reading_mps2=samples.reading_mps2 - beyond)
             solved = self._road.solved(block, linear, read, self._beyond, self._beyond_variance, _TURNS,
                                        turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
@@ -350,7 +360,7 @@ class RoadEstimator:
         begin_m = number * self._piece_m + self._ride_ahead_m
         inside = (samples.distance_m >= begin_m) & (samples.distance_m < begin_m + self._piece_m) & moving
         inside[:round(ENTRY_S * RATE_HZ)] = False
-        return self._answers.ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
+        return self._answers.ride.sums(weighted, inside, ~samples.read, place) if inside.any() else None
 
     def _speed_mps(self, samples: Samples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)

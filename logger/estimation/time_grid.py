@@ -1,4 +1,8 @@
-"""Time grid of the estimator: readings at even instants, cut and joined."""
+"""Time grid of the estimator: readings at even instants, cut and joined.
+
+Coarse readings may be taken several times per sample of the grid. What a car does is slow enough to be known between
+the samples from them, so each reading is one of the acceleration at its own instant: ``between`` gives that.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
 
 RATE_HZ = 100.0
@@ -16,7 +21,8 @@ SLOWEST_MPS = 1.0
 
 @dataclass(frozen=True)
 class Samples:
-    """Arrays (n,) as ``RoadEstimator.push`` takes them."""
+    """Arrays as ``RoadEstimator.push`` takes them: the first three (n, k) for k readings per sample, the first of them
+    at the sample and the others at even steps up to the next; ``distance_m`` (n,)."""
 
     reading_mps2: Array
     usable: Bools
@@ -24,7 +30,12 @@ class Samples:
     distance_m: Array
 
     def __len__(self) -> int:
-        return len(self.usable)
+        return len(self.distance_m)
+
+    @property
+    def read(self) -> Bools:
+        """(n,) samples with a reading."""
+        return np.asarray(self.usable.any(axis=1))
 
     def part(self, low: int, high: int) -> Samples:
         """Samples ``low`` ... ``high - 1``."""
@@ -36,10 +47,12 @@ class Samples:
         return Samples(*(np.concatenate(pair) for pair in both))
 
     @classmethod
-    def unread(cls, count: int, until_m: float, step_m: float) -> Samples:
-        """Nothing was read while the car came up to ``until_m``, ``step_m`` further with each sample."""
+    def unread(cls, count: int, until_m: float, step_m: float, reads: int) -> Samples:
+        """None of the ``reads`` per sample came while the car came up to ``until_m``, ``step_m`` further with each
+        sample."""
         distance_m = until_m - step_m * np.arange(count, 0, -1.0)
-        return cls(np.zeros(count), np.zeros(count, dtype=np.bool_), np.zeros(count), distance_m)
+        shape = (count, reads)
+        return cls(np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.zeros(shape), distance_m)
 
     @property
     def mean_step_m(self) -> float:
@@ -52,3 +65,13 @@ class Samples:
         steps_m = np.diff(self.distance_m[max(low - 1, 0):high + 1])
         moving = steps_m > SLOWEST_MPS / RATE_HZ
         return float(steps_m[moving].mean()) * RATE_HZ if moving.sum() > 0.5 * len(steps_m) else None
+
+
+def between(row: Array, reads: int) -> Array:
+    """A row (n,) of even samples, without anything at half their rate, at ``reads`` instants per sample (n reads,)."""
+    return row if reads == 1 else at_readings(np.fft.rfft(row), len(row), reads)
+
+
+def at_readings(waves: ComplexArray, count: int, reads: int) -> Array:
+    """The same from its rfft."""
+    return np.fft.irfft(waves, count * reads) * reads

@@ -2,15 +2,16 @@
 
 Problem: a name alone is no answer. The reader wants to know how much an effect explains, how certain that is, what else
 it could be, and what these runs could not have shown anyway. Solution: a search by evidence (``selection.stepwise``)
-names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor has
-where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
-with their priors.
+names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor
+has where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
+with their priors. Where the car's numbers then lie beyond their tolerance on the whole, its file is a rough one: all of
+it is done again with a wider tolerance. Noise that has a colour is told from physics by what it does not depend on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,15 +27,17 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import CONFLICT_SIGMA
+from logger.lab.likelihood.priors import BAND_SIGMA, CONFLICT_SIGMA, FARTHEST_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
+from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
-from logger.lab.selection.candidate_fit import CandidateFit
+from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
+from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
@@ -51,7 +54,7 @@ class Candidate:
     """An effect that was tried.
 
     error                  hold-out error of the model with it
-    p_value                bound on the probability that noise alone gains as much with any of the candidates
+    p_value                probability, at most, that noise alone gains as much with any of the candidates
     gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on held-out stretches
     confused_with          effects that explain the same as well
     """
@@ -95,6 +98,9 @@ class Diagnosis:
     signals              errors of other signals than the sensor's acceleration, by name
     band                 in which the runs were compared; None: all
     car                  numbers and laws as fitted
+    coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
+    tolerance            share by which the car's masses, springs and dampers may well be off
+    rough_file           whether they turned out to be off by more, on the whole, than they were taken to be at first
     """
 
     runs: tuple[str, ...]
@@ -116,6 +122,9 @@ class Diagnosis:
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     band: ComparedBand | None = None
     car: FittedCar | None = None
+    coloured: bool = False
+    tolerance: float = 0.04
+    rough_file: bool = False
 
     @property
     def exceeds_noise(self) -> bool:
@@ -149,8 +158,27 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    search, selection = search_effects(posterior, effects, present, progress, workers)
-    return assess(posterior, effects, present, search, selection)
+    def searched(posterior: Posterior) -> tuple[Search, Selection]:
+        return search_effects(posterior, effects, present, progress, workers)
+
+    search, selection = searched(posterior)
+    below = below_filter_without_delay(search, selection)
+    if below is not None:
+        progress("the records were filtered forth and back: searching below that")
+        posterior = below
+        search, selection = searched(posterior)
+    selection, after = _fit_finely(search, selection)
+    if posterior.may_be_rough and _is_off_on_the_whole(after):
+        # Numbers that are held back where they are not make effects of what they would explain.
+        progress("the car's numbers are off by more than their tolerance: again with a wider one")
+        wider = posterior.with_rough_file()
+        search_again, selection_again = searched(wider)
+        selection_again, after_again = _fit_finely(search_again, selection_again)
+        # A few numbers that are far off even so are not explained by a rough file.
+        if not wider.prior.any_beyond(after_again.state.logs, FARTHEST_SIGMA):
+            found = _assess(wider, effects, present, search_again, selection_again, after_again)
+            return replace(found, rough_file=True)
+    return _assess(posterior, effects, present, search, selection, after)
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -169,10 +197,14 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
 def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
            selection: Selection) -> Diagnosis:
     """The diagnosis by the result of a search, which is fitted again by a fine simulation."""
+    return _assess(posterior, effects, present, search, *_fit_finely(search, selection))
+
+
+def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
+            selection: Selection, after: LinearModel) -> Diagnosis:
+    """The diagnosis by the result of a search and the model that was fitted finely."""
     progress, tried = search.progress, search.effects
     nominal = posterior.start(present)
-    progress("fitting it finely")
-    selection, after = _fit_finely(search, selection)
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
@@ -181,6 +213,10 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     excess = excess_over_noise(fine, state, FALSE_ALARM)
     baseline = fine.start(present)
     removed = removed_from(fine, baseline.predictions, state)
+    shape = shape_of(fine, state, removed) if excess > UNEXPLAINED else None
+    colour = None if shape is None else coloured_noise(fine.bands, shape)
+    if colour is not None:
+        noise, excess = colour, excess_over_noise(fine, state, FALSE_ALARM, colour)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
@@ -188,10 +224,15 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         noise=noise, noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
-        undetectable=hidden, shape=shape_of(fine, state, removed) if excess > UNEXPLAINED else None,
+        undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        car=fitted_car(fine, baseline, state),
+        car=fitted_car(fine, baseline, state), tolerance=BAND_SIGMA * posterior.tolerance.numbers,
     )
+
+
+def _is_off_on_the_whole(after: LinearModel) -> bool:
+    """Whether the car's numbers lie beyond their tolerance on the whole."""
+    return after.posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1])
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:
@@ -215,6 +256,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
     that are at an end of their range then are dropped."""
+    search.progress("fitting it finely")
     fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
         state = selection.now.state
@@ -249,11 +291,12 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
     before = selection.before.hold_out
-    stages = dict(selection.steps)
+    stages, freedom = dict(selection.steps), selection.before.posterior.freedom
     found = []
     for name, gain in selection.gains.items():
         there = stages.get(name) or selection.now.hold_out
-        found.append(Candidate(effects[name], values[name], there.error, probability_by_chance(gain, count), gain,
+        by_chance = chance_of([Chosen(effects[name], values[name])], gain, freedom, count)
+        found.append(Candidate(effects[name], values[name], there.error, by_chance, gain,
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
@@ -265,7 +308,7 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
 def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:
     """A candidate that was fitted, of so many."""
     there = one.hold_out
-    p_value = probability_by_chance(one.gain, count)
+    p_value = chance_of([one.chosen], one.gain, one.found.posterior.freedom, count)
     rivals = tuple(other.effect.name for other in fits
                    if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
     return Candidate(one.effect, one.chosen.values, there.error, p_value, one.gain, before.deviance - there.deviance,
@@ -277,5 +320,6 @@ def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> C
     trial = one.trials[0]
     there = cross_validate(base.linear, [change[None] for change in trial.change])
     gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
-    return Candidate(one.effect, trial.one.values, there.error, probability_by_chance(gain, count), gain,
+    by_chance = chance_of([trial.one], gain, base.posterior.freedom, count)
+    return Candidate(one.effect, trial.one.values, there.error, by_chance, gain,
                      before.deviance - there.deviance, ())

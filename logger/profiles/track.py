@@ -50,6 +50,19 @@ class Stance(Protocol):
     def contact_patch_m(self) -> float: ...
 
 
+class Resurfaced(Protocol):
+    """What a road is that differs from its profile; equal for two that differ alike."""
+
+    def __call__(self, spacing_m: float, elevation_m: Array) -> Array:
+        """Elevations of the road (n,), of those of a track in its profile (n,) at this spacing [m]."""
+
+    def __hash__(self) -> int: ...
+
+
+Surface = tuple[Resurfaced, ...]
+"""What is done to a profile, one after the other; nothing: the road is what its profile says."""
+
+
 @dataclass(frozen=True, eq=False)
 class Way:
     """The way of a car in fine steps of time, (M,) each: where the front tires stand [m], and when, from the first
@@ -65,6 +78,11 @@ class WheelTracks(Protocol):
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """Elevations (M, w) under the wheels on a way, and their means (M - 1, w) over each step [m]."""
+
+
+def under_surface(track: WheelTracks, surface: Surface) -> WheelTracks:
+    """What moves the wheels where a road differs from its profile. A rig does what it was told to."""
+    return track.resurfaced(surface) if surface and isinstance(track, Track) else track
 
 
 def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:
@@ -105,6 +123,11 @@ class Track:
         """What tires of the last few patches met: fits ask for the same ones hundreds of times."""
         return {}
 
+    @cached_property
+    def _resurfaced(self) -> dict[Surface, Track]:
+        """The roads of the last few surfaces."""
+        return {}
+
     @property
     def end_m(self) -> float:
         """Where the last sample lies [m]."""
@@ -118,6 +141,19 @@ class Track:
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""
         return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
+
+    def resurfaced(self, surface: Surface) -> Track:
+        """The road itself, of which this is a profile that differs from it."""
+        known = self._resurfaced.get(surface)  # another thread may put others in its place at any time
+        if known is None:
+            columns = self.elevation_m.reshape(len(self.elevation_m), -1).T
+            for one in surface:
+                columns = np.stack([one(self.spacing_m, column) for column in columns])
+            known = Track(self.spacing_m, columns.T.reshape(self.elevation_m.shape), self.start_m)
+            for old in [*self._resurfaced][:-_KEPT_PATHS + 1]:
+                self._resurfaced.pop(old, None)
+            self._resurfaced[surface] = known
+        return known
 
     def begun(self, later_s: float) -> Track:
         """The same for a record that begins so much later [s]: a road stays where it is."""

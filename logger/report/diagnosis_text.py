@@ -7,7 +7,7 @@ from typing import Any
 
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.unexplained import Shape
-from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
 from logger.report.band_text import band_json
@@ -27,12 +27,19 @@ def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     removed = removed_words(found.removed, found.band)
     lines = list(removed)
+    if found.rough_file:
+        lines.append("On the whole the car's masses, springs and dampers are off by more than their tolerance. They "
+                     f"were taken to be good to {found.tolerance:.0%} instead: the vehicle's file is a rough one, and "
+                     "small changes of the car cannot be seen with it (ridelog identify measures its numbers).")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
                      "is hardly more than the sensor's noise.")
+    if found.coloured and not found.exceeds_noise:
+        lines.append("The sensor's noise is louder at some frequencies than at others: it is as loud where the car is "
+                     "shaken little as where it is shaken much, and has nothing to do with the road.")
     if found.exceeds_noise:
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
                      f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
@@ -62,12 +69,17 @@ def untested(found: Diagnosis) -> list[str]:
     """Effects that these runs cannot show, and which drive would."""
     lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
     lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
-              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed. To see it: "
+              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed{_alike(one)}. To see it: "
               f"{one.effect.shown_by}."
               for one in found.undetectable[:_MOST_HIDDEN]]
     if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
         lines.append(f"These runs could also miss: {', '.join(rest)}.")
     return lines
+
+
+def _alike(one: Undetectable) -> str:
+    """What of the car hides an effect."""
+    return f": {one.alike}, within its tolerance, does nearly the same" if one.alike else ""
 
 
 def groups(found: Diagnosis) -> list[list[str]]:
@@ -148,6 +160,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
+        "tolerance": found.tolerance, "rough_file": found.rough_file, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},

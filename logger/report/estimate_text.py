@@ -52,7 +52,7 @@ def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
     columns = {
         "distance_start_m": windows.edges_m[:-1], "distance_end_m": windows.edges_m[1:],
         "speed_mps": windows.speed_mps, "iri_m_per_km": windows.iri_m_per_km,
-        "iri_std_m_per_km": windows.iri_std_m_per_km, "told": windows.resolved,
+        "iri_std_m_per_km": windows.iri_std_m_per_km, "resolved_share": windows.resolved,
         "limit_std_m_per_km": found.least_error_m_per_km,
     } | ({"iri_exact_m_per_km": found.exact_m_per_km} if found.compared else {})
     for *values, flags in zip(*(column.tolist() for column in columns.values()), windows.flags, strict=True):

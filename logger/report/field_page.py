@@ -49,8 +49,8 @@ def _tiles(story: Story, before: Assessment, after: Assessment) -> Html:
     return tiles([
         ("IRI is off by, at first", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
         ("At last", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
-        ("Error of the model, at first", f"{steps(story)[0][1]:.3f}", ""),
-        ("At last", f"{steps(story)[-1][1]:.3f}", ""),
+        ("Error of the model, at first", f"{steps(story)[0][1]:.3f}", "as its file says"),
+        ("At last", f"{steps(story)[-1][1]:.3f}", "refitted"),
     ])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 
 from logger.vehicle.effect import Chosen
 
@@ -53,12 +53,16 @@ def numbers_of(one: Chosen) -> str:
     """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none. Numbers that are given
     and are as they are when nothing is said are left out."""
     usual = {parameter.name: parameter.default for parameter in one.effect.parameters if parameter.given}
-    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items()
-                     if usual.get(name) != value)
+    inside = {parameter.name for parameter in one.effect.parameters
+              if parameter.is_free and not parameter.at_bound(one.values[parameter.name])}
+    return ", ".join(f"{name} {_with_unit(value, one.standard_errors.get(name), name, name in inside)}"
+                     for name, value in one.values.items() if usual.get(name) != value)
 
 
-def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:
-    return f"{measured(value, errors.get(name))} {unit_of(name)}".rstrip()
+def _with_unit(value: float, error: float | None, name: str, inside: bool) -> str:
+    """A number with its unit; one ``inside`` its range of which nothing is known is said to be so."""
+    unseen = " (these runs do not show it)" * (inside and error == inf)
+    return f"{measured(value, error)} {unit_of(name)}".rstrip() + unseen
 
 
 def chance(p_value: float) -> str:

@@ -21,7 +21,15 @@ def summary(found: UnknownRoadDiagnosis) -> list[str]:
         if candidate.confused_with:
             names = enumerated([one.effect.name, *candidate.confused_with], "and")
             lines.append(f"{names} explain about as much as each other: these drives cannot distinguish them.")
-    if not lines:
+        if candidate.stands_in:
+            lines.append(f"{one.effect.name} bends the laws of the car: in each drive over each stretch of road the "
+                         "linear car that comes nearest stood in for it, which its numbers are as right as.")
+    if found.undecided:
+        names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
+        lines.append(f"Not decided: {names} would explain a little, more than noise would, but less than a tenth of "
+                     f"what no road explains. {'They' if them else 'It'} may only imitate something else that is "
+                     "missing.")
+    elif not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
                for index, (words, error) in enumerate(_steps(found))]
@@ -87,6 +95,7 @@ def as_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess,
         "steps": [{"step": words, "error": error} for words, error in _steps(found)],
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
+        "undecided": [one.name for one in found.undecided],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
         "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "hidden": dict(found.hidden),
         "sentences": [*summary(found), *cannot_tell(found)],

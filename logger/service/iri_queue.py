@@ -10,10 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-from logger.dsp.windows import GridSamples, Window
+from logger.dsp.windows import Floats, GridSamples, Window
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 
@@ -36,14 +33,14 @@ class RoughnessQueue:
         self._leg: int | None = None
         self._expected = -1
 
-    def read(self, samples: GridSamples, distance_m: npt.NDArray[np.float64], leg: int) -> None:
+    def read(self, samples: GridSamples, distance_m: Floats, leg: int) -> None:
         """Samples of one leg with their travelled distance [m]; the leg before has ended (``end_leg``)."""
         if leg != self._leg:
             self._leg, self._expected = leg, -1
         estimates = self._estimator.push(
-            samples.reading_mps2,
-            samples.present & ~samples.interpolated,
-            np.where(samples.clipped, np.sign(samples.reading_mps2), 0.0),
+            samples.each_mps2,
+            samples.each_usable & (samples.present & ~samples.interpolated).reshape(-1, 1),
+            samples.each_at_end,
             distance_m,
         )
         self._take(estimates)

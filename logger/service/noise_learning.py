@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from drivers.disk import FileSystem
 from logger.estimation.noise_belief import NoiseBelief
+from logger.estimation.sensor_noise import Sensor
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig
 from logger.service.learnt_file import LearntFile, drives_words, value_of
 
@@ -30,7 +31,7 @@ _HIDING_STEP_MPS2 = 1.0
 
 @dataclass(frozen=True)
 class KnownNoise:
-    """What is believed of the noise of a reading on the 100 Hz grid, over how many drives it was learnt."""
+    """What is believed of the noise of a reading, over how many drives it was learnt."""
 
     belief: NoiseBelief
     drives: int = 0
@@ -81,7 +82,10 @@ def at_start(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
 
 def _identity(config: AccelerometerConfig) -> dict[str, Any]:
     """What the sensor is and how it is read, as far as its noise depends on that."""
-    return {"driver": config.driver, **config.kind.header(config.settings)}
+    readings = config.kind.readings(config.settings)
+    is_of_each = readings.oversample > 1 and Sensor(readings.noise_mps2, readings.step_mps2).is_coarse
+    return {"driver": config.driver, **config.kind.header(config.settings),
+            **({"reads": readings.oversample} if is_of_each else {})}
 
 
 class NoiseLearning:

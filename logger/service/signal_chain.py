@@ -62,7 +62,7 @@ class SignalChain:
                   the next multiple above it
     low_pass_hz   corner of a second-order low-pass; None: not used
     coarse        the sensor's steps are larger than its noise: its readings are passed on as they were read, not
-                  interpolated to the grid
+                  interpolated to the grid, and each of them
     make_filter   the arithmetic of the recursive filters: ``BlockFilter``, or ``FixedFilter.for_acceleration``
     """
 
@@ -71,6 +71,7 @@ class SignalChain:
         self._axis = axis
         self._coarse = coarse
         self._oversample = oversample
+        self._reads = oversample if coarse else 1
         self._resampler = GridResampler(GRID_RATE_HZ * oversample)
         self._decimator = Decimator(oversample)
         self._high_pass = make_filter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
@@ -187,7 +188,7 @@ class SignalChain:
             return []
         values = np.interp(t_us, [begin_us - GRID_STEP_US, end_us], [from_mps2, to_mps2])
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
-        return self._filter(t_us, values, values, nowhere, nowhere, nowhere)
+        return self._filter(t_us, values, values, nowhere, nowhere, nowhere, _unread(len(t_us), self._reads))
 
     def _absent(self, begin_us: int, end_us: int) -> GridSamples:
         t_us = _grid_us(begin_us, end_us)
@@ -195,16 +196,21 @@ class SignalChain:
             self._next_us = int(t_us[-1]) + GRID_STEP_US
         zero = np.zeros(len(t_us))
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
-        return GridSamples(t_us, zero, zero, zero, zero, nowhere, nowhere, nowhere, nowhere)
+        return GridSamples(t_us, zero, zero, zero, zero, nowhere, nowhere, nowhere, nowhere,
+                           *_unread(len(t_us), self._reads))
 
     def _samples(self, run: GridRun) -> list[GridSamples]:
         t_us = run.t0_us + GRID_STEP_US * np.arange(len(run.values), dtype=np.int64)
         everywhere = np.ones(len(t_us), dtype=np.bool_)
         reading = run.nearest if self._coarse else run.values
-        return self._filter(t_us, run.values, reading, everywhere, run.bridged, run.clipped)
+        each, each_clipped = reading[:, None], run.clipped[:, None]
+        if self._reads > 1 and run.each is not None and run.each_clipped is not None:
+            each, each_clipped = run.each, run.each_clipped
+        own = each, np.isfinite(each), np.where(each_clipped, np.sign(each), 0.0)
+        return self._filter(t_us, run.values, reading, everywhere, run.bridged, run.clipped, own)
 
-    def _filter(self, t_us: Times, values: Floats, reading: Floats, present: Bools, interpolated: Bools, clipped: Bools
-                ) -> list[GridSamples]:
+    def _filter(self, t_us: Times, values: Floats, reading: Floats, present: Bools, interpolated: Bools, clipped: Bools,
+                own: tuple[Floats, Bools, Floats]) -> list[GridSamples]:
         """Run the filters over more samples. The weighting is some whole samples behind; as many wait for it, and its
         first outputs belong to instants before the start."""
         self._next_us = int(t_us[-1]) + GRID_STEP_US
@@ -216,7 +222,7 @@ class SignalChain:
         self._since_start += len(values)
         weighted = self._weighting.process(values)
         blank = np.zeros(len(values))
-        waiting = GridSamples(t_us, reading, accel, blank, blank, present, interpolated, settled, clipped)
+        waiting = GridSamples(t_us, reading, accel, blank, blank, present, interpolated, settled, clipped, *own)
         early = min(self._early, len(weighted))
         self._early -= early
         weighted = weighted[early:]
@@ -243,6 +249,11 @@ class SignalChain:
 def _grid_us(begin_us: int, end_us: int) -> Times:
     """Instants of the grid from ``begin_us`` to half a step before ``end_us``."""
     return np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
+
+
+def _unread(count: int, reads: int) -> tuple[Floats, Bools, Floats]:
+    """Of samples none of whose readings came: what ``GridSamples`` has of each."""
+    return np.zeros((count, reads)), np.zeros((count, reads), dtype=np.bool_), np.zeros((count, reads))
 
 
 def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:

@@ -41,16 +41,19 @@ from logger.vehicle.linearise import known_car
 from logger.vehicle.uncertain import cars_off
 from logger.vehicle.vehicle import Vehicle
 
+_READS = "reads"  # how many readings per sample there are, each of which has the noise that is said
 _FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
-    description for the logs.
+    """What the settings say about the accelerometer: its decoder, what its readings are, and a description for the
+    logs.
 
-    noise    what is believed of the noise of a reading on the grid, which the pipeline then learns; None: it is that of
-             the sensor
+    sensor   of a reading: of each of them where the steps are larger than the noise, else of what several per sample of
+             the 100 Hz grid are thinned out to
+    noise    what is believed of the noise of such a reading, which the pipeline then learns; None: it is that of the
+             sensor
     """
 
     decoder: Decoder
@@ -58,6 +61,16 @@ class Instrument:
     sensor: Sensor
     description: dict[str, Any]
     noise: NoiseBelief | None = None
+
+    @property
+    def reads(self) -> int:
+        """Readings of each sample of the grid that the road's estimate is made of."""
+        return self.oversample if self.sensor.is_coarse else 1
+
+    def on_grid(self, noise_mps2: float) -> Sensor:
+        """Of the samples of the grid, for such a noise of a reading: the mean of several is taken to have no steps."""
+        reading = Sensor(noise_mps2, self.sensor.step_mps2)
+        return reading if self.reads == 1 else _thinned(reading, self.reads)
 
 
 def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> Instrument:
@@ -69,13 +82,18 @@ def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> 
     readings = kind.readings(settings)
     given = config.noise_mps2
     sensor = Sensor(given if isinstance(given, float) else readings.noise_mps2, readings.step_mps2)
-    if readings.oversample > 1:  # the mean of several readings is on no step any more
-        sensor = Sensor(sqrt(sensor.variance_mps2_2 / readings.oversample), 0.0)
+    if readings.oversample > 1 and not sensor.is_coarse:
+        sensor = _thinned(sensor, readings.oversample)
     decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
     noise = None
     if given == AUTO:
         noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2)
     return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)}, noise)
+
+
+def _thinned(reading: Sensor, count: int) -> Sensor:
+    """Of the mean of ``count`` readings, whose rounding has become noise."""
+    return Sensor(sqrt(reading.variance_mps2_2 / count), 0.0)
 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
@@ -116,9 +134,10 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
         ride_ahead_m=settings.front_axle_ahead_m,
         off=off,
         driven_share=_driven_share(composed),
+        reads=sensor.reads,
     )
     alignment = DriveAlignment(axis.column, axis.sign)
-    columns = ComfortColumns(_noise_floor(sensor.sensor, low_pass_hz), sensor.sensor)
+    columns = ComfortColumns(_noise_floor(sensor, low_pass_hz), sensor.sensor)
     relation = rms_relation(car, recorder_gain(low_pass_hz))
     return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns)
 
@@ -139,10 +158,10 @@ def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
                        make_filter)
 
 
-def _noise_floor(sensor: Sensor, low_pass_hz: float | None) -> NoiseFloor:
+def _noise_floor(sensor: Instrument, low_pass_hz: float | None) -> NoiseFloor:
     f_hz = np.linspace(0.0, GRID_RATE_HZ / 2, _FLOOR_LINES)
     gain = np.abs(weighted_response(WEIGHTING, low_pass_hz)(f_hz))
-    return NoiseFloor(gain, GRID_RATE_HZ, sensor.step_mps2)
+    return NoiseFloor(gain, GRID_RATE_HZ, sensor.sensor.step_mps2, sensor.reads)
 
 
 def notices(vehicle: Vehicle) -> tuple[str, ...]:
@@ -180,7 +199,8 @@ def _noise_said(config: AccelerometerConfig, known: KnownNoise | None) -> dict[s
     """For a dump's header and a sidecar: the noise that a drive began with; nothing where it is what is usual."""
     if config.noise_mps2 is None:
         return {}
-    return {"noise": {"noise_mps2": config.noise_mps2, **(noise_learning.header_fields(known) if known else {})}}
+    of = {_READS: reads} if known and (reads := instrument(config).reads) > 1 else {}
+    return {"noise": {"noise_mps2": config.noise_mps2, **(noise_learning.header_fields(known) if known else {}), **of}}
 
 
 def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNoise | None = None) -> DumpHeader:
@@ -234,8 +254,11 @@ def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") ->
     Raises BadInput, beginning with ``place``, where the recording says what cannot be."""
     if config.accelerometer.noise_mps2 != AUTO:
         return None
+    said = header.accelerometer.get("noise", {})
     try:
-        return noise_learning.from_fields(header.accelerometer.get("noise", {}))
+        known = noise_learning.from_fields(said)
+        # Recordings by programs that learnt the noise of the mean of several readings say nothing of one.
+        return known if said.get(_READS, 1) == instrument(config.accelerometer).reads else None
     except ValueError as error:
         raise BadInput(f"{place}: {error}") from None
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ from logger.vehicle.effect import (
     ForceEffect,
     RecordEffect,
     Recording,
+    RoadEffect,
     SensorEffect,
     VehicleEffect,
 )
@@ -96,6 +98,17 @@ class Car:
         return accel_z_mps2
 
 
+@dataclass(frozen=True)
+class _Resurfaced:
+    """What an effect does to a profile."""
+
+    effect: RoadEffect
+    values: tuple[tuple[str, float], ...]
+
+    def __call__(self, spacing_m: float, elevation_m: Array) -> Array:
+        return self.effect.road(SimpleNamespace(**dict(self.values)), spacing_m, elevation_m)
+
+
 @dataclass(frozen=True, eq=False)
 class Response:
     """What a car did on a passage of N samples.
@@ -122,6 +135,10 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     structure = structure_of(vehicle)
     if (given, vehicle.model) == ("half_car", "full_car"):
         structure = replace(structure, sides=2)
+    surface = tuple(_Resurfaced(one.effect, tuple(sorted(one.values.items())))
+                    for one in ordered if isinstance(one.effect, RoadEffect))
+    if surface:
+        structure = replace(structure, surface=surface)
     for one in ordered:
         if isinstance(one.effect, BodyEffect):
             structure = one.effect.structure(one.p, structure)

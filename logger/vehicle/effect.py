@@ -3,8 +3,9 @@
 Problem: a car does more than its linear model, in some twenty ways that come alone and together; and users bring ways
 of their own. Simulation, fits, diagnosis and reports must not know any of them by name. Solution: an effect is one file
 that offers ``EFFECT``: a name, its parameters with units and bounds, a source, words on what it leaves in a
-measurement, and one function. There are six kinds of function, one for each place between road and record:
+measurement, and one function. There are seven kinds of function, one for each place between road and record:
 
+    RoadEffect      the road under the wheels            profile written -> profile of the road
     DriveEffect     where the car was                    distance recorded -> distance driven
     VehicleEffect   the numbers of the car               vehicle -> vehicle
     BodyEffect      what hangs on the body               structure -> structure
@@ -199,6 +200,11 @@ class Effect(ABC):
         names = [one.name for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
 
+    def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
+        """Values that delay slow motions so much that distances which were fitted without it have absorbed the delay: a
+        search tries them with its delay taken out of the distances. Of each kind, those that do more and more."""
+        return []
+
     def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
         """Whether something else than the model's error speaks for it at these values."""
         return False
@@ -234,6 +240,16 @@ class DriveEffect(Effect):
     @abstractmethod
     def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
         """Where the front tires truly were (n,) when these distances were recorded [m]."""
+
+
+class RoadEffect(Effect):
+    """The road, where the profile that was written of it differs from what the wheels met."""
+
+    needs_road = True
+
+    @abstractmethod
+    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
+        """Elevations of the road itself (n,) along one track, of those in its profile (n,) at this spacing [m]."""
 
 
 class VehicleEffect(Effect):

@@ -139,7 +139,7 @@ class LinearCar:
         """Whether it is another car where the road or the speed is another one: never."""
         return False
 
-    def at(self, speed_mps: float, wave_number_cpm: Array, psd_m3: Array) -> LinearCar:
+    def at(self, speed_mps: float, wave_number_cpm: Array, psd_m3: Array, like: LinearCar | None = None) -> LinearCar:
         """This car at a speed on a road of some spectrum: itself."""
         return self
 
@@ -204,17 +204,19 @@ class LinearCar:
     def _matrices(self) -> tuple[Array, Array]:
         """Damping and stiffness (n, n) with the laws of the corners, as far as these are springs and dampers; of a
         damper behind a mount as if that were rigid."""
-        structure = self.structure
-        damping, stiffness = structure.damping, structure.stiffness
-        for i, one in enumerate(self.corners):
-            travel, wheel = structure.travel[i], structure.wheels[i]
-            whole, resting = (float(one.tire(np.asarray(s), structure.tires[i]).real) for s in (1.0, 0.0))
-            damped = one.damper_n_s_per_m + one.beside_n_s_per_m - structure.dampers[i]
-            damping = (damping + damped * np.outer(travel, travel) + (whole - resting) * np.outer(wheel, wheel)
-                       + one.wheel_n_s_per_m * np.outer(wheel, wheel)
-                       + one.body_n_s_per_m * np.outer(travel + wheel, travel + wheel))
-            stiffness = (stiffness + one.spring_n_per_m * np.outer(travel, travel)
-                         + resting * np.outer(wheel, wheel))
+        structure, corners = self.structure, self.corners
+        travel, wheel = structure.travel, structure.wheels
+        body = travel + wheel
+        damped = np.array([one.damper_n_s_per_m + one.beside_n_s_per_m for one in corners]) - structure.dampers
+        at_wheel = np.array([one.contact * one.tire_damping_n_s_per_m + one.wheel_n_s_per_m for one in corners])
+        at_body = np.array([one.body_n_s_per_m for one in corners])
+        springs = np.array([one.spring_n_per_m for one in corners])
+        resting = np.array([one.contact * (tire + one.tire_n_per_m) - tire
+                            for one, tire in zip(corners, structure.tires, strict=True)])
+        damping = (structure.damping + travel.T @ (damped[:, None] * travel) + wheel.T @ (at_wheel[:, None] * wheel)
+                   + body.T @ (at_body[:, None] * body))
+        stiffness = (structure.stiffness + travel.T @ (springs[:, None] * travel)
+                     + wheel.T @ (resting[:, None] * wheel))
         return damping, stiffness
 
     def _dynamic(self, s: Complex) -> tuple[Complex, Complex]:

@@ -19,6 +19,7 @@ from logger.vehicle.effect import (
     Parameter,
     RecordEffect,
     Recording,
+    RoadEffect,
     Scale,
     SensorEffect,
     Sought,
@@ -28,7 +29,7 @@ from logger.vehicle.laws import linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
 
-KINDS = (DriveEffect, VehicleEffect, BodyEffect, ForceEffect, SensorEffect, RecordEffect)
+KINDS = (RoadEffect, DriveEffect, VehicleEffect, BodyEffect, ForceEffect, SensorEffect, RecordEffect)
 WORDS = ("name", "title", "source", "signature", "shown_by")
 # What a vehicle's file says of an effect beside its parameters.
 KEYS = ("name", "file", "standard_errors")
@@ -94,7 +95,9 @@ def _look_through(one: Parameter) -> None:
 
 def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
     """Ask a watched effect once on a car, as far as a simulation does."""
-    if isinstance(effect, DriveEffect):
+    if isinstance(effect, RoadEffect):
+        effect.road(p, 0.1, 0.01 * np.sin(np.arange(0.0, 100.0, 0.1)))
+    elif isinstance(effect, DriveEffect):
         effect.driven(p, np.linspace(0.0, 1000.0, 11))
     elif isinstance(effect, VehicleEffect):
         effect.vehicle(p, vehicle)

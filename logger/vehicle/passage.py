@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import Way, WheelTracks
+from logger.profiles.track import Way, WheelTracks, under_surface
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure
 
@@ -65,7 +65,7 @@ class Passage:
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
         self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
         self._recorder = _recorder(self._coarse, self.steps)
-        self._known: dict[tuple[float, ...], tuple[Array, Array]] = {}
+        self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
 
     @property
@@ -86,10 +86,10 @@ class Passage:
     def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins."""
-        place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m))
+        place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
-            elevation, mean = self.track.under_wheels(self._way, structure)
+            elevation, mean = under_surface(self.track, structure.surface).under_wheels(self._way, structure)
             level = elevation[0, 0]
             known = elevation - level, mean - level
             self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}

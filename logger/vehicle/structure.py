@@ -24,6 +24,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.track import Surface
 from logger.vehicle.vehicle import Axle
 
 Array = npt.NDArray[np.float64]
@@ -65,6 +66,7 @@ class Structure:
                                 tire [N/m]
     sides                       how many times the masses that a person gives are in it: twice, where a half car was
                                 made whole
+    surface                     how the road that it meets differs from the profile that was written of it
     """
 
     mass: Array
@@ -81,6 +83,7 @@ class Structure:
     dampers: Array
     tires: Array
     sides: int = 1
+    surface: Surface = ()
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""

@@ -26,6 +26,7 @@ from logger.vehicle.effect import (
     Misalignment,
     RecordEffect,
     Recording,
+    RoadEffect,
     SensorEffect,
     VehicleEffect,
 )
@@ -74,6 +75,12 @@ class _Watched(Effect):
                 if not isinstance(value, Real):
                     raise ValueError(f"expected trials to answer with a number as {name}, found {value!r}")
             return [self.checked(one) for one in found]
+
+
+class _WatchedRoad(_Watched, RoadEffect):
+    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
+        with self._blame(), np.errstate(all="ignore"):
+            return _numbers("road", self._own.road(p, spacing_m, elevation_m.copy()), elevation_m)
 
 
 class _WatchedDrive(_Watched, DriveEffect):
@@ -149,8 +156,8 @@ class _WatchedRecord(_Watched, RecordEffect):
 
 
 _WATCHED: dict[type[Effect], type[_Watched]] = {
-    DriveEffect: _WatchedDrive, VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody, ForceEffect: _WatchedForce,
-    SensorEffect: _WatchedSensor, RecordEffect: _WatchedRecord,
+    RoadEffect: _WatchedRoad, DriveEffect: _WatchedDrive, VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody,
+    ForceEffect: _WatchedForce, SensorEffect: _WatchedSensor, RecordEffect: _WatchedRecord,
 }
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from logger.api.same_road import records_of
 from logger.errors import BadInput
-from logger.runs import RecordFacts
+from logger.runs import BY_RECEIVER, BY_ROAD, RecordFacts
 from logger.store.formats.drive_file import Drive
 
 METRES_PER_DEG = 111_195.0
@@ -48,6 +48,18 @@ def test_other_drives_keep_their_distances() -> None:
     drives = [drive(name, 8.0, 40.0, 30.0, facts) for name, facts in (("a", RecordFacts()), ("bb", EXTRACTED))]
     for one, (given, _) in zip(records_of(drives), drives, strict=True):
         assert one.distance_m is given.distance_m or (one.distance_m == given.distance_m).all()
+
+
+def test_drives_by_the_road_and_by_the_receiver_are_laid_on_one_distance() -> None:
+    """One was matched to a measured line, which counts from elsewhere; the other counts from its own start."""
+    (by_road, name), other = (drive(name, speed, starts, 60.0, EXTRACTED) for name, speed, starts in
+                              (("a", 11.0, 0.0), ("bb", 8.0, 40.0)))
+    by_road = replace(by_road, distance_m=by_road.distance_m + 300.0, facts=replace(EXTRACTED, places_by=BY_ROAD))
+    found = records_of([(by_road, name), other])
+    assert {one.facts.places_by for one in found} == {BY_RECEIVER}
+    moved = other[0].speed_mps > 0
+    assert found[0].distance_m[0] == pytest.approx(300.0, abs=0.5)
+    assert found[1].distance_m == pytest.approx(340.0 + other[0].distance_m[moved], abs=2.5)
 
 
 def test_a_drive_that_goes_elsewhere_is_refused() -> None:

@@ -231,17 +231,22 @@ def roads(levels: tuple[float, ...], length_m: float, draw: int = 0) -> tuple[Ro
 
 
 def reported(sensor: Accelerometer) -> Sensor:
-    """What the estimator knows of a sensor. Fast readings with their noise make a sum without steps."""
-    if sensor.oversample == 1:
-        return Sensor(sensor.noise_mps2, sensor.step_mps2)
-    return Sensor(sqrt((sensor.noise_mps2**2 + sensor.step_mps2**2 / 12) / sensor.oversample), 0.0)
+    """What the estimator knows of a sensor. Fast readings whose noise blurs their steps make a mean without steps."""
+    reading = Sensor(sensor.noise_mps2, sensor.step_mps2)
+    if sensor.oversample == 1 or reading.is_coarse:
+        return reading
+    return Sensor(sqrt(reading.variance_mps2_2 / sensor.oversample), 0.0)
 
 
-def on_grid(drive: Drive, sensor: Accelerometer, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Readings at 100 Hz, and which of them have a reading in them that stood at an end of the range."""
+def on_grid(drive: Drive, sensor: Accelerometer, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Readings thinned to 100 Hz; those that the estimator is given (n, k), and which of them stood at an end of the
+    range."""
     readings, clipped = sensor.read(drive.accel_mps2, rng)
     thin = thinned(readings, sensor.oversample)
-    return thin, np.any(clipped[: len(thin) * sensor.oversample].reshape(len(thin), -1), axis=1)
+    each = slice(len(thin) * sensor.oversample)
+    if reported(sensor).is_coarse:
+        return thin, readings[each].reshape(len(thin), -1), clipped[each].reshape(len(thin), -1)
+    return thin, thin[:, None], np.any(clipped[each].reshape(len(thin), -1), axis=1, keepdims=True)
 
 
 class Spent:
@@ -255,12 +260,14 @@ class Spent:
 def estimates(
     sensor: Sensor, readings: Array, clipped: Array, travelled_m: Array, window_m: float, spent: Spent | None = None
 ) -> dict[int, tuple[float, float]]:
-    """The estimator fed as the service feeds it: IRI and its standard error [m/km] by number of the window."""
+    """The estimator fed as the service feeds it, with readings (n,) or (n, k): IRI and its standard error [m/km] by
+    number of the window."""
     structure = half_car.structure(rav4())
     started_s = time.process_time()
-    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), sensor, window_m)
+    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), sensor, window_m,
+                              reads=readings.size // len(readings))
     found = []
-    usable = np.ones(len(readings), dtype=np.bool_)
+    usable = np.ones(readings.shape, dtype=np.bool_)
     at_end = np.where(clipped, np.sign(readings - np.median(readings)), 0.0)
     for low in range(0, len(readings), PUSH):
         part = slice(low, low + PUSH)
@@ -291,12 +298,12 @@ def exact_drive(
     """A steady drive over one lap of the road, the way known exactly. The estimator believes it sits in ``rav4``."""
     rng = np.random.default_rng([FIRST_SEED, seed, round(10 * road.level_m_per_km), round(mph)])
     drive = steady_drive(car, road, mph * MPH_MPS, LEAD_S, GRID_HZ * sensor.oversample)
-    readings, clipped = on_grid(drive, sensor, rng)
+    readings, each, clipped = on_grid(drive, sensor, rng)
     place_m = drive.place_m[:: sensor.oversample][: len(readings)]
     travelled_m = place_m - place_m[0]
     numbers = np.arange(np.ceil(-place_m[0] / window_m), np.floor((road.length_m - place_m[0]) / window_m)).astype(int)
     begin_m = place_m[0] + numbers * window_m
-    found = estimates(reported(sensor), readings, clipped, travelled_m, window_m, spent)
+    found = estimates(reported(sensor), each, clipped, travelled_m, window_m, spent)
     nothing = (np.nan, np.nan)
     estimate, std = np.array([found.get(number, nothing) for number in numbers.tolist()]).T
     limit = np.full(len(numbers), np.nan)

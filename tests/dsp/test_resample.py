@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -254,6 +255,22 @@ def test_marks_go_to_the_sample_around_which_they_stood() -> None:
     run.clipped[[3, 4, 400]] = True
     [slow] = decimated(8, [run])
     np.testing.assert_array_equal(np.flatnonzero(slow.clipped), [0, 1, 50])
+
+
+def test_the_readings_that_were_thinned_out_come_along() -> None:
+    """From each sample up to the next, in pieces too; one that was missing, and what no reading came for, is none."""
+    values = np.arange(29.0)
+    run = replace(fast_run(values, 4), bridged=values == 5, clipped=values == 9)
+    decimator = Decimator(4)
+    runs = [*split(run, [3, 10, 11]), fast_run(-values, 4, t0_us=700_000)]
+    ready = [slow for one in runs for slow in decimator.push(one)] + decimator.flush()
+    begins = [number for number, slow in enumerate(ready) if slow.new_start]
+    each, clipped = (np.concatenate([getattr(slow, name) for slow in ready]) for name in ("each", "each_clipped"))
+    assert len(begins) == 2 and len(each) == len(clipped) == 16
+    expected = np.append(np.where(values == 5, np.nan, values), [np.nan] * 3).reshape(8, 4)
+    np.testing.assert_array_equal(each[:8], expected)
+    np.testing.assert_array_equal(np.flatnonzero(clipped), [9])
+    np.testing.assert_array_equal(each[8:15], -values[:28].reshape(7, 4))
 
 
 def test_factor_one_changes_nothing_and_zero_is_refused() -> None:

@@ -21,7 +21,8 @@ def samples(count: int, seed: int = 0, present: np.ndarray | None = None) -> Gri
     accel = rng.normal(size=count)
     there = yes if present is None else present
     t_us = STEP_US * np.arange(count, dtype=np.int64)
-    return GridSamples(t_us, accel, accel, 0.5 * accel, np.abs(accel), there, no, yes, no)
+    return GridSamples(t_us, accel, accel, 0.5 * accel, np.abs(accel), there, no, yes, no, accel[:, None],
+                       yes[:, None], np.zeros((count, 1)))
 
 
 def push(cutter: WindowCutter, part: GridSamples, distance_m: np.ndarray, speed_mps: np.ndarray) -> list[Window]:

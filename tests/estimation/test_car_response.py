@@ -16,7 +16,9 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.models import structure_of
+from logger.vehicle.named_parameters import changed
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace
 
@@ -72,3 +74,18 @@ def test_golden_car_slope_is_that_of_the_exact_filter() -> None:
 def test_golden_car_on_a_grid_is_kept() -> None:
     assert golden_car_on_grid(64, 0.15) is golden_car_on_grid(64, 0.15)
     assert golden_car_on_grid(64, 0.15) == pytest.approx(golden_car_slope(np.fft.rfftfreq(64, 0.15)))
+
+
+def test_what_other_numbers_change_is_looked_up_nearly_exactly() -> None:
+    """Weighted by the reading's power on a common road, against the responses themselves."""
+    vehicle, speed_mps = read_vehicle(vehicle_file("rav4-2009")), 16.0
+    own, *off = (known_vehicle(changed(vehicle, moved)) for moved in (
+        {}, {"sprung_mass_kg": 910.0}, {"front.tire_stiffness_n_per_m": 2.6e5}, {"rear.cg_distance_m": 1.52}))
+    cars = [one.at(speed_mps, WAVE_NUMBERS_CPM, WAVE_NUMBERS_CPM) for one in (own, *off)]
+    response = CarResponse(cars[0], cars[1:])
+    speed_mps = np.exp(round(np.log(speed_mps) * 20) / 20)
+    f_hz = WAVE_NUMBERS_CPM * speed_mps
+    whole = np.array([one.response(f_hz, speed_mps) for one in cars])
+    power = response.power(speed_mps) * WAVE_NUMBERS_CPM**-1.0
+    found, exact = response.changes(speed_mps), whole[1:] / whole[0] - 1
+    assert ((np.abs(found - exact) ** 2) @ power < 0.03**2 * (np.abs(exact) ** 2) @ power).all()

@@ -65,7 +65,8 @@ def scaled(step_mps2: float, reading: np.ndarray, beyond_mps2: np.ndarray | floa
     road = FollowedRoad(Sensor(NOISE_MPS2, step_mps2), SPACING_M, 0.05, before)
     usable, way = np.ones(COUNT, dtype=bool), felt()[1][:COUNT]
     block = Block(TimeGrid(CarResponse(CAR), COUNT, 100.0), way, SPACING_M, 7.62)
-    road.solved(block, Samples(reading[:COUNT] - beyond_mps2, usable, np.zeros(COUNT), way), usable, beyond_mps2)
+    column = (reading[:COUNT] - beyond_mps2)[:, None]
+    road.solved(block, Samples(column, usable[:, None], np.zeros((COUNT, 1)), way), usable, beyond_mps2)
     assert road.noise is not None
     return road.scale_log_std / road.noise.log_std
 

@@ -28,11 +28,11 @@ def line(rms_mps2: float, samples: int) -> Array:
 
 def followed(residual: Array, variance: Array, road_psd: Array = NOTHING) -> OtherMotion:
     """What is found of residuals (n,) of these variances (n,), block by block."""
-    found = OtherMotion(RATE_HZ)
+    found = OtherMotion()
     for low in range(0, len(residual) - COUNT, HOP):
         part = slice(low, low + COUNT)
         found.move_on(HOP)
-        found.learn(residual[part], 1 / variance[part], road_psd)
+        found.learn(residual[part], 1 / variance[part], SteadyMotion(road_psd, RATE_HZ))
         found.find(residual[part], 1 / variance[part])
     return found
 

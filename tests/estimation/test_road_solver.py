@@ -26,9 +26,9 @@ def car(name: str) -> Structure:
 
 
 @cache
-def time_grid(name: str, count: int, ahead_m: float = 0.0) -> TimeGrid:
+def time_grid(name: str, count: int, ahead_m: float = 0.0, reads: int = 1) -> TimeGrid:
     structure = car(name)
-    return TimeGrid(CarResponse(LinearCar(structure, body_point(structure, ahead_m))), count, RATE_HZ)
+    return TimeGrid(CarResponse(LinearCar(structure, body_point(structure, ahead_m))), count, RATE_HZ, reads)
 
 
 def way(count: int, speeds_mps: list[float], rate_hz: float = RATE_HZ) -> np.ndarray:
@@ -109,6 +109,35 @@ def test_the_transpose_is_one(name: str) -> None:
     road, row = rng.standard_normal(block.count), rng.standard_normal(1024)
     back = np.fft.irfft(block.transposed(row), block.count)
     assert block.driven(np.fft.rfft(road)) @ row == pytest.approx(road @ back, rel=1e-10)
+
+
+def test_readings_between_samples_are_those_of_the_same_motion() -> None:
+    """Eight readings per sample: each eighth is that of one per sample, the others lie where a sine would put them, and
+    the transpose is one. A weight stands for as much information as it has, however it is spread over a sample."""
+    rng = np.random.default_rng(3)
+    count, reads = 1024, 8
+    distance_m = way(count, [20.0, 20.0])
+    single, several = (Block(time_grid("rav4-2009", count, reads=many), distance_m, SPACING_M, ALIGN_M)
+                       for many in (1, reads))
+    wave = np.zeros(single.count // 2 + 1, dtype=complex)
+    wave[30] = single.count * 1e-3
+    found = several.driven(wave)
+    assert found[::reads] == pytest.approx(single.driven(wave), abs=1e-12)
+    middle = slice(400 * reads, 900 * reads)
+    f_hz = 30 / (single.count * SPACING_M) * 20.0
+    angle = 2 * np.pi * f_hz * np.arange(count * reads)[middle] / (RATE_HZ * reads)
+    basis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    fitted, *_ = np.linalg.lstsq(basis, found[middle], rcond=None)
+    assert (basis @ fitted - found[middle]).std() < 0.01 * found[middle].std()
+    road, row = rng.standard_normal(several.count), rng.standard_normal(count * reads)
+    back = np.fft.irfft(several.transposed(row), several.count)
+    assert several.driven(np.fft.rfft(road)) @ row == pytest.approx(road @ back, rel=1e-10)
+    weight = weights(count)
+    weight[-200:] = 0.0  # the end of a block meets its beginning
+    one = single.solve(found[::reads] + 9.8, weight, ROAD, even(single), 300)
+    many = several.solve(found + 9.8, np.repeat(weight, reads) / reads, ROAD, even(several), 300)
+    assert many.gain == pytest.approx(one.gain)
+    assert np.abs(many.road - one.road).max() < 0.02 * np.abs(one.road).max()
 
 
 def dense(block: Block, spectrum: RoadSpectrum) -> np.ndarray:

@@ -372,3 +372,44 @@ def test_pieces_of_road_join_and_have_the_roads_shape() -> None:
         bent = [row - np.polyval(np.polyfit(place, row, 2), place) for row in (exact, piece.elevation_m)]
         correlations.append(np.corrcoef(*bent)[0, 1])
     assert np.median(correlations) > 0.85  # what is resolved by less than a half is missing
+
+
+@pytest.mark.parametrize("range_g", [2, 4])
+def test_reading_several_times_per_sample_gains_and_its_errors_are_right(range_g: int) -> None:
+    """Slow drives over roads that hide in the steps: four readings per sample, each twice as noisy, against one. Taken
+    as bounds their errors come out right; with their mean taken to have no steps they were too small by half."""
+    step = 9.80665 * range_g / 32
+    off: dict[int, list[float]] = {1: [], 4: []}
+    squares: dict[int, list[float]] = {1: [], 4: []}
+    for seed, (iri, offset) in enumerate([(3.0, 0.0), (8.0, 0.3), (3.0, 0.5), (8.0, -0.2)]):
+        finer = 4
+        seconds, speed_mps = 60.0, 9.0
+        distance_m = speed_mps * np.arange(round(seconds * 100 * finer)) / (100 * finer)
+        road = iso8608.generate(iso8608.gd_n0_from_iri(iri), distance_m[-1] + LEAD_M + 30, 0.05, 40 + seed)
+        body = [body_point(car("rav4-2009"))]
+        accel = drive(car("rav4-2009"), body, Track(0.05, road, -LEAD_M), np.arange(len(distance_m)) / (100 * finer),
+                      distance_m)[:, 0]
+        edges = LEAD_M + WINDOW_M * np.arange(int(distance_m[-1] / WINDOW_M) + 1)
+        exact = window_iri(rectified_slope(road, 0.05), 0.05, edges)
+        for reads, noise in ((1, 0.1), (4, 0.2)):
+            rng = np.random.default_rng([seed, reads])
+            felt = accel[::finer // reads] + 9.8 + offset * step
+            reading = step * np.rint((felt + noise * rng.standard_normal(len(felt))) / step).reshape(-1, reads)
+            structure = car("rav4-2009")
+            estimator = RoadEstimator(LinearCar(structure, body_point(structure)), Sensor(noise, step), WINDOW_M,
+                                      reads=reads)
+            found = estimator.push(reading, np.ones(reading.shape, dtype=bool), np.zeros(reading.shape),
+                                   distance_m[::finer]) + estimator.finish()
+            errors = [(one.iri_m_per_km - exact[one.number], one.iri_std_m_per_km) for one in found if not one.flags]
+            off[reads] += [abs(error) / std for error, std in errors]
+            squares[reads] += [error**2 / iri**2 for error, _ in errors]
+    shares = [float(np.mean(np.array(off[4]) <= times)) for times in (1, 2)]
+    print(f"{range_g} g: in 1 and 2 {shares}, mean square {np.mean(squares[4]):.3f} of {len(squares[4])} against "
+          f"{np.mean(squares[1]):.3f} of {len(squares[1])}")
+    assert len(squares[4]) >= len(squares[1]) and np.mean(squares[4]) < 0.95 * np.mean(squares[1])
+    assert 0.58 < shares[0] < 0.82 and shares[1] > 0.9
+
+
+def test_several_readings_per_sample_that_are_no_bounds_are_refused() -> None:
+    with pytest.raises(ValueError, match="one reading per sample"):
+        RoadEstimator(LinearCar(car("rav4-2009"), body_point(car("rav4-2009"))), FINE, WINDOW_M, reads=4)

@@ -10,7 +10,9 @@ import pytest
 
 from logger.lab.diagnosis import ALREADY_PRESENT, CONFLICT_SIGMA, Diagnosis, diagnose, obstacles_of
 from logger.lab.likelihood.noise_floor import UNEXPLAINED
+from logger.lab.likelihood.priors import Tolerance, VehiclePrior, is_length
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.report.diagnosis_text import summary
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
@@ -78,6 +80,18 @@ def test_numbers_within_their_tolerance_lack_no_physics() -> None:
     assert nothing_is_missing(diagnosed(secret_runs(car=car)))
 
 
+@pytest.mark.slow
+def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
+    rng = np.random.default_rng(5)
+    names = np.array(VehiclePrior.of(CAR, Tolerance()).names)
+    numbers = names[~is_length(tuple(names))]
+    car = changed(CAR, {name: read(CAR, name) * (1 + float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.1)))
+                        for name in numbers})
+    found = diagnosed(secret_runs(car=car, lasts_s=30.0, rougher=2.0), (*FEW, "cg_shift", "occupant"))
+    assert nothing_is_missing(found) and found.rough_file and found.tolerance == pytest.approx(0.1)
+    assert "is a rough one" in " ".join(summary(found))
+
+
 # --- what lacks some ---
 
 
@@ -88,7 +102,7 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: Diagnosis)
     assert 0 < error < 0.03 and one.values["offset_m"] == pytest.approx(0.4, abs=4 * error)
     best = offset.candidate("sensor_offset")
     assert best is offset.candidates[0] and best.values == one.values
-    assert best.p_value == probability_by_chance(best.gain, 4) and best.p_value < 1e-9
+    assert best.p_value <= probability_by_chance(best.gain, 5) and best.p_value < 1e-9
     assert best.confused_with == ()
 
 

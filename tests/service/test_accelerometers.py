@@ -128,6 +128,10 @@ def test_its_settings_are_its_keys_and_what_it_says_can_be_kept(name: str, ride:
         assert len(kind.advice(state).split()) >= 5
 
 
+SAID_NOTHING: dict[str, dict[str, Any]] = {"bma220": {"oversample": 1}}
+"""What is true of recordings that say nothing of a setting, where that is not what is usual today."""
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_the_header_of_a_recording_brings_its_settings_back(name: str, tmp_path: Path) -> None:
     """For each setting that the header carries; one that cannot be is refused with its place."""
@@ -146,7 +150,8 @@ def test_the_header_of_a_recording_brings_its_settings_back(name: str, tmp_path:
         with pytest.raises(BadInput, match=r"^drive\.dump:1: "):
             wiring.config_for_dump(wrong, None, None, "drive.dump:1")
     header = DumpHeader(None, {"driver": name}, {}, "rav4-2009")
-    assert wiring.config_for_dump(header, None, None).accelerometer.settings == usual
+    before = SAID_NOTHING.get(name, {})
+    assert wiring.config_for_dump(header, None, None).accelerometer.settings == replace(usual, **before)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -175,7 +180,7 @@ def test_a_recording_alone_gives_the_same_rows_again(name: str, settings: Any, t
     for figure, std in rides:  # the tones beat: from one short window to the next the ride is 0.1 m/s2 more or less
         assert abs(figure - ROUGH_A_W_MPS2) < 3 * np.hypot(std, 0.1)
         assert 1.0 < figure < 2.5 or std > 0.1
-        assert std < 0.1 or settings.__dict__.get("range_g", 2) > 8
+        assert std < 0.1 or settings.__dict__.get("range_g", 2) >= 8
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import log
+from math import log, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from ..support.drives.replay import parts_for, rows_of
 
 LEARNS = AccelerometerConfig(noise_mps2=AUTO)
 KNOWN = KnownNoise(NoiseBelief(log(0.15), 0.06), 3)
+USUAL_MPS2 = 0.1 * sqrt(125 / 32)  # of one of four reads, whose filter is wider than that of one
 DRIVEN_MPS2 = 0.1  # that of the demo's drives
 
 
@@ -63,8 +64,21 @@ def test_the_setting(tmp_path: Path, text: str, noise: float | str | None) -> No
     config = config_of(f"accelerometer:\n  driver: bma220\n  {text}\n", tmp_path).accelerometer
     assert config.noise_mps2 == noise
     sensor = wiring.instrument(config)
-    assert sensor.sensor.noise_rms_mps2 == (0.15 if noise == 0.15 else 0.1)
+    assert sensor.sensor.noise_rms_mps2 == (0.15 if noise == 0.15 else USUAL_MPS2)
     assert (sensor.noise is not None) == (noise == AUTO)
+
+
+def test_what_was_learnt_of_the_mean_of_several_readings_is_not_taken_for_that_of_one(tmp_path: Path) -> None:
+    """Recordings and files of programs that took the mean of several readings to have no steps."""
+    settings = "accelerometer:\n  driver: bma220\n  noise_mps2: auto\n  bma220: {oversample: 4}\n"
+    config = config_of(settings, tmp_path)
+    header = wiring.dump_header(config, None, KNOWN)
+    assert header.accelerometer["noise"]["reads"] == 4
+    assert wiring.noise_for_dump(header, config) == KNOWN
+    old = replace(header, accelerometer=header.accelerometer | {"noise": header_fields(KNOWN)})
+    assert wiring.noise_for_dump(old, config) is None
+    once = wiring.dump_header(config_of(settings.replace("4", "1"), tmp_path), None, KNOWN)
+    assert "reads" not in once.accelerometer["noise"]
 
 
 @pytest.mark.parametrize("value", ["Auto", "0", "-0.1", "1000", "0.1 m/s2", "[]", "nan"])
@@ -168,7 +182,7 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
     def words(config: AccelerometerConfig, drive: Drive = NOTHING, known: KnownNoise | None = None) -> str:
         return NoiseLearning(tmp_path, drive, config, known).words()
 
-    assert words(AccelerometerConfig()) == "0.1 m/s2, usual of this sensor (noise_mps2: auto learns it)"
+    assert words(AccelerometerConfig()) == "0.198 m/s2, usual of this sensor (noise_mps2: auto learns it)"
     assert words(AccelerometerConfig(noise_mps2=0.15)) == "0.15 m/s2 by the settings"
     assert words(LEARNS) == "not known yet, it is learnt while driving"
     assert words(LEARNS, known=KNOWN) == "0.15 +- 0.009 m/s2, learnt over 3 drives"

@@ -130,3 +130,24 @@ def test_a_silent_sensor_is_missing_from_the_grid_and_what_comes_too_late_is_cou
     late = block(np.array([5_000_000, 5_010_000, 9_000_000, 9_010_000], dtype=np.int64), np.full(4, G))
     chain.push(late)
     assert chain.late_samples == 2
+
+
+def test_each_coarse_reading_is_passed_on_with_its_own_bound() -> None:
+    """Four reads per sample: what reaches the estimator is each of them as it was read; late ones are none."""
+    rng = np.random.default_rng(4)
+    count, step = 800, 1.25
+    t_us = 7_000_000 + 2500 * np.arange(count, dtype=np.int64)
+    vertical = step * np.rint((G + rng.normal(size=count)) / step)
+    samples = block(t_us, vertical)
+    samples.clipped[402] = True
+    missing = np.array([101, 102, 301])
+    kept = np.delete(np.arange(count), missing)
+    holed = AccelerationBlock(t_us[kept], samples.accel_mps2[kept], samples.clipped[kept])
+    coarse = SignalChain(Axis.from_word("+z"), WEIGHTING, 4, None, coarse=True)
+    out = through(coarse, holed, [150, 400, 401])
+    assert out.each_mps2.shape == (200, 4) and len(out) == 200
+    np.testing.assert_array_equal(np.flatnonzero(~out.each_usable), missing)
+    np.testing.assert_array_equal(out.each_mps2[out.each_usable], vertical[kept])
+    np.testing.assert_array_equal(np.flatnonzero(out.each_at_end), [402])
+    np.testing.assert_array_equal(through(chain_for(4), samples, []).each_mps2[:, 0],
+                                  through(chain_for(4), samples, []).reading_mps2)

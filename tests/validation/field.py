@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from .cases.field_case import SENSORS, START_S, noise_of, write_field
 from .cases.random_case import Case, case
 from .cases.seeds import add_seed_options, first_seed, seeds
 from .cases.visibility import deviations
-from .marking.marks import all_found, hidden, near, numbers, right, said
+from .marking.marks import above, all_found, hidden, near, numbers, right, said
 from .marking.sitting import NoAnswer, Record, added, asked, kept_of
 
 STANDS_OUT = 8.0
@@ -59,6 +60,7 @@ def main() -> int:
     parser.add_argument("--sensor", choices=SENSORS, default=SENSORS[0])
     parser.add_argument("--kind", choices=("one", "none"), default="one")
     parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no case after so many")
     add_seed_options(parser)
     options = parser.parse_args()
     goal = NAMED[options.sensor]
@@ -69,7 +71,11 @@ def main() -> int:
     off: list[float] = []
     seconds: list[float] = []
     cpu_s: list[float] = []
+    begun = time.monotonic()
     for seed in seeds(first_seed(options), options.cases, options.release):
+        if time.monotonic() - begun > 60 * options.minutes:
+            print(f"time is up before {seed}")
+            break
         made = case(options.kind, seed, None, noise_of(options.sensor))
         stands_out = deviations(made, _START_M)
         record, places_m = put(made, options.sensor)
@@ -82,21 +88,25 @@ def main() -> int:
         found = list(numbers(record)) if record["said"] and all_found(record) else []
         for one in found:
             known.take(one.found is not None and abs(one.found - one.true) <= 3 * (one.standard_error or 0.0))
+        ended = ""
         if record["added"] and found:
             close.take(near(record, "attainable_error"))
+            ended = f"; error {above(record, 'attainable_error'):.3f} of the true model's"
         if record["said"]:
             seconds.append(record["diagnosing"]["wall_s"])
             cpu_s.append(record["diagnosing"]["cpu_s"])
         words = ", ".join(f"{one['name']} {deviation:.0f}" for one, deviation in zip(
             hidden(record), stands_out, strict=True)) or "nothing"
-        took = f"; {seconds[-1]:.0f} s" if record["said"] else ""
+        took = f"; {seconds[-1]:.0f} s, {cpu_s[-1]:.0f} of the processor" if record["said"] else ""
         print(f"{seed} {'right' if is_right else 'WRONG'}: {words} -> {said(record)}; {len(places_m)} runs, places off "
-              f"{', '.join(f'{one:.3f}' for one in places_m)} m{took}", flush=True)
+              f"{', '.join(f'{one:.3f}' for one in places_m)} m{took}{ended}", flush=True)
         for one in found:
             print(f"    {one.words}", flush=True)
     for one in (named, wrong, known, close):
         print(one)
-    placed = bool(off) and max(off) <= PLACE_M
+    if not off or not seconds:
+        return 1
+    placed = max(off) <= PLACE_M
     within = sum(one <= PLACE_M for one in off)
     print(f"places off, r.m.s.: median {np.median(off):.3f} m, largest {max(off):.3f} m, {within} "
           f"of {len(off)} runs within the goal of {PLACE_M:g} m")

@@ -129,3 +129,33 @@ def test_a_full_car_takes_them_too() -> None:
     f_hz = np.array([1.0, 4.0, 11.0])
     by_side = [known_vehicle(one, some).at(15.0, N_CPM, road(2.0)).response(f_hz, 15.0) for one in (half, full)]
     assert by_side[1] == pytest.approx(by_side[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "values"), [
+    ("dry_friction", {"friction_force_n": 150.0}), ("damper_blow_off", {}), ("progressive_spring", {}),
+])
+def test_a_stand_in_does_not_depend_on_what_was_asked_before(name: str, values: dict[str, float]) -> None:
+    """The search begins at the most similar one, and ends where it would have from the start."""
+    asked, fresh = (known_vehicle(RAV4, [effect(name, **values)]) for _ in range(2))
+    for speed_mps, height in ((10.0, 0.5), (25.0, 3.0), (13.0, 1.0)):
+        asked.at(speed_mps, N_CPM, road(height))
+    f_hz = np.array([1.0, 3.0, 11.0])
+    found, alone = (one.at(20.0, N_CPM, road(2.0)).response(f_hz, 20.0) for one in (asked, fresh))
+    assert np.abs(found - alone) == pytest.approx(0.0, abs=0.01 * np.abs(alone).max())
+
+
+@pytest.mark.parametrize(("name", "values", "moved"), [
+    ("dry_friction", {"friction_force_n": 150.0}, {"friction_force_n": 165.0}),
+    ("damper_blow_off", {"knee_velocity_m_per_s": 0.05, "slope_ratio": 0.4},
+     {"knee_velocity_m_per_s": 0.05, "slope_ratio": 0.5}),
+])
+def test_two_turns_are_enough_for_a_car_that_is_nearly_another(
+    name: str, values: dict[str, float], moved: dict[str, float]
+) -> None:
+    """Of what the change does to the response, little is left out."""
+    one, other, fresh = (known_vehicle(RAV4, [effect(name, **said)]) for said in (values, moved, moved))
+    f_hz = np.geomspace(0.5, 20.0, 60)
+    near = one.at(20.0, N_CPM, road(4.0))
+    found, whole = (car.response(f_hz, 20.0) for car in (
+        other.at(20.0, N_CPM, road(4.0), near), fresh.at(20.0, N_CPM, road(4.0))))
+    assert np.linalg.norm(found - whole) < 0.25 * np.linalg.norm(whole - near.response(f_hz, 20.0))

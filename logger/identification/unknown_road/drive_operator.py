@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import irfft, rfft
 
 from logger.estimation.road_solver import patch_gain
 from logger.vehicle.passage import smooth_length
@@ -116,16 +117,14 @@ class Crossing:
 
     def under_axles(self, innovations: Array, waves: Complex, lever: bool = False) -> Complex:
         """Transforms (b, x, f) in time of the elevations under the axles."""
-        elevation = np.fft.irfft(np.fft.rfft(innovations) * (waves * self._averaged), self._grid.count)
+        elevation = irfft(rfft(innovations) * (waves * self._averaged), self._grid.count)
         under = (self._read @ elevation.T).T.reshape(-1, self._axles, self._length) * self._weight(lever)
-        return np.asarray(np.fft.rfft(under, self._count))
+        return np.asarray(rfft(under, self._count))
 
     def unit_readings(self, waves: Complex, response: Complex, first: int, last: int) -> npt.NDArray[np.float32]:
         """Readings (b, n), less the mean of each, over roads of one innovation: those of the grid from ``first`` up to
         ``last``. In single precision, to a thousandth, as a preconditioner needs them."""
-        from scipy.fft import irfft, rfft
-
-        kernel = np.fft.irfft(waves * self._averaged, self._grid.count).astype(np.float32)
+        kernel = irfft(waves * self._averaged, self._grid.count).astype(np.float32)
         shifted = np.lib.stride_tricks.sliding_window_view(np.concatenate([kernel, kernel]), len(kernel))
         elevation = shifted[len(kernel) - np.arange(first, last)]
         under = (self._read.astype(np.float32) @ elevation.T).T.reshape(-1, self._axles, self._length)
@@ -135,16 +134,16 @@ class Crossing:
 
     def readings(self, under: Complex, response: Complex) -> Array:
         """Readings (b, n), less the mean of each."""
-        return _level(np.fft.irfft((response * under).sum(axis=1), self._count)[:, self.kept])
+        return _level(irfft((response * under).sum(axis=1), self._count)[:, self.kept])
 
     def back(self, readings: Array, waves: Complex, response: Complex, lever: bool = False) -> Array:
         """The transposed map: of readings (b, n), to innovations (b, count)."""
         time = np.zeros((len(readings), self._count))
         time[:, self.kept] = _level(readings)
-        transform = np.fft.rfft(time)[:, None, :] * np.conj(response)
-        under = np.fft.irfft(transform, self._count)[..., : self._length] * self._weight(lever)
+        transform = rfft(time)[:, None, :] * np.conj(response)
+        under = irfft(transform, self._count)[..., : self._length] * self._weight(lever)
         elevation = (self._spread @ under.reshape(len(readings), -1).T).T
-        return np.asarray(np.fft.irfft(np.fft.rfft(elevation) * np.conj(waves * self._averaged), self._grid.count))
+        return np.asarray(irfft(rfft(elevation) * np.conj(waves * self._averaged), self._grid.count))
 
     def _weight(self, lever: bool) -> Array:
         return self._window * self._lever_m if lever else self._window
@@ -153,7 +152,7 @@ class Crossing:
         """Transforms (b, f) of readings (b, n) in the frame of ``under_axles``, so that ``products`` can be taken."""
         time = np.zeros((len(readings), self._count))
         time[:, self.kept] = _level(readings)
-        return np.asarray(np.fft.rfft(time))
+        return np.asarray(rfft(time))
 
     def products(self, readings: Complex, responses: Complex, under: Complex) -> Array:
         """Sums (b, p) of the products of readings, by their transforms (b, f), with what responses (p, x, f) make of

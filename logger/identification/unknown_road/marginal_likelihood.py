@@ -58,6 +58,7 @@ class UnknownRoad:
 
     def __init__(self, car: ResponseCar, drives: list[Drive], options: Options, generator: np.random.Generator) -> None:
         self._car, self._options = car, options
+        self._cars = [car] * len(drives)
         highest = max(_highest_cpm(drive) for drive in drives)
         spacing_m = float(np.clip(1 / (_PER_WAVE * min(highest, _SHORTEST_CPM)), *_SPACING_M))
         scale_off = options.scale_off * (len(drives) > 1)
@@ -115,10 +116,11 @@ class UnknownRoad:
                               model.responses[number], self.grid.wave_number_cpm, model.waves[0], white,
                               self._options.place_off_m, self._options.scale_off)
 
-    def with_car(self, car: ResponseCar) -> UnknownRoad:
-        """The same road and drives with another car, whose axles stand where they stood."""
+    def with_cars(self, cars: Sequence[ResponseCar]) -> UnknownRoad:
+        """The same road and drives with another car, whose axles stand where they stood; one for each drive, of the
+        same numbers, as a car that is not linear answers each drive in its own way."""
         other = copy(self)
-        other._car = car
+        other._car, other._cars = cars[0], list(cars)
         return other
 
     @property
@@ -144,8 +146,12 @@ class UnknownRoad:
         found = self._solve(model, [one[None] for one in self.measured], self._nearby)[0]
         return np.asarray(np.fft.irfft(np.fft.rfft(found[0]) * np.abs(model.waves[0]), self.grid.count))
 
-    def score(self, at: RoadState, information: bool) -> tuple[Array, Array, tuple[float, float]]:
-        """Slopes of the likelihood (m,), the information (m, m) or zeros, and squares unexplained and measured."""
+    def score(self, at: RoadState, information: bool, fisher_probes: int | None = None,
+              ) -> tuple[Array, Array, tuple[float, float]]:
+        """Slopes of the likelihood (m,), the information (m, m) or zeros, and squares unexplained and measured.
+
+        fisher_probes    in place of that of the options
+        """
         model = self.model(at)
         readings = []
         for number, one in enumerate(self.crossings):
@@ -160,7 +166,7 @@ class UnknownRoad:
         count = slopes.shape[1]
         known = np.zeros((count, count))
         if information:
-            probes = slice(1, 1 + self._options.fisher_probes)
+            probes = slice(1, 1 + (fisher_probes or self._options.fisher_probes))
             known = self._information(model, white[probes], [one[probes] for one in rest])
         return slopes[0] - slopes[1:].mean(axis=0), known, (left, whole)
 
@@ -242,7 +248,7 @@ class UnknownRoad:
         factor = np.sqrt(displacement_psd_m3(at.level, at.waviness, n) / (2 * self.grid.spacing_m))
         if at.scales is not None:
             self.crossings = [one.laid(float(scale)) for one, scale in zip(self.crossings, at.scales, strict=True)]
-        pairs = [self._car.responses(at.values, one.f_hz) for one in self.crossings]
+        pairs = [car.responses(at.values, one.f_hz) for car, one in zip(self._cars, self.crossings, strict=True)]
         gain = np.zeros(len(n))
         for one, (response, _) in zip(self.crossings, pairs, strict=True):
             seen = float(one.speed_mps.mean()) * len(one.speed_mps) / self._rate_hz / self.grid.spacing_m

@@ -22,7 +22,7 @@ from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
 from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.profiles.track import Track
-from logger.vehicle.effect import Chosen
+from logger.vehicle.effect import Chosen, Parameter
 from logger.vehicle.effect_parameters import (
     FreeParameter,
     coordinates_of,
@@ -228,11 +228,20 @@ def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[FreePara
         if moves and fresh:
             slopes = effect_slopes(linear, at.effects, at.logs, moves, at.record, at.predictions)
             own, known = linear.whitened(slopes), (x.copy(), at, slopes)
-        return linear.gradient(at.fit.residuals, at.logs, own), linear.information(at.logs, own)
+        information = linear.information(at.logs, own)
+        information[p:, p:] += unseen
+        return linear.gradient(at.fit.residuals, at.logs, own), information
 
+    # A number that the runs say nothing of would be moved by roundings: its step is damped by what its range says.
+    unseen = np.diag([range_of(state.effects[move.effect].effect.parameters[move.parameter])**-2.0 for move in moves])
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
+
+
+def range_of(parameter: Parameter) -> float:
+    """Width of a parameter's range on the scale that fits move on; infinite where it has no end."""
+    return abs(parameter.coordinate(parameter.high) - parameter.coordinate(parameter.low))
 
 
 def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[FreeParameter],

@@ -138,16 +138,19 @@ def gain_of_full_explanation(posterior: Posterior, state: State) -> float:
     return max(0.0, found)
 
 
-def excess_over_noise(posterior: Posterior, state: State, chance: float) -> float:
+def excess_over_noise(posterior: Posterior, state: State, chance: float, noise: Noise | None = None) -> float:
     """Share by which the residual is above the noise and the discrepancy of two right simulations, of the run and the
     signal where it is largest. A run so short that noise alone may do the same with this probability counts no higher
-    than ``UNEXPLAINED``."""
+    than ``UNEXPLAINED``.
+
+    noise    of the sensors, where it is known; None: estimated from the residuals
+    """
     from scipy.special import gammainccinv
 
     signals = _by_signal(posterior, state)
     count, found = sum(len(one.bands) for one in signals), []
     for signal in signals:
-        own = _noise_of(signal)
+        own = noise or _noise_of(signal)
         for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True):
             freedom = float(one.freedom.sum())
             expected = one.freedom @ (own.deviation_mps2**2 / share + one.floor)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
-from logger.lab.likelihood.priors import Tolerance, VehiclePrior
+from logger.lab.likelihood.priors import WIDE_NUMBERS, Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.runs import normalised_rms_error
@@ -75,6 +75,17 @@ class Posterior:
         runs = SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)) if fine else self.runs
         return Posterior(runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior.without_soft_bounds(),
                          self.readings)
+
+    def with_rough_file(self) -> Posterior:
+        """The posterior of a vehicle whose file is a rough one (``priors.WIDE_NUMBERS``)."""
+        tolerance = replace(self.tolerance, numbers=WIDE_NUMBERS)
+        prior = replace(VehiclePrior.of(self.vehicle, tolerance), soft_bounds=self.prior.soft_bounds)
+        return Posterior(self.runs, self.vehicle, tolerance, self.start_vehicle, prior, self.readings)
+
+    @property
+    def may_be_rough(self) -> bool:
+        """Whether a rough file's numbers would be more uncertain than these are taken to be."""
+        return self.tolerance.numbers < WIDE_NUMBERS
 
     def with_rounding_at(self, state: State) -> Posterior:
         """The posterior with rounded readings taken for bounds, given the predictions of a state; itself where rounding

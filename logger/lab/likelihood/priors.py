@@ -8,6 +8,7 @@ normal prior with soft bounds at two standard deviations: a car whose numbers ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,18 @@ in thirty comparisons (normal distribution)."""
 CONFLICT_SIGMA = 4.0
 """A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
 as far in 1300 comparisons (normal distribution)."""
+BAND_SIGMA = 1.6
+"""A band that numbers may well be off by ends at so many standard deviations: one of 4 % either way has 2.5 %."""
+WIDE_NUMBERS = 0.1 / BAND_SIGMA
+"""Standard deviation, as a share, of masses, springs and dampers of a file that turns out to be a rough one: a band of
+10 % either way. A judgement: it is what data sheets and textbook cars are off by."""
+_KNOWN, _SEVERAL = 0.5, 4
+"""A number is measured where its standard error is less than this share of its prior's; so many say what a file is
+worth (``another_car`` asks for as many)."""
+FARTHEST_SIGMA = 2.5
+"""None of a rough file's numbers is farther off (16 %), and none counts as farther off where a file is judged: a
+missing effect pulls few numbers, but far. Of a dozen right numbers one goes as far in seven files (normal
+distribution)."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +59,11 @@ class Tolerance:
     droop: float = 0.4
 
 
+def is_length(names: Sequence[str]) -> npt.NDArray[np.bool_]:
+    """Which of a vehicle's numbers (p,) are lengths."""
+    return np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
+
+
 @dataclass(frozen=True)
 class VehiclePrior:
     """Prior of a vehicle's numbers: their names, and (p,) standard deviations and difference steps of their logarithms.
@@ -62,7 +80,7 @@ class VehiclePrior:
     def of(vehicle: Vehicle, tolerance: Tolerance) -> VehiclePrior:
         """The prior of a vehicle's numbers."""
         names = sized(vehicle)
-        lengths = np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
+        lengths = is_length(names)
         # A step of a length, by which waves come late, has to be much smaller.
         return VehiclePrior(names, np.where(lengths, tolerance.lengths, tolerance.numbers),
                             np.where(lengths, 1e-4, 0.002))
@@ -94,6 +112,18 @@ class VehiclePrior:
         """The nearest numbers (p,) within the soft bounds."""
         ends = _SOFT_BOUND_SIGMA * self.deviations
         return np.clip(logs, -ends, ends) if self.soft_bounds else logs
+
+    def any_beyond(self, logs: Array, deviations: float) -> bool:
+        """Whether a mass, spring or damper lies farther off than so many standard deviations (p,)."""
+        return bool((np.abs(logs / self.deviations)[~is_length(self.names)] > deviations).any())
+
+    def off_on_the_whole(self, logs: Array, errors: Array) -> bool:
+        """Whether the masses, springs and dampers that were measured, by these standard errors (p,), lie beyond the
+        band that they may well be off by, on the whole (r.m.s.): then it is the file that is rough, and not an effect
+        that is missing."""
+        measured = ~is_length(self.names) & (errors < _KNOWN * self.deviations)
+        off = np.minimum(np.abs(logs[measured]) / self.deviations[measured], FARTHEST_SIGMA)
+        return len(off) >= _SEVERAL and float(np.sqrt(np.mean(off**2))) > BAND_SIGMA
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
         """The vehicle with its numbers times the exponentials of these logarithms (p,)."""

@@ -125,23 +125,35 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
 
     ValueError where nothing is left.
     """
-    found = []
-    for run, seen, prediction in zip(runs, detect_low_passes(runs, predictions), predictions, strict=True):
-        low_hz, high_hz = run.pass_band_hz
-        if low_pass_hz is not None:
-            high_hz = min(high_hz, low_pass_hz)
-        if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
-            high_hz, seen = ends_hz, replace(seen, ends_band=True)
-        if high_hz - low_hz < LEAST_WIDTH_HZ:
-            raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
-                             f"to {high_hz:.3g} Hz")
-        cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
-        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
-                        usable=run.usable if cut is None else _without_its_end(run))
-        residual = run.residual(prediction)
-        outside = float(np.sqrt(np.mean((residual - there.in_band(residual))[run.first:] ** 2)))
-        found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2), outside_mps2=outside))
-    return found
+    return [cut_to_pass_band(run, prediction, seen, low_pass_hz) for run, seen, prediction in
+            zip(runs, detect_low_passes(runs, predictions), predictions, strict=True)]
+
+
+def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass_hz: float | None = None) -> Run:
+    """The run filtered to its pass band, given the low-pass that it went through, and a model's prediction (n,).
+
+    ValueError where nothing is left.
+    """
+    low_hz, high_hz = run.pass_band_hz
+    if low_pass_hz is not None:
+        high_hz = min(high_hz, low_pass_hz)
+    if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
+        high_hz, seen = ends_hz, replace(seen, ends_band=True)
+    if high_hz - low_hz < LEAST_WIDTH_HZ:
+        raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
+                         f"to {high_hz:.3g} Hz")
+    cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
+    there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
+                    usable=run.usable if cut is None else _without_its_end(run))
+    residual = run.residual(prediction)
+    outside = float(np.sqrt(np.mean((residual - there.in_band(residual))[run.first:] ** 2)))
+    return replace(there, measured_mps2=there.in_band(run.measured_mps2), outside_mps2=outside)
+
+
+def is_wide_enough(run: Run, seen: LowPass) -> bool:
+    """Whether enough of a run is left below a filter that it went through."""
+    low_hz, high_hz = run.pass_band_hz
+    return min(high_hz, pass_band_end_hz(seen, run.rate_hz)) - low_hz > LEAST_WIDTH_HZ
 
 
 def _without_its_end(run: Run) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import own_slopes
+from logger.lab.likelihood.map_fit import own_slopes, range_of
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, free_parameters_of, slope_of
 from logger.vehicle.effect_sizes import grows_with_mass
@@ -26,12 +26,14 @@ Array = npt.NDArray[np.float64]
 def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
 
-    Both include the priors: a number that the runs say nothing of is as uncertain as before.
+    Both include the priors: a number of the car that the runs say nothing of is as uncertain as before. An error that
+    is larger than the whole range of an effect's number is infinite.
     """
     linear, state = found.without_soft_bounds(), found.state
-    covariance = _covariance(linear)
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return (with_standard_errors(state.effects, free_parameters_of(state.effects), deviations[linear.count:]),
+    deviations = np.sqrt(np.maximum(np.diag(_covariance(linear)), 0.0))
+    own, moves = deviations[linear.count:], free_parameters_of(state.effects)
+    ranges = [range_of(state.effects[move.effect].effect.parameters[move.parameter]) for move in moves]
+    return (with_standard_errors(state.effects, moves, np.where(own < ranges, own, np.inf)),
             deviations[: linear.count])
 
 

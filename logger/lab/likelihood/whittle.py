@@ -81,6 +81,12 @@ class Bands:
         spectrum = self._spectrum(residual)
         return np.array([spectrum[one].mean() for one in self._members])
 
+    def block_powers(self, samples: Array) -> Array:
+        """Power (blocks, b) of samples (n,), whole, in each block of Welch's method as if they were white; blocks
+        overlap by half."""
+        spectra = self._spectra(samples)
+        return np.stack([spectra[:, one].mean(axis=1) for one in self._members], axis=1)
+
     def levels(self, residual: Array) -> Array:
         """The most likely noise levels (b,) under a residual (n,)."""
         return np.maximum(self.power(residual), self.floor)
@@ -105,9 +111,12 @@ class Bands:
 
     def _spectrum(self, residual: Array) -> Array:
         """Mean power per frequency, scaled so that white noise has its variance at each."""
+        return np.asarray(self._spectra(residual).mean(axis=0))
+
+    def _spectra(self, residual: Array) -> Array:
+        """The same of each block (blocks, f)."""
         blocks = np.lib.stride_tricks.sliding_window_view(residual[self.first:], self._size)[self._starts]
-        power = (np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2).mean(axis=0)
-        return np.asarray(power / (self._size * self._share))
+        return np.asarray(np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2 / (self._size * self._share))
 
 
 def _edges_hz(run: Run, band_hz: tuple[float, float]) -> Array:

@@ -21,10 +21,12 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.priors import FARTHEST_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
-from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.candidate_fit import chance_of
+from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
@@ -77,7 +79,7 @@ class AddedEffects:
     error_after                    of the model with the effects, fitted in the same way
     error_as_written               of that model at the recorded distances: the error of a comparison with it
     noise_floor_error              the error that the sensor's noise makes
-    p_value                        bound on the probability that noise alone gains as much
+    p_value                        probability, at most, that noise alone gains as much
     unseen_before, unseen_after    cross-validation without and with the effects; None: not known
     band                           in which the runs were compared; None: all
     removed                        sensor drift, distance error and filtering, removed from the errors
@@ -143,10 +145,12 @@ def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
 
 def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen], candidates: int = 1) -> AddedEffects:
     """Fit the vehicle, with the effects that are present, without and with those that are added; the values that these
-    have are where the fit begins, and were chosen among so many candidates.
+    have are where the fit begins, and were chosen among so many candidates. A vehicle's file that turns out to be a
+    rough one (``priors``) is taken for one.
 
     ValueError where the vehicle lacks what an effect needs.
     """
+    given = posterior
     before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
     after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added))
@@ -154,6 +158,11 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     (base_fit, errors_before), (effect_fit, errors_after) = (
         _fit_without_soft_bounds(unbounded, one) for one in (before, after))
     prior, nominal = posterior.prior, posterior.vehicle
+    if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
+        wider = given.with_rough_file()
+        rough = add(wider, present, added, candidates)
+        if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), FARTHEST_SIGMA):
+            return rough
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
         after.state.logs, base_fit.state.logs, effect_fit.state.logs))
     numbers = tuple(
@@ -169,7 +178,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_after=posterior.error(state),
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-        p_value=probability_by_chance(before.score - after.score, candidates),
+        p_value=chance_of(after.state.effects[len(before.state.effects):], before.score - after.score,
+                          posterior.freedom, candidates),
         removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
         unseen_before=cross_validate(before, own_slopes(before)), unseen_after=cross_validate(after, own_slopes(after)),
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state))

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
+
+import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, fit, optimise_numbers, own_slopes, relinearise
 from logger.lab.likelihood.posterior import State
+from logger.lab.selection.evidence import probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
@@ -38,6 +43,24 @@ class CandidateFit:
         """Cross-validation of the model."""
         linear = self.found.linearise(keep_size=True)
         return cross_validate(linear, own_slopes(linear))
+
+
+def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates: int) -> float:
+    """Probability, at most, that noise alone gains so much in minus twice the log of the evidence by adding such
+    effects, chosen among so many, to a model of records with so many degrees of freedom. Effects that shift runs
+    compete with the distance errors, whose likelihood is no normal one: for them only the bound of the evidence
+    holds."""
+    bound = probability_by_chance(gain, candidates)
+    if any(one.effect.realigns for one in effects):
+        return bound
+    numbers = len(free_parameters_of(effects))
+    trials = candidates * prod(_shapes(one.effect) for one in effects)
+    return min(bound, probability_of_likelihood_gain(gain + numbers * float(np.log(freedom)), numbers, trials))
+
+
+def _shapes(effect: Effect) -> int:
+    """From how many shapes, such as frequencies or knees, a search for an effect starts."""
+    return len({tuple(values[one.name] for one in effect.parameters if one.null is None) for values in effect.trials()})
 
 
 def fit_roughly(score: float, base: Baseline, screen: Screened) -> list[CandidateFit]:

@@ -17,24 +17,29 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
 DETECTABLE_SIGMA = 6.0
-"""An effect of a smaller expected significance would hardly be found among twenty. Derived: a search asks for 20 (2 ln
-of twenty over ``FALSE_ALARM``) and each of two numbers costs the logarithm of some 4000 degrees of freedom: 36,
-rounded."""
+"""An effect of a smaller expected significance may be missed among twenty. Derived: where noise alone looks like one of
+them in one search of a thousand, an effect of one number has to gain 16.4 in minus twice the log-likelihood
+(chi-squared with one degree of freedom), one of three numbers with six starts 26.5: 4.1 to 5.1 deviations. What is
+found scatters by one deviation around what is expected."""
 _NO_CHANGE = 0.1  # standard deviations, a sixtieth of what is detectable: the vehicle has these values already
 
 
 @dataclass(frozen=True)
 class Undetectable:
-    """An effect whose expected significance at its usual strength, in standard deviations, is too small."""
+    """An effect whose expected significance at its usual strength, in standard deviations, is too small.
+
+    alike    the number of the car that hides it, doing nearly the same within its tolerance; None: it is faint itself
+    """
 
     effect: Effect
     deviations: float
+    alike: str | None = None
 
 
 def undetectable_effects(found: LinearModel, effects: Sequence[Effect]) -> tuple[Undetectable, ...]:
     """Effects that the runs of a fitted model could not show in addition to it, the least significant first."""
     sensitivity = _Sensitivity(found)
-    all_of_them = [Undetectable(effect, sensitivity.of(effect)) for effect in effects]
+    all_of_them = [sensitivity.judge(effect) for effect in effects]
     return tuple(sorted((one for one in all_of_them if one.deviations < DETECTABLE_SIGMA),
                         key=lambda one: one.deviations))
 
@@ -54,19 +59,24 @@ class _Sensitivity:
         self._covariance = np.linalg.inv(self._linear.information(self._state.logs))
         self._here = self._predictions(self._state.effects)
 
-    def of(self, effect: Effect) -> float:
+    def judge(self, effect: Effect) -> Undetectable:
         """Expected significance at the usual strength; where there is none, or the vehicle has it already, the largest
         of the values that a search begins at."""
-        found = self._deviations(chosen(effect, effect.usual))
+        found, alike = self._deviations(chosen(effect, effect.usual))
         if is_uninformative_at_usual(effect, found):
-            found = max(self._deviations(chosen(effect, values)) for values in effect.trials())
-        return found
+            found, alike = max((self._deviations(chosen(effect, values)) for values in effect.trials()),
+                               key=lambda one: one[0])
+        return Undetectable(effect, found, alike)
 
-    def _deviations(self, one: Chosen) -> float:
+    def _deviations(self, one: Chosen) -> tuple[float, str | None]:
+        """Expected significance of an effect at its values, and the number of the car that hides it, if one does."""
         there = self._predictions((*self._state.effects, one))
         white = self._linear.whitened([new - old for new, old in zip(there, self._here, strict=True)])
         mixed, own = self._linear.cross_products(white)
-        return float(np.sqrt(max(own - float(mixed @ self._covariance @ mixed), 0.0)))
+        absorbed = mixed * (self._covariance @ mixed)
+        left = float(np.sqrt(max(own - float(absorbed.sum()), 0.0)))
+        hidden = left < DETECTABLE_SIGMA <= np.sqrt(max(own, 0.0)) and absorbed.max(initial=0.0) > 0.5 * absorbed.sum()
+        return left, self._linear.prior.names[int(absorbed.argmax())] if hidden else None
 
     def _predictions(self, effects: tuple[Chosen, ...]) -> list[np.ndarray]:
         state = self._state

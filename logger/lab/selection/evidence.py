@@ -4,8 +4,12 @@ Problem: among twenty candidates at some hundred values, one always gains by cha
 missing several gain a little by imitating it. Solution: models are scored by their evidence, in which each number
 counts (``LinearModel.score``). A ratio of evidences of B or more comes by chance in less than one of B cases (A.
 Markov's inequality; V. Vovk and R. Wang, Annals of Statistics 49, 2021, call it an e-value), so that 1 / B times the
-number of candidates bounds how often noise alone looks like any of them (Bonferroni). What is unmodelled competes as
-well: an effect has to gain more than imitations do.
+number of candidates bounds how often noise alone looks like any of them (Bonferroni). That bound holds whatever is
+compared, but it is far from sharp. Where noise alone is there, twice the log of a likelihood ratio is distributed as
+chi-squared with as many degrees of freedom as numbers were fitted (S. S. Wilks, Annals of Mathematical Statistics 9,
+1938); a number that means nothing where the effect is not there, such as a frequency, is looked for from several
+starts, each of which is one more trial (R. B. Davies, Biometrika 74, 1987). The smaller of the two is the probability.
+What is unmodelled competes as well: an effect has to gain more than imitations do.
 """
 
 from __future__ import annotations
@@ -27,6 +31,14 @@ def probability_by_chance(gain: float, candidates: int) -> float:
     """Bound on the probability that noise alone gains so much, in minus twice the log of the evidence, with any of so
     many candidates."""
     return float(min(1.0, candidates * np.exp(-0.5 * max(gain, 0.0))))
+
+
+def probability_of_likelihood_gain(gain: float, numbers: int, trials: int) -> float:
+    """Probability that noise alone gains so much, in minus twice the log-likelihood, by so many fitted numbers with any
+    of so many trials; one without a number is bounded by one with one."""
+    from scipy.special import gammaincc
+
+    return float(min(1.0, trials * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
 
 
 def min_gain(candidates: int) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -22,8 +23,9 @@ from logger.lab.likelihood.noise_floor import gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run
-from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, with_coordinates
+from logger.vehicle.effects.time_offset import EFFECT as TIME_OFFSET
 from logger.vehicle.named_parameters import read
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +33,10 @@ Array = npt.NDArray[np.float64]
 # Bounds of the best strength over that of a trial, as far as a quadratic is to be believed (judgements). An effect that
 # shifts all of a run is linear much farther, and is tried with next to nothing.
 _STRONGEST, _STRONGEST_SHIFT, _WEAKEST = 10.0, 1000.0, 0.03
+# Of trials with their delay: one kind has so many that gain less and less, and no more are tried; and those that gain
+# such a share of the best are starts of fits, at most so many (judgements: a trial gains within a tenth of its fit).
+_FALLS, _AS_GOOD, _MOST_STARTS = 3, 0.8, 4
+_SLOW_HZ = 1.0  # motions that are slow: a body's bounce
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +219,49 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
             by_shape[there] = trial
     best = [one for by_shape in found.values()
             for one in _optima([by_shape[value] for value in sorted(by_shape)])[:2]]
+    best += _delayed_trials(base, effect, misaligned[0])
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
+
+
+def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment) -> list[Trial]:
+    """The best trials of an effect that delays, with the delay taken out of the distances: fitted without the effect,
+    these have absorbed it, and a delay by half a wave more is beyond what is linear. On a rig, whose clock is one,
+    nothing has.
+    """
+    bests = []
+    timed = all(run.timed for run in base.posterior.runs.runs)
+    for kind in effect.delaying_trials(seen):
+        tried: list[tuple[Trial, float]] = []
+        for values in kind:
+            one = chosen(effect, values)
+            delay_s = 0.0 if timed else _delay_s(one)
+            earlier = (chosen(TIME_OFFSET, {"delay_s": -delay_s}),) if delay_s else ()
+            tried.append((_trial_at_values(base, one, base.state.logs, earlier), delay_s))
+            last = [trial.gain for trial, _ in tried[-_FALLS - 1 :]]
+            if len(last) > _FALLS and all(later < before for before, later in pairwise(last)):
+                break
+        bests.append(max(tried, key=lambda pair: pair[0].gain))
+    bests.sort(key=lambda pair: -pair[0].gain)
+    worth = [(trial, delay_s) for trial, delay_s in bests[:_MOST_STARTS]
+             if trial.gain > max(_AS_GOOD * bests[0][0].gain, 0.0)]
+    speeds = [error.coefficients_of(error.run.speed_mps) for error in base.posterior.record_errors] if worth else []
+    return [_begun_earlier(base, trial, [delay_s * one for one in speeds]) for trial, delay_s in worth]
+
+
+def _delay_s(one: Chosen) -> float:
+    """By how much an effect on the sensor delays slow motions [s]."""
+    assert isinstance(one.effect, SensorEffect)
+    slow = np.array([2j * np.pi * _SLOW_HZ])
+    return float(-np.angle(one.effect.factor(one.p, slow)[0]) / (2 * np.pi * _SLOW_HZ))
+
+
+def _begun_earlier(base: Baseline, trial: Trial, farther: Sequence[Array]) -> Trial:
+    """The trial with a start of fits at which the car was farther along: by distance errors with these numbers (k,) per
+    run more."""
+    posterior, state = base.posterior, base.state
+    record = [k + more for k, more in zip(state.record, farther, strict=True)]
+    logs = posterior.prior.clip_to_soft_bounds(trial.logs)
+    return replace(trial, start=posterior.state_at((*state.effects, trial.one), logs, record, state.size))
 
 
 def _optima(trials: Sequence[Trial]) -> list[Trial]:
@@ -275,12 +323,15 @@ def _with_predicted_gain(base: Baseline, linear: LinearModel, trial: Trial) -> T
     return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
 
 
-def _trial_at_values(base: Baseline, one: Chosen, logs: Array) -> Trial:
+def _trial_at_values(base: Baseline, one: Chosen, logs: Array, besides: tuple[Chosen, ...] = ()) -> Trial:
     """The trial at its own values, in a car with these numbers (p,), which then take one Newton step; those that the
-    effect sets are held at their nominal values."""
+    effect sets are held at their nominal values.
+
+    besides    what else differs
+    """
     linear = base.quadratics[-1].linear.hold_fixed(one.effect.replaces)
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
-    there = _rough_predictions(linear, (*base.state.effects, one), logs)
+    there = _rough_predictions(linear, (*base.state.effects, one, *besides), logs)
     found = linear.fit_record_errors(there)
     gradient = linear.gradient(found.residuals, logs)
     step = np.linalg.solve(linear.information(logs), gradient)

@@ -19,8 +19,8 @@ import numpy as np
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
-from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE, min_gain
+from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import (
     Baseline,
@@ -201,14 +201,24 @@ class Search:
 
     def is_accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect gains enough, and its values are within its range and within what the record shows."""
-        return self._is_evident(now, one.gain) and not is_outside_data(now.posterior, one.chosen)
+        return self._is_evident(now, one.chosen, one.gain) and not is_outside_data(now.posterior, one.chosen)
 
-    def _is_evident(self, without: Baseline, gain: float) -> bool:
-        """Whether a gain over a model is more than chance or imitation would give."""
-        return gain > self._required_gain(without)
+    def _is_evident(self, without: Baseline, one: Chosen, gain: float) -> bool:
+        """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
+        explain, nothing is imitated."""
+        imitates = without.explanation > 0 and not gain > IMITATION * without.explanation
+        return self._chance_of(without, one, gain) < FALSE_ALARM and not imitates
+
+    def _chance_of(self, without: Baseline, one: Chosen, gain: float) -> float:
+        """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are
+        searched, a law that was learned, nobody knows how much else was tried: the bound of the evidence holds."""
+        if all(known is not one.effect for known in self.effects):
+            return probability_by_chance(gain, len(self.effects))
+        return chance_of([one], gain, without.posterior.freedom, len(self.effects))
 
     def _required_gain(self, without: Baseline) -> float:
-        """The most that chance or imitation gains over a model."""
+        """Gain over a model from which on nothing is chance or imitation; what gains less than a share of it is not
+        pursued."""
         return max(min_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
@@ -305,11 +315,13 @@ class Search:
             with ThreadPoolExecutor(self.workers) as pool:
                 without = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in without.items()}
-            least = min(gains, key=lambda name: gains[name])
+            by_name = {one.effect.name: one for one in now.state.effects}
+            chances = {name: self._chance_of(without[name], by_name[name], gain) for name, gain in gains.items()}
+            least = min(gains, key=lambda name: (-chances[name], gains[name]))
             raising = [name for name in names if _worsens_hold_out(now, without[name], name)]
             if raising:
                 least = min(raising, key=lambda name: gains[name])
-            elif len(names) == 1 or self._is_evident(without[least], gains[least]):
+            elif len(names) == 1 or self._is_evident(without[least], by_name[least], gains[least]):
                 break
             now = without[least]
             names.remove(least)

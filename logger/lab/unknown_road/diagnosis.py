@@ -17,18 +17,19 @@ from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structu
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.unknown_road.fisher_scoring import RoadFit, fit, inverse
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.placement import placed_by_road
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import Trial, screen
-from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, RoadEffect, chosen
 from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
+_NO_CHANGE = 1e-3  # of a response: less than its table is right to
 ABSORBED_BY_ROAD = 0.02
 """The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
 show it seven times as well (root of 1 / 0.02)."""
@@ -43,6 +44,8 @@ class Candidate:
     gain             of minus twice the log of the evidence; where it was not fitted, by its score test
     confused_with    effects that explain about as much
     fitted           with the car's numbers and the road; else it was added at the best strength of its score test
+    imitation        gain up to which an effect may only imitate what is missing
+    stands_in        whether it bends the laws of the car, so that linear ones stood in for it
     """
 
     one: Chosen
@@ -51,6 +54,8 @@ class Candidate:
     gain: float
     confused_with: tuple[str, ...] = ()
     fitted: bool = True
+    imitation: float = 0.0
+    stands_in: bool = False
 
     @property
     def name(self) -> str:
@@ -58,8 +63,14 @@ class Candidate:
         return self.one.effect.name
 
     def helps(self, error: float) -> bool:
-        """Whether it is accepted: not by chance, and without a larger leave-one-out error than the model without it."""
+        """Whether it explains more than chance would, without a larger leave-one-out error than the model without
+        it."""
         return self.fitted and self.p_value < FALSE_ALARM and self.error <= error
+
+    @property
+    def may_imitate(self) -> bool:
+        """Whether it gains so little of what is to be explained that it may only imitate what is missing."""
+        return self.gain < self.imitation
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +86,8 @@ class UnknownRoadDiagnosis:
     confounded    what these drives cannot identify of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
     doubtful      pairs of runs that may be over one road or two, by name
+    undecided     effects that explain more than chance would, but so little of what no road explains that they may only
+                  imitate what is missing
     exact_places  whether the distances of the drives are a recorder's, not a receiver's
     """
 
@@ -90,6 +103,7 @@ class UnknownRoadDiagnosis:
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
+    undecided: tuple[Candidate, ...] = ()
     exact_places: bool = True
 
     @property
@@ -115,9 +129,11 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
     before = now = fit(problem.preconditioned(nominal), nominal)
+    now = replace(now, problem=now.problem.moved_as(now.state))
     errors = [before.problem.error(replace(nominal, roads=before.state.roads)), before.problem.error(before.state)]
     first: list[Candidate] = []
     taken: list[Candidate] = []
+    undecided: list[Candidate] = []
     while len(taken) < most_effects:
         progress(f"round {len(taken) + 1}: trying {len(remaining)} effects")
         ranked = _by_effect(screen(now.problem, now, _trials(remaining)))
@@ -127,7 +143,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
             _candidate(now.problem, _with_effect(now, ones[0].best), ones[0].gain, len(remaining), fitted=False)
             for name, ones in ranked.items() if name not in models)]
         best = next((one for one in candidates if one.helps(errors[-1])), None)
-        if best is None:
+        if best is None or best.may_imitate:
+            undecided = [one for one in candidates if one.helps(errors[-1])]
             break
         taken.append(best)
         now = models[best.name]
@@ -147,28 +164,33 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
         _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
-        problem.exact_places,
+        tuple(undecided), problem.exact_places,
     )
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
-    found = {}
+    found, nominal = {}, problem.response(present, problem.start_vehicle)
     for name, effect in effects.items():
         why = effect.obstacle(problem.vehicle, True)
         if why is None and effect.obstacle(problem.vehicle, False) is not None:
             why = "the road has to be known under the right wheels too"
         if name in [one.effect.name for one in present]:
             why = "the model has it"
+        elif why is None and isinstance(effect, RoadEffect):
+            why = "it is about a profile, and there is none"
         elif why is None and isinstance(effect, DriveEffect):
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None and not (effect.reshapes or problem.exact_places):
             why = "it only shifts the record, and the distances of these drives, by a receiver, shift as well"
         elif why is None:
             try:
-                problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
+                there = problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
+                off = np.abs(there - nominal).max() / np.abs(nominal).max()
+                if isinstance(effect, ForceEffect) and off <= _NO_CHANGE:
+                    why = "it only adds what is not in proportion to the road, which takes a measured road"
             except ValueError:
-                why = "a car with it does not answer in proportion to the road, which takes a measured road"
+                why = "no linear car stands in for one that has it, which takes a measured road"
         if why is not None:
             found[name] = why
     return found
@@ -195,17 +217,21 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
     each start goes on.
 
     most, share, least    so many at most, of those whose gain is this share of the largest, and so much
-    starts                so many trials at their own values; the best one also at its best strength, which holds for
-                          small changes only
+    starts                so many trials at their own values, those whose gain is half of the best one's or more; this
+                          also at its best strength, which holds for small changes only
+
+    What gains less by its first steps than its numbers cost is not fitted further.
     """
     enough = max([least, *(share * ones[0].gain for ones in ranked.values())])
     found = {}
     for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
         progress(f"fitting {name}")
-        begins = [ranked[name][0].best, *(trial.chosen for trial in ranked[name][:starts])]
+        first = ranked[name][0]
+        begins = [first.best, *(one.chosen for one in ranked[name][:starts] if one.gain > 0.5 * first.gain)]
         tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
-        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state, nodes=2))
-        found[name] = fit(best.problem, best.state)
+        gains = [one.problem.gain(base.state, one.state, nodes=2) for one in tries]
+        best = tries[int(np.argmax(gains))]
+        found[name] = fit(best.problem, best.state) if max(gains) > _cost(best.problem, best.state) else best
     return found
 
 
@@ -233,20 +259,27 @@ def _with_effect(base: RoadFit, one: Chosen) -> RoadFitState:
 
 def _candidates(base: RoadFit, models: Mapping[str, RoadFit], count: int, error: float) -> list[Candidate]:
     """Fitted effects as candidates of so many, best first, each with those that cannot be distinguished from it."""
-    found = [_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count)
-             for one in models.values()]
+    imitation = IMITATION * _full_explanation(base)
+    found = [replace(_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count),
+                     imitation=imitation) for one in models.values()]
     found.sort(key=lambda one: -one.gain)
     there = [one for one in found if one.helps(error)]
     return [replace(one, confused_with=tuple(other.name for other in there if other is not one and one in there
                                              and abs(other.gain - one.gain) < INDISTINGUISHABLE)) for one in found]
 
 
+def _cost(problem: SameRoad, state: RoadFitState) -> float:
+    """What the numbers of the last effect of a state cost of its gain."""
+    return len(free_parameters_of([state.effects[-1]])) * float(np.log(problem.samples))
+
+
 def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
     """The last effect of a state as one of so many candidates. Its gain in minus twice the log of the likelihood, less
     what its numbers cost (G. Schwarz 1978), is that in the evidence."""
     one = state.effects[-1]
-    gain -= len(free_parameters_of([one])) * float(np.log(problem.samples))
-    return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
+    gain -= _cost(problem, state)
+    return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted,
+                     stands_in=not problem.is_linear([one], state.logs))
 
 
 # --- the residual ---
@@ -269,6 +302,14 @@ def _confounded_numbers(model: RoadFit) -> tuple[Finding, ...]:
     powers, directions = np.linalg.eigh(marginal)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
     return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
+
+
+def _full_explanation(model: RoadFit) -> float:
+    """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as explained;
+    at least 0."""
+    noise = model.problem.noise(model.state)
+    over = model.state.noise_mps2 / ((1 + UNEXPLAINED) * noise.deviation_mps2)
+    return max(0.0, 2 * PASS_OF_RATE * model.problem.samples * 2 * float(np.log(over)))
 
 
 def _excess(model: RoadFit, noise: Noise) -> float:

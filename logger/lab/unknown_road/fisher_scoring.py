@@ -62,16 +62,17 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
     def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
         return here[:p], with_coordinates(state.effects, moves, here[p : p + q]), here[p + q :]
 
+    probes = 1 if len(problem.stretches) > 2 else None  # where there are many stretches, these are a mean as well
     data, last_gain = np.empty((0, 0)), 0.0
     for count in range(steps):
         logs, effects, roads = at(here)
         gains, slopes = response_and_slopes(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
             problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
-        table = problem.table(gains, slopes)
+        tables = problem.tables(gains, slopes)
         off, precision = problem.prior_terms(logs, q, roads)
         for renewed in (False, True) if count else (True,):
-            score, found = problem.score_and_information(table, roads, information=renewed)
+            score, found = problem.score_and_information(tables, roads, renewed, probes)
             score -= precision * off
             data = found if renewed else data
             information = data + np.diag(precision)
@@ -105,7 +106,7 @@ def inverse(information: Array, ridge: float = 1e-6) -> Array:
 
 def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[FreeParameter], logs: Array,
            step: float = 1e-3) -> tuple[Complex, Complex]:
-    """A response (x, f) and its derivatives (p + q, x, f) by the logs and the moves, over steps of this share."""
+    """A response (d, x, f) and its derivatives (p + q, d, x, f) by the logs and the moves, over steps of this share."""
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):

@@ -9,7 +9,8 @@ places that may be a little off, as roads change and distance signals drift.
 The likelihood itself is never computed, only its score is. The gain of one model over another is the integral of the
 score along a straight line from the one response to the other, by Gauss's quadrature with a few points.
 
-Only effects with which a car is linear can be tried. What a free road absorbs (a gain; a longer contact patch) is known
+Effects with which a car is not linear are tried by the linear cars that come nearest, one for each drive over each
+stretch, as each moves it by another amplitude. What a free road absorbs (a gain; a longer contact patch) is known
 from the information that remains of an effect once the road is integrated out.
 """
 
@@ -30,7 +31,7 @@ from logger.identification.unknown_road.road_state import Options, RoadState
 from logger.lab.likelihood.noise_floor import Noise, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
-from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
+from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, is_linear, responses_of
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
@@ -58,7 +59,7 @@ class RoadFitState:
     logs       logarithms of the car's numbers over the nominal ones (p,)
     roads      of every stretch its level, its waviness and the places of its drives but the first, in this order; the
                logarithm of the noise last (r,)
-    gains      the car's response (x, f)
+    gains      the car's response (d, x, f) in each drive over each stretch, in the order of ``SameRoad.motions``
     """
 
     effects: tuple[Chosen, ...]
@@ -103,12 +104,16 @@ class SameRoad:
                              "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
-        nominal = self.table(response_of(self.car((), self.start_vehicle), self.rate_hz))
-        self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
+        self.motions = [Motion(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0, STANDARD_WAVINESS)
+                        for parts in self.stretches for _, one in parts]
+        nominal = self.tables(self.response((), self.start_vehicle))
+        self._roads = [UnknownRoad(nominal[0], [one for _, one in parts], options, generator)
+                       for parts in self.stretches]
         sizes = [1 + len(parts) for parts in self.stretches]
         ends = np.cumsum(sizes)
         self._parts = [np.append(np.arange(end - size, end), ends[-1]) for size, end in zip(sizes, ends, strict=True)]
         self._first = self._start(nominal)
+        self.motions = self._moved_by(self._first)
         self.count, self.rounds = len(self._first), 0
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
@@ -116,26 +121,48 @@ class SameRoad:
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
-        """The response (x, f) of the car with these numbers and effects. ValueError if it is not linear."""
-        return response_of(self.car(effects, logs), self.rate_hz)
+        """The response (d, x, f) of the car with these numbers and effects, in each of the ``motions``. ValueError if
+        no linear car stands in for it."""
+        return responses_of(self.car(effects, logs), self.rate_hz, self.motions)
 
-    def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
-        """The table of a response (x, f) with derivatives (p, x, f)."""
+    def is_linear(self, effects: Sequence[Chosen], logs: Array) -> bool:
+        """Whether the car with these numbers and effects answers in proportion to the road."""
+        return is_linear(self.car(effects, logs))
+
+    def tables(self, gains: Complex, slopes: Complex | None = None) -> list[Tabulated]:
+        """Tables of a response (d, x, f) with derivatives (p, d, x, f), one for each drive over each stretch."""
         found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
-        return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
+        return [Tabulated(self._behind_m, self._patch_m, self.rate_hz, gain, found[:, drive])
+                for drive, gain in enumerate(gains)]
+
+    def _moved_by(self, roads: Array) -> list[Motion]:
+        """What moves the car in each drive over each stretch, on roads of these numbers (r,)."""
+        levels = [roads[part[:2]] for part, parts in zip(self._parts, self.stretches, strict=True) for _ in parts]
+        return [replace(one, level=float(level), waviness=float(waviness))
+                for one, (level, waviness) in zip(self.motions, levels, strict=True)]
+
+    def moved_as(self, state: RoadFitState) -> SameRoad:
+        """The problem, its car moved by the roads of a state, and not by those that spectra alone let expect."""
+        other = copy(self)
+        other.motions = self._moved_by(state.roads)
+        return other
 
     def start(self, effects: Sequence[Chosen] = ()) -> RoadFitState:
         """The vehicle that fits begin at, with these effects, on roads of a likely level."""
         return RoadFitState(tuple(effects), self.start_vehicle, self._first, self.response(effects, self.start_vehicle))
 
-    def score_and_information(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
-        """Score of the log-likelihood (m,) by the parameters of a table's derivatives and by the numbers of the roads,
-        and the information (m, m) or zeros, both without the priors."""
-        p, self.rounds = len(table.slopes), 0
+    def score_and_information(self, tables: Sequence[Tabulated], roads: Array, information: bool,
+                              fisher_probes: int | None = None) -> tuple[Array, Array]:
+        """Score of the log-likelihood (m,) by the parameters of tables' derivatives and by the numbers of the roads,
+        and the information (m, m) or zeros, both without the priors.
+
+        fisher_probes    simulated drives over each stretch that the information is a mean over
+        """
+        p, self.rounds = len(tables[0].slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
-        for road, at, part, _ in self._at(table, roads):
+        for road, at, part, _ in self._at(tables, roads):
             whole = np.append(np.arange(p), p + part)
-            own, known, _ = road.score(at, information)
+            own, known, _ = road.score(at, information, fisher_probes)
             self.rounds = max(self.rounds, road.rounds)
             slopes[whole] += own
             matrix[np.ix_(whole, whole)] += known
@@ -145,19 +172,22 @@ class SameRoad:
         """The problem with preconditioners for models near a state."""
         other = copy(self)
         other._roads = []
-        for road, at, *_ in self._at(self.table(state.gains), state.roads):
+        for road, at, *_ in self._at(self.tables(state.gains), state.roads):
             road.prepare(at)
             other._roads.append(road)
         return other
 
-    def _at(self, table: Tabulated, roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
-        """Every stretch under a car of this response: its road, its numbers, their indices among those of all roads,
+    def _at(self, tables: Sequence[Tabulated], roads: Array,
+            ) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
+        """Every stretch under a car of these responses: its road, its numbers, their indices among those of all roads,
         and the runs of its drives."""
+        first = 0
         for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
             own = roads[part]
-            at = RoadState(np.zeros(len(table.slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
+            at = RoadState(np.zeros(len(tables[0].slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
                            float(np.exp(own[-1])))
-            yield road.with_car(table), at, part, [run for run, _ in parts]
+            yield road.with_cars(tables[first : first + len(parts)]), at, part, [run for run, _ in parts]
+            first += len(parts)
 
     def prior_terms(self, logs: Array, moves: int, roads: Array, waviness_off: float = 0.3,
                     place_off_m: float = 0.05) -> tuple[Array, Array]:
@@ -190,21 +220,21 @@ class SameRoad:
         total = 0.0
         places, weights = np.polynomial.legendre.leggauss(nodes)
         for node, weight in zip(0.5 * (places + 1), 0.5 * weights, strict=True):
-            table = self.table(before.gains + node * change, change[None])
-            slopes, _ = self.score_and_information(table, before.roads + node * road_change, information=False)
+            tables = self.tables(before.gains + node * change, change[None])
+            slopes, _ = self.score_and_information(tables, before.roads + node * road_change, information=False)
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
     def predicted_by_others(self, state: RoadFitState) -> Iterator[tuple[int, Array, Array]]:
         """Every drive over every stretch: its run, what was read (n,), and its prediction by the other drives (n,)."""
-        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
+        for road, at, _, runs in self._at(self.tables(state.gains), state.roads):
             for number, run in enumerate(runs):
                 yield run, road.measured[number], road.predicted(at, number)
 
     def predicted_by_each(self, state: RoadFitState) -> Iterator[tuple[int, int, Array, Array]]:
         """Every ordered pair of drives over a stretch: the run, the one that predicts it, what was read (n,), and its
         prediction by the latter alone (n,)."""
-        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
+        for road, at, _, runs in self._at(self.tables(state.gains), state.roads):
             for number, by in permutations(range(len(runs)), 2):
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
@@ -244,7 +274,7 @@ class SameRoad:
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
-    def _start(self, nominal: Tabulated) -> Array:
+    def _start(self, nominal: Sequence[Tabulated]) -> Array:
         """First guess of the roads' numbers: levels and noise from spectra; places by ``_offsets``."""
         first = np.zeros(int(self._parts[-1][-1]) + 1)
         noises = []
@@ -259,7 +289,7 @@ class SameRoad:
             first[part[2:-1]] = np.array(own[1:]) - own[0]
         return first
 
-    def _offsets(self, nominal: Tabulated, first: Array) -> Array:
+    def _offsets(self, nominal: Sequence[Tabulated], first: Array) -> Array:
         """Offsets of each run's places [m] from those of the first run of the stretch that most runs share; of runs
         that are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}

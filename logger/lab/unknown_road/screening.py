@@ -37,8 +37,8 @@ def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Tri
     gains, own = response_and_slopes(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
-    table = problem.table(gains, np.array([*own, *changes]))
-    slopes, information = problem.score_and_information(table, state.roads, information=True)
+    tables = problem.tables(gains, np.array([*own, *changes]))
+    slopes, information = problem.score_and_information(tables, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
     off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)

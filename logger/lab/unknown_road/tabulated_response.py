@@ -1,9 +1,11 @@
-"""The linear frequency response of a car with effects, as a table, where it has one.
+"""The linear frequency response of a car with effects, as a table: exact where it has one, else on the average.
 
 Problem: where nobody measured the road, it has to be integrated out, which is possible for a linear car. With most
 effects a car is linear, with some in ways that no constant matrix describes (a spring in series with a damper, a
 delay). Solution: the response is computed frequency by frequency from the same parts as simulations; whether a corner's
-laws are linear is tested at some motions.
+laws are linear is tested at some motions. Where they are not, each drive over each stretch of road moves them by an
+amplitude of its own, and has the response of the linear car that comes nearest there (``vehicle.linearise``): what
+friction does is then no damping, but one that falls from stretch to stretch as the motion grows.
 """
 
 from __future__ import annotations
@@ -14,10 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
+from logger.identification.unknown_road.road_state import displacement_psd_m3
 from logger.vehicle.compose import Car
 from logger.vehicle.laws import CornerLaws
+from logger.vehicle.linearise import known_car, linearised
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.simulate import recorder_gain
+from logger.vehicle.structure import Output
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -45,7 +51,7 @@ def response_of(car: Car, rate_hz: float) -> Complex:
 
     Left and right wheels are on the same road. ValueError for a car whose laws are not linear.
     """
-    if car.records or not all(map(_is_linear, car.laws)):
+    if not is_linear(car):
         raise ValueError("expected a car that answers in proportion to the road")
     f_hz = frequencies_of(rate_hz)
     structure, s = car.structure, np.asarray(2j * np.pi * f_hz, np.complex128)
@@ -59,6 +65,52 @@ def response_of(car: Car, rate_hz: float) -> Complex:
     motion = np.linalg.solve(dynamic, forces)
     behind = recorder_gain(f_hz / rate_hz) * car.factor(s) * s * s
     return np.asarray(behind * np.einsum("n,fnx->xf", car.row, motion))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What moves a car over a stretch: its speed [m/s], and the level and the waviness of the road (``RoadState``)."""
+
+    speed_mps: float
+    level: float
+    waviness: float
+
+
+_MOVING_CPM = np.geomspace(FLATTENED_BELOW_CPM, 4.0, 80)
+"""Waves by which a suspension is moved: from those that a road's spectrum is flat below to a tire's length."""
+
+
+def is_linear(car: Car) -> bool:
+    """Whether a car answers in proportion to the road."""
+    return not car.records and all(map(_is_linear, car.laws))
+
+
+def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion]) -> Complex:
+    """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
+    is not linear, the same for all of one that is.
+
+    ValueError for effects on the record in time, and for laws that are others at another place or time.
+    """
+    if is_linear(car):
+        return np.broadcast_to(response_of(car, rate_hz), (len(motions), *_shape(car, rate_hz)))
+    if car.records:
+        raise ValueError("expected a car whose record is what its sensor felt")
+    known_car(car)  # refuses laws that no linear ones stand in for
+    f_hz = frequencies_of(rate_hz)
+    axles = np.unique(car.structure.behind_m, return_inverse=True)[1]
+    by_axle = np.eye(axles.max() + 1)[axles]
+    output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
+    behind = recorder_gain(f_hz / rate_hz)
+    found = []
+    for motion in motions:
+        psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, _MOVING_CPM))[1:]
+        linear = linearised(car, output, motion.speed_mps, _MOVING_CPM, psd_m3)
+        found.append(behind * (linear.by_wheel(f_hz) @ by_axle).T)
+    return np.asarray(found)
+
+
+def _shape(car: Car, rate_hz: float) -> tuple[int, int]:
+    return len(np.unique(car.structure.behind_m)), len(frequencies_of(rate_hz))
 
 
 def _damper(laws: CornerLaws, s: Complex) -> Complex:

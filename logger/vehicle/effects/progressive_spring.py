@@ -23,7 +23,7 @@ class ProgressiveSpring(ForceEffect):
     shown_by = "drive slowly over large bumps or dips, so that the suspension travels several centimetres"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
-        return laws.with_spring(lambda travel_m: p.cubic_stiffness_n_per_m3 * travel_m**3)
+        return laws.with_spring(lambda travel_m: p.cubic_stiffness_n_per_m3 * (travel_m * travel_m * travel_m))
 
 
 EFFECT = ProgressiveSpring()

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import norm
 
-from logger.lab.likelihood.priors import Tolerance, VehiclePrior
+from logger.lab.likelihood.priors import BAND_SIGMA, Tolerance, VehiclePrior, is_length
 from logger.vehicle.named_parameters import read
 
 from ...support.lab.runs_with_residual import CAR
@@ -63,3 +63,22 @@ def test_logarithms_bring_one_car_to_another_and_back() -> None:
     assert PRIOR.logs(CAR, other) == pytest.approx(FAR)
     for name, log in zip(PRIOR.names, FAR, strict=True):
         assert read(other, name) == pytest.approx(read(CAR, name) * np.exp(log))
+
+
+def test_a_file_is_rough_where_most_of_what_was_measured_is_off() -> None:
+    errors = 0.2 * PRIOR.deviations
+    lengths = is_length(PRIOR.names)
+    off = np.where(np.arange(len(PRIOR.names)) % 2, 2.5, -2.5) * PRIOR.deviations
+    assert PRIOR.off_on_the_whole(off, errors)
+    assert not PRIOR.off_on_the_whole(np.where(lengths, off, 0.0), errors)
+    assert not PRIOR.off_on_the_whole(off, 0.8 * PRIOR.deviations)  # nothing was measured
+    few = np.zeros(len(off))
+    few[np.flatnonzero(~lengths)[:3]] = 20 * PRIOR.deviations[0]  # what a missing effect pulls away
+    assert not PRIOR.off_on_the_whole(few, errors)
+
+
+def test_numbers_within_their_band_are_never_a_rough_file() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        logs = rng.uniform(-BAND_SIGMA, BAND_SIGMA, len(PRIOR.names)) * PRIOR.deviations
+        assert not PRIOR.off_on_the_whole(logs, 0.2 * PRIOR.deviations)

@@ -9,7 +9,8 @@ import pytest
 
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, add, moved_between
-from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.candidate_fit import chance_of
+from logger.lab.selection.evidence import FALSE_ALARM
 from logger.runs import normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -58,7 +59,7 @@ def test_how_often_noise_would_gain_as_much_is_by_the_evidence_of_both_models(ru
     without, there = (fit(align(posterior, posterior.start(some))) for some in ([], [one]))
     gain = without.score - there.score
     found = add(posterior, [], [one], candidates=3)
-    assert found.p_value == pytest.approx(probability_by_chance(gain, 3), abs=1e-3)
+    assert found.p_value == pytest.approx(chance_of([one], gain, posterior.freedom, 3), rel=0.1, abs=1e-6)
     assert found.helps == (found.p_value < FALSE_ALARM)
 
 

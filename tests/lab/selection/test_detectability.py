@@ -53,6 +53,16 @@ def test_quieter_runs_hide_less(loud: LinearModel) -> None:
     assert all(after[name] >= before[name] for name in after)
 
 
+def test_what_a_number_of_the_car_does_as_well_is_said_to_be_hidden_by_it() -> None:
+    quiet_runs = posterior_of(secret_runs(noise_mps2=0.05, lasts_s=12.0))
+    quiet = refit(quiet_runs, quiet_runs.start()).linear
+    (load,) = undetectable_effects(quiet, [EFFECTS["payload"]])
+    assert load.alike == "sprung_mass_kg" and load.deviations < DETECTABLE_SIGMA
+    loud_runs = posterior_of(secret_runs(noise_mps2=5.0, lasts_s=12.0))
+    deaf = refit(loud_runs, loud_runs.start()).linear
+    assert all(one.alike is None for one in undetectable_effects(deaf, [EFFECTS["payload"]]))
+
+
 NAMES = ("tire_enveloping", "sensor_gain", "speed_scale")
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.lab.selection.evidence import FALSE_ALARM, min_gain, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, min_gain, probability_by_chance, probability_of_likelihood_gain
 
 GAINS = st.floats(-1e4, 1e4)
 COUNTS = st.integers(1, 500)
@@ -51,3 +51,21 @@ def test_less_gain_and_more_candidates_make_it_more_probable(first: float, other
 @given(st.floats(-1e9, 0.0), COUNTS)
 def test_a_loss_is_certain_to_come_by_chance(loss: float, candidates: int) -> None:
     assert probability_by_chance(loss, candidates) == 1
+
+
+@pytest.mark.parametrize("numbers", [1, 2, 3])
+def test_fits_to_noise_gain_as_much_as_is_said(numbers: int) -> None:
+    """Least squares on noise, the best of ten trials."""
+    rng = np.random.default_rng(6)
+    columns, _ = np.linalg.qr(rng.normal(size=(80, 10 * numbers)))
+    explained = (rng.normal(size=(20_000, 80)) @ columns) ** 2
+    gains = explained.reshape(20_000, 10, numbers).sum(axis=2).max(axis=1)
+    p_values = np.array([probability_of_likelihood_gain(gain, numbers, 10) for gain in gains])
+    for often in (0.1, 0.01, FALSE_ALARM):
+        assert 0.4 * often < (p_values < often).mean() < 1.6 * often
+
+
+def test_the_tails_are_those_of_tables() -> None:
+    assert probability_of_likelihood_gain(16.45, 1, 20) == pytest.approx(0.001, rel=0.01)
+    assert probability_of_likelihood_gain(19.81, 2, 20) == pytest.approx(0.001, rel=0.01)
+    assert probability_of_likelihood_gain(-5.0, 2, 20) == 1

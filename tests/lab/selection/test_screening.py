@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from logger.lab.diagnosis import refit
 from logger.lab.likelihood.posterior import Posterior
@@ -191,3 +192,19 @@ def test_a_model_without_one_of_its_effects_has_all_else_as_it_was() -> None:
     assert out.state.names == ("sensor_offset",) and np.array_equal(out.state.logs, now.state.logs)
     assert out.state.effects[0].values == now.state.effects[0].values
     assert screen(out, EFFECTS["sensor_gain"], [STILL]).gain > min_gain(len(EFFECTS))
+
+
+@pytest.mark.parametrize(("order", "cutoff_hz"), [(4, 20.0), (6, 28.0), (8, 16.0)])
+def test_a_delay_that_the_distances_absorbed_does_not_hide_the_order_of_a_filter(order: int, cutoff_hz: float) -> None:
+    """A filter by scipy delays by up to half a wave; noise behind it hides from spectra what it took away."""
+    rng, sections = np.random.default_rng(3), butter(order, cutoff_hz, fs=100.0, output="sos")
+    runs = [replace(run, measured_mps2=sosfilt(sections, run.measured_mps2) + rng.normal(0, 0.05, run.count))
+            for run in secret_runs([], noise_mps2=0.01).runs]
+    posterior = posterior_of(SimulatedRuns(runs, 500.0))
+    base = fitted(posterior)
+    found = screen(base, EFFECTS["sensor_bandwidth"], [misalignment(posterior, posterior.start())])
+    best = max(fit_roughly(base.score, base, found), key=lambda one: one.gain)
+    assert best.chosen.values["order"] == pytest.approx(order, abs=1)
+    assert best.chosen.values["cutoff_hz"] == pytest.approx(cutoff_hz, rel=0.15)
+    others = [one for one in found.trials if abs(one.one.values["order"] - order) > 2]
+    assert best.gain > 1.1 * max((one.gain for one in others), default=0.0)

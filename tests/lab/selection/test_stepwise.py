@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from logger.lab.diagnosis import diagnose, refit
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, align, fit
 from logger.lab.selection.candidate_fit import fit_roughly, refine
-from logger.lab.selection.evidence import IMITATION, min_gain
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.screening import Baseline, misalignment, screen
 from logger.lab.selection.stepwise import Round, Search, Selection
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -111,7 +113,8 @@ def test_of_two_that_explain_alike_the_one_with_fewer_numbers_is_taken() -> None
 def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Baseline) -> None:
     sought = search(FEW)
     one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
-    enough = min_gain(len(FEW))
+    freedom = offset_base.posterior.freedom
+    enough = float(chi2.isf(FALSE_ALARM / len(FEW), 1) - np.log(freedom))  # one number, whose strength is linear
     nearly_all = replace(offset_base, explanation=enough)
     assert sought.is_accepted(nearly_all, replace(one, gain=enough + 0.1))
     assert not sought.is_accepted(nearly_all, replace(one, gain=enough - 0.1))

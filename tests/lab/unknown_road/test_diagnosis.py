@@ -10,13 +10,14 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
+from logger.identification.unknown_road.road_state import at_n0
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.fisher_scoring import fit
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import screen
-from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
+from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, is_linear, response_of, responses_of
 from logger.profiles.track import Track
 from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
@@ -24,7 +25,7 @@ from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.compose import compose, recorded
+from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.passage import Passage
 
@@ -85,6 +86,60 @@ def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
         response_of(compose(CAR, [effect]), RATE_HZ)
 
 
+@pytest.mark.parametrize("effect", [
+    named("dry_friction", friction_force_n=150.0),
+    named("damper_blow_off", knee_velocity_m_per_s=0.03, slope_ratio=0.2),
+    named("progressive_spring", cubic_stiffness_n_per_m3=3e7),
+], ids=lambda one: one.effect.name)
+def test_a_linear_car_stands_in_for_one_that_bends_its_laws(effect: Chosen) -> None:
+    """Most of what such an effect does to a record of the stepping simulation is in proportion to the road, and not to
+    one that moves the car less."""
+    run = run_of([effect], 14.0, 200.0, 1)
+    drive = Drive(RATE_HZ, run.measured_mps2, run.distance_m)
+    structure = compose(CAR).structure
+    behind_m = np.unique(structure.behind_m)
+    grid = grid_under([drive], behind_m, SPACING_M, 0.0)
+    crossing = Crossing(drive, grid, behind_m, structure.contact_patch_m)
+    place = grid.start_m + SPACING_M * np.arange(grid.count)
+    elevation = np.interp(place, LONG.start_m + SPACING_M * np.arange(len(LONG.elevation_m)), LONG.elevation_m)
+    waves = np.ones(len(grid.wave_number_cpm), complex)
+    level = float(np.log(64.0 / at_n0(2.0)))  # as LONG was generated
+
+    def left(car: Car, level: float) -> float:
+        (gains,) = responses_of(car, RATE_HZ, [Motion(14.0, level, 2.0)])
+        table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
+        response = table.responses(np.zeros(0), crossing.f_hz)[0]
+        predicted = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
+        return float(np.mean((run.measured_mps2 - run.measured_mps2.mean() - predicted) ** 2)) - NOISE_MPS2**2
+
+    bent = compose(CAR, [effect])
+    assert not is_linear(bent)
+    assert left(bent, level) < 0.5 * left(compose(CAR), level)
+    assert left(bent, level) < left(bent, level - np.log(100.0))
+
+
+@pytest.mark.slow
+def test_friction_is_not_taken_for_another_damping() -> None:
+    """A linear damper comes near what friction does, if each drive is over one road of one roughness: not near enough
+    if the friction itself is a candidate."""
+    rubbing = named("dry_friction", friction_force_n=100.0, transition_velocity_m_per_s=0.0)
+    runs = [run_of([rubbing], speed, 110.0, seed) for seed, speed in ((1, 9.0), (2, 15.0))]
+    effects = {name: shipped_effects()[name] for name in ("dry_friction", "tire_damping", "sensor_gain")}
+    found = diagnose_same_road(SameRoad(runs, CAR, Tolerance()), effects)
+    assert "tire_damping" not in [one.effect.name for one in found.missing]
+    assert [one.effect.name for one in found.missing] in ([], ["dry_friction"])
+    assert found.missing or "dry_friction" in [one.name for one in found.undecided]
+
+
+def test_what_may_only_imitate_is_not_named() -> None:
+    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0, imitation=200.0)
+    assert one.helps(0.3) and one.may_imitate and not replace(one, imitation=50.0).may_imitate
+    found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
+    reported = as_json(found)
+    assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
+    assert any(words.startswith("Not decided: tire_damping would explain a little") for words in reported["sentences"])
+
+
 def deviance(problem: SameRoad, state: RoadFitState) -> float:
     """Minus twice the log-likelihood of all drives by their covariance, written out, and the priors."""
     total = problem.cost(state)
@@ -93,12 +148,12 @@ def deviance(problem: SameRoad, state: RoadFitState) -> float:
         n = np.maximum(grid.wave_number_cpm, 0.01)
         psd = np.exp(own[0]) * CM3_M3 * (n / 0.2) ** -own[1]
         psd[0] = 0.0
-        table = problem.table(state.gains)
+        drives = iter(problem.tables(state.gains))
         rows = []
         for number, crossing in enumerate(road.crossings):
             off = 0.0 if number == 0 else own[1 + number]
             waves = np.sqrt(psd / (2 * grid.spacing_m)) * np.exp(2j * np.pi * grid.wave_number_cpm * off)
-            response = table.responses(np.zeros(0), crossing.f_hz)[0]
+            response = next(drives).responses(np.zeros(0), crossing.f_hz)[0]
             rows.append(crossing.readings(crossing.under_axles(np.eye(grid.count), waves), response).T)
         matrix = np.concatenate(rows)
         covariance = matrix @ matrix.T + np.exp(2 * own[-1]) * np.eye(len(matrix))

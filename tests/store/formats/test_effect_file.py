@@ -39,12 +39,15 @@ class Mine({kind}):
 
 EFFECT = Mine()
 """
-ASKED = {"DriveEffect": "driven(self, p, distance_m)", "VehicleEffect": "vehicle(self, p, vehicle)",
+ASKED = {"RoadEffect": "road(self, p, spacing_m, elevation_m)",
+         "DriveEffect": "driven(self, p, distance_m)", "VehicleEffect": "vehicle(self, p, vehicle)",
          "BodyEffect": "structure(self, p, structure)", "ForceEffect": "laws(self, p, laws)",
          "SensorEffect": "factor(self, p, s)", "RecordEffect": "record(self, p, recording)"}
 BAD = "(np.nan if p.size == 3 else 1.0)"
 # What each kind does; at size 3 it fails or gives no answer, in these words.
 CASES = [
+    ("RoadEffect", "return elevation_m / (p.size - 3)", "expected road to answer with finite numbers"),
+    ("RoadEffect", "return elevation_m[:-1] if p.size == 3 else elevation_m", "expected road to answer with an array"),
     ("DriveEffect", "return distance_m / (p.size - 3)", "expected driven to answer with finite numbers"),
     ("DriveEffect", "return distance_m[:-1] if p.size == 3 else distance_m", "expected driven to answer with an array"),
     ("DriveEffect", "return [{}[1] if p.size == 3 else one for one in distance_m]", ":16: KeyError: 1"),

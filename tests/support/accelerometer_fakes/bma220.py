@@ -101,7 +101,7 @@ class FakeBma220(Fake):
 
     @property
     def sheet(self) -> DataSheet:
-        range_g, rate_hz = self.settings.range_g, 100 * self.settings.oversample
+        range_g, rate_hz = self.settings.range_g, 100 * self.settings.reads
         wanted_hz = self.settings.bandwidth_hz or max(hz for hz in FILTER_HZ.values() if hz <= 0.64 * rate_hz / 2)
         return DataSheet(rate_hz, range_g / 32 * G_MPS2, (0.03, 0.3), range_g * G_MPS2, wanted_hz)
 

@@ -64,14 +64,21 @@ def draw_receiver(rng: np.random.Generator) -> Receiver:
                     float(rng.uniform(20, 90)), float(rng.uniform(0.05, 0.3)))
 
 
-def write_field(case: Case, sensor: str, vehicle: Path, folder: Path) -> list[tuple[Path, Path]]:
-    """Write ``run1.dump``, ``line1.csv`` ... into a folder; give the pairs. The dumps name the file of the vehicle."""
+def write_field(
+    case: Case, sensor: str, vehicle: Path, folder: Path, one_road: bool = False,
+) -> list[tuple[Path, Path]]:
+    """Write ``run1.dump``, ``line1.csv`` ... into a folder; give the pairs. The dumps name the file of the vehicle.
+
+    one_road    whether all drives are over one road, and not each over one elsewhere
+    """
     rng = np.random.default_rng([case.seed, SENSORS.index(sensor)])
     receiver = draw_receiver(rng)
-    pairs = []
+    pairs: list[tuple[Path, Path]] = []
+    along = None
     for number, (drive, run, road) in enumerate(
             zip(case.scene.drives, case.recordings, case.profiles, strict=True), 1):
-        along = _Path(rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 0.6), rng.uniform(400, 2000))
+        if along is None or not one_road:
+            along = _Path(rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 0.6), rng.uniform(400, 2000))
         dump, line = folder / f"run{number}.dump", folder / f"line{number}.csv"
         _write_dump(dump, case, sensor, vehicle, run, drive.distance_m, drive.speed_at_mps, along, receiver, rng)
         tracks = [road.left_m, road.right_m] if case.both_tracks else [road.left_m]

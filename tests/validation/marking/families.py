@@ -12,6 +12,7 @@ BY_TRAVEL, BY_RATE, BY_BOTH, BY_TIRE = "force by travel", "force by rate", "damp
 FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading by heat"
 MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
 DRIFT, CHANGE = "sensor drift", "number that changes"
+PROFILE, INERTIA = "profile that lacks waves", "inertia in the suspension"
 
 REMOVED_DRIFT = "drift that is removed"
 """No family: a sensor's drift is no law of the car, it is removed and said."""
@@ -26,9 +27,11 @@ NAMES: dict[str, frozenset[str]] = {
     PLAY: frozenset({"damper_backlash"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
-    CORRECTION: frozenset({"record_factor", "clipping"}),
+    CORRECTION: frozenset({"record_factor", "clipping", "loose_sensor"}),
     REPEATS: frozenset({"hum", "wheel_turns"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
+    INERTIA: frozenset({"inertia_behind_spring"}),
+    PROFILE: frozenset({"smoothed_profile"}),
     CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
 }
 """What ``ridelog learn`` calls the families of each meaning."""
@@ -55,13 +58,13 @@ RIGHT: dict[str, Right] = {
     "trailer": Right((MASS,), "a mass on a spring behind the rear axle"),
     "clipping": Right((CORRECTION,), "of the sensor's reading alone"),
     "gain_drift": Right((CHANGE, DRIFT), "the gain is a number that was taken for fixed, and it is the sensor's"),
-    "blurred_profile": Right((CORRECTION,), "what was compared lacks short waves, as if it were filtered"),
+    "blurred_profile": Right((PROFILE,), "the profile lacks short waves; the record itself is as it should be"),
     "gas_spring": Right((BY_TRAVEL,), "a force by travel, stiffer in compression"),
     "place_damper": Right((BY_BOTH,), "a force by travel and rate together"),
     "stribeck_friction": Right((FRICTION, BY_RATE), "a force by rate that falls; friction"),
     "rebound_stop": Right((BY_TRAVEL,), "a force by travel and rate, in extension"),
-    "inerter": Right((MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way with time"),
-    "hydraulic_mount": Right((MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
+    "inerter": Right((INERTIA, MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way"),
+    "hydraulic_mount": Right((INERTIA, MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
     "wheel_absorber": Right((MASS,), "a mass on a spring at each wheel"),
     "tire_warming": Right((CHANGE,), "the tires' stiffness changes with time"),
     "damper_heating": Right((HEAT, CHANGE), "the damping falls with the heat that it made"),

@@ -1,9 +1,9 @@
 """A record that goes no farther than a limit: a sensor or an amplifier that clips, or nears its limit smoothly.
 
 Smoothly, a reading x becomes x / (1 + |x / limit|^n)^(1 / n): with n = 2 it bends early, with n = 20 it all but clips
-(C. Rapp, 2nd European Conference on Satellite Communications, 1991, ESA SP-332: amplifiers). What limits a reading sits
-before the recorder's filter, which rounds the corners: the record is taken in finer steps, band-limited as it is,
-limited there, and what was lost goes through such a filter.
+(C. Rapp, 2nd European Conference on Satellite Communications, 1991, ESA SP-332, p. 179: amplifiers). What limits a
+reading sits before the recorder's filter, which rounds the corners: the record is taken in finer steps, band-limited as
+it is, limited there, and what was lost goes through such a filter.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """A correction between body and record: a stable rational transfer function of low order.
 
 1 + (a + b s / w) / (1 + 2 z s / w + s2 / w2) adds one pair of poles in parallel to the direct path: a bracket, a panel
-that rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole.
+that rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole; 1 + a (s / w) / (1 + s / w) leaves slow motions
+as they are, and raises or lowers quick ones.
 """
 
 from __future__ import annotations
@@ -15,6 +16,10 @@ from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _POLE = """def factor(self, p, s):
     return 1.0 + p.added_ratio / (1.0 + s / (2 * np.pi * p.frequency_hz))
+"""
+_RISING = """def factor(self, p, s):
+    at = s / (2 * np.pi * p.frequency_hz)
+    return 1.0 + p.added_ratio * at / (1.0 + at)
 """
 _PAIR = """def factor(self, p, s):
     at = s / (2 * np.pi * p.frequency_hz)
@@ -42,12 +47,16 @@ class RecordFactor(Family):
             "signature": "the measurement is the model times one function of frequency, whatever the road",
         }
         return [Draft(parameters=(added, frequency), method=_POLE, variant="pole", **common),
+                Draft(parameters=(replace(added, meaning="what is added to quick motions"), frequency), method=_RISING,
+                      variant="rising", **common),
                 *(Draft(parameters=(added, rate, _begun(frequency, one), damping), method=_PAIR,
                         variant=f"pair_{one:g}", **common) for one in _HZ)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "pole":
             return f"a record to which {say('added_ratio')} of it is added below {say('frequency_hz')}"
+        if draft.variant == "rising":
+            return f"a record to which {say('added_ratio')} of it is added above {say('frequency_hz')}"
         return (f"a record that something rings into at {say('frequency_hz')} with a damping of "
                 f"{say('damping_ratio')}, by {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
 
