@@ -30,15 +30,18 @@ def page(story: Story) -> Html:
     title = f"{story.first.vehicle}: from the first comparison to the last effect"
     runs = story.first.plain.residuals.runs
     last = story.diagnoses[-1]
+    at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
+    before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
     return document(title, [
         heading(title, ", ".join(run.name for run in runs)),
         _tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
         section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
-        section("What was missing", concatenated(paragraphs(summary(one)) for one in story.diagnoses)),
+        section("What was missing", concatenated(paragraphs(summary(one)) for one in before)),
         *_law(story), *map(_added, story.rounds),
         section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
         section("What the car's numbers had been taken for", _moved(story)),
-        section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))) if story.rounds else "",
+        section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))
+                + concatenated(paragraphs(summary(one)) for one in at_last)) if story.rounds else "",
         shape_sections(last),
         section("What these runs cannot tell, and which drive would", bullets(untested(last))),
         section("Where the effects are from", bullets(

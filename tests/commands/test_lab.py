@@ -160,6 +160,9 @@ def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: py
     html = (out / "story.html").read_text("utf-8")
     for words in ("A law out of the data", "The law", "power_ratio", "with learned_force_by_rate"):
         assert words in html
+    told_of = [html.index(words) for words in ("<h2>What was missing", "<h2>A law out of the data", "<h2>At last",
+                                               "Nothing is missing: with")]
+    assert told_of == sorted(told_of)
 
 
 def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str], tmp_path: Path) -> None:

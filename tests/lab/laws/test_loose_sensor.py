@@ -10,7 +10,7 @@ from scipy.signal import decimate, firwin, lfilter
 
 from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.families.loose_sensor import FAMILY
-from logger.vehicle.effect import RecordEffect, Recording
+from logger.vehicle.effect import RecordEffect, Recording, chosen
 
 from ...support.lab.secret_runs import posterior_of, secret_runs
 
@@ -32,10 +32,20 @@ def thrown(body_m: np.ndarray, step_s: float, held_mps2: float) -> np.ndarray:
 
 
 def effect() -> RecordEffect:
-    posterior = posterior_of(secret_runs())
-    found, = (one.effect for one in FAMILY.drafts(LawContext(posterior, posterior.start())))
+    found = FAMILY._draft(HELD_MPS2, 10.0).effect
     assert isinstance(found, RecordEffect)
     return found
+
+
+def test_what_holds_it_is_found_closely_and_nothing_is_tried_where_nothing_is_skewed() -> None:
+    plain = secret_runs()
+    posterior = posterior_of(plain)
+    assert not FAMILY.drafts(LawContext(posterior, posterior.start()))
+    falls = [float(np.quantile(-run.measured_mps2, 0.95)) for run in plain.runs]
+    loose = chosen(effect(), {"held_mps2": min(falls)})
+    posterior = posterior_of(secret_runs([loose]))
+    draft, = FAMILY.drafts(LawContext(posterior, posterior.start()))
+    assert draft.parameters[0].start == pytest.approx(min(falls), rel=0.02)
 
 
 def test_it_flies_and_lands_as_a_mass_does() -> None:

@@ -4,15 +4,24 @@ A mass that is only pressed on with a force h m follows the body as long as its 
 acceleration above -h. Below, it falls behind with -h, until the gap closes again; landing without a bounce takes its
 remaining speed away at once (B. Brogliato, Nonsmooth Mechanics, 2016, chapter 1: unilateral contact, impact with a
 coefficient of restitution of 0). The blow is in the record as wide as the recorder's filter makes it.
+
+When it lands goes with where it left, so that a fit has to begin within a few hundredths of what holds it: closely
+spaced values are tried on the model's record. Blows are all upwards, which the residual's skewness shows; where it has
+none, nothing is tried.
 """
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import numpy.typing as npt
 
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
-from logger.vehicle.effect import Chosen, Parameter, Scale
+from logger.vehicle.effect import Chosen, Parameter, RecordEffect, Recording, Scale
+
+Array = npt.NDArray[np.float64]
 
 _FUNCTIONS = """
 FINER = 8  # steps in which the flight is followed, of each of the record's
@@ -49,8 +58,10 @@ _METHOD = """def record(self, p, recording):
     beyond = np.clip((np.arange(len(changed)) / n - 0.38) / 0.12, 0.0, 1.0)
     return accel + np.fft.irfft(changed * np.cos(0.5 * np.pi * beyond) ** 2, n)
 """
-_SHARES = (0.5, 0.1, 0.02)
-"""Of the time that the body falls faster than what is tried holds the sensor."""
+_WEAKEST, _TRIED, _CLOSER = 0.02, 200, np.linspace(-0.02, 0.02, 17)
+"""Of the greatest fall of the body; how many are tried up to there, two hundredths apart; and around the best."""
+_SKEWED = 10.0
+"""Standard errors of the skewness of white noise, sqrt(6 / n)."""
 
 
 class LooseSensor(Family):
@@ -60,20 +71,41 @@ class LooseSensor(Family):
     shown_by = "screw the sensor down, and drive the same road again"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        predictions = context.state.predictions
-        falls = -np.concatenate([run.main(one) for run, one in zip(context.runs, predictions, strict=True)])
-        greatest = float(falls.max())
-        held = sorted({rounded(max(float(np.quantile(falls, 1 - share)), 0.02 * greatest)) for share in _SHARES})
-        number = Parameter("held_mps2", held[-1], rounded(0.01 * greatest), rounded(5 * greatest), float("inf"),
-                           Scale.RECIPROCAL, tuple(held), "the sensor leaves its seat where the body falls faster")
-        return [Draft(
+        residual = np.concatenate([one[run.first:] for run, one in zip(context.runs, context.residuals, strict=True)])
+        skewness = float(np.mean(residual**3) / np.mean(residual**2) ** 1.5)
+        predicted = [run.main(one) for run, one in zip(context.runs, context.state.predictions, strict=True)]
+        greatest = max(float(-one.min()) for one in predicted)
+        if skewness < _SKEWED * np.sqrt(6 / len(residual)) or not greatest > 0:
+            return []
+        effect = self._draft(greatest, greatest).effect
+        assert isinstance(effect, RecordEffect)
+        best = greatest
+        for shares in (np.geomspace(_WEAKEST, 1.0, _TRIED), 1 + _CLOSER):
+            tried = best * shares
+            best = float(tried[int(np.argmin([_squares(context, effect, predicted, held) for held in tried]))])
+        return [self._draft(rounded(best, 4), greatest)]
+
+    def _draft(self, held_mps2: float, greatest_mps2: float) -> Draft:
+        number = Parameter("held_mps2", held_mps2, rounded(0.01 * greatest_mps2), rounded(5 * greatest_mps2),
+                           float("inf"), Scale.RECIPROCAL, (held_mps2,),
+                           "the sensor leaves its seat where the body falls faster", step=0.002 / held_mps2)
+        return Draft(
             family=self.name, kind="RecordEffect", title=self.title, shown_by=self.shown_by, parameters=(number,),
             source="B. Brogliato, Nonsmooth Mechanics (2016), chapter 1: unilateral contact, impact without a bounce",
             signature="downwards the record goes no farther than a limit, and blows upwards follow",
-            functions=_FUNCTIONS, method=_METHOD)]
+            functions=_FUNCTIONS, method=_METHOD)
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a sensor that lies loose, and leaves its seat where the body falls faster than {say('held_mps2')}"
+
+
+def _squares(context: LawContext, effect: RecordEffect, predicted: list[Array], held_mps2: float) -> float:
+    """Sum of the squares of what is left of the residuals by a sensor that is held so."""
+    p, found = SimpleNamespace(held_mps2=held_mps2), 0.0
+    for run, one in zip(context.runs, predicted, strict=True):
+        felt = effect.record(p, Recording(np.arange(run.count) / run.rate_hz, one, one, one))
+        found += float(np.sum((run.measured_mps2 - felt)[run.first:] ** 2))
+    return found
 
 
 FAMILY = LooseSensor()

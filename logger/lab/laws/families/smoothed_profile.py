@@ -35,7 +35,9 @@ def share_left(p, waves_per_m):
 """
 _BELL = "np.exp(-0.5 * np.minimum(2 * np.pi * waves_per_m * p.spread_m, 30.0) ** 2)"
 _MEAN = "np.sinc(waves_per_m * p.base_m)"
-_SPREADS_M = (0.04, 0.1, 0.25)  # standard deviations of the weights of a mean that are tried
+_SPREADS_M = (0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.45)
+"""Standard deviations of the weights of a mean that are tried, closely: what is lost grows as the exponential of their
+squares, so that no slope leads far."""
 
 
 class SmoothedProfile(Family):
@@ -65,7 +67,7 @@ class SmoothedProfile(Family):
 def _length(name: str, times: float, meaning: str) -> Parameter:
     """A length that is so many times the standard deviation of the weights of the mean."""
     tried = tuple(round(times * one, 3) for one in _SPREADS_M)
-    return Parameter(name, tried[1], 0.0, round(2 * times, 3), 0.0, Scale.LINEAR, tried, meaning, step=0.002)
+    return Parameter(name, tried[3], round(0.2 * tried[0], 4), round(2 * times, 3), None, Scale.LOG, tried, meaning)
 
 
 FAMILY = SmoothedProfile()
