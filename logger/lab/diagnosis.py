@@ -27,9 +27,9 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import BAND_SIGMA, CONFLICT_SIGMA, FARTHEST_SIGMA
+from logger.lab.likelihood.priors import BAND_SIGMA, CONFLICT_SIGMA, FARTHEST_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from
@@ -247,7 +247,8 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
-    that are at an end of their range then are dropped."""
+    that are at an end of their range then are dropped, and those that are not unusually far from doing nothing: they
+    gained because numbers of the car were held at their soft bounds, and do what these numbers may do as well."""
     search.progress("fitting it finely")
     fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
@@ -256,7 +257,11 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         after = fit_model(fine, start, selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
-            return selection, after
+            found = standard_errors(after)[0][search.present:]
+            weakest = min(found, key=deviations_from_null, default=None)
+            if weakest is None or deviations_from_null(weakest) > UNUSUAL_SIGMA:
+                return selection, after
+            ended = [weakest.effect.name]
         selection = search.without_effect(selection, ended[0])
 
 

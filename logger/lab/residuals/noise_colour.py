@@ -2,11 +2,9 @@
 
 Problem: the sensor's noise is read where no car moves the sensor, at the highest frequencies, and taken to be white.
 Noise that falls or rises with frequency then looks like missing physics. Solution: what a car does grows with how much
-it is shaken, and follows the road; what a sensor adds does neither. The residual's power in each band, block by block,
-is regressed on that of the model's motion: its intercept is the noise, of whatever colour (weighted least squares, as
-of gamma distributed powers). A residual is noise if hardly any of it may grow with the motion, the uncertainty of that
-counted in, and none of the tests of a residual relates it to the road, to the car, to a time or to a place, or finds a
-tone in it.
+it is shaken, and follows the road; what a sensor adds does neither. A residual is noise if hardly any of its power may
+grow with the motion (``growing_power``), the uncertainty of that counted in, and none of the tests of a residual
+relates it to the road, to the car, to a time or to a place, or finds a tone in it.
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.growing_power import UPPER_SIGMA, growing_power
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import Bands
@@ -25,10 +24,6 @@ Array = npt.NDArray[np.float64]
 
 COLOUR = frozenset({"whiteness", "frequency"})
 """Tests of a residual that only say that it has a colour."""
-_UPPER_SIGMA = 2.0
-"""What grows with the motion is taken to be so many standard errors more than it is found to be."""
-_OVERLAP = 0.947  # blocks with Hann's taper that overlap by half are worth this share of their number (Welch 1967)
-_ROUNDS = 6
 
 
 def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise | None:
@@ -45,31 +40,12 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise |
     grows, error = growing_power(power, motion)
     freedom = np.sum([one.freedom for one in bands], axis=0)
     mean = float(freedom @ power.mean(axis=0)) / float(freedom.sum())
-    may_grow = (max(float(freedom @ grows), 0.0) + _UPPER_SIGMA * float(np.linalg.norm(freedom * error))) / float(
+    may_grow = (max(float(freedom @ grows), 0.0) + UPPER_SIGMA * float(np.linalg.norm(freedom * error))) / float(
         freedom.sum())
     if not mean - may_grow > mean / (1 + UNEXPLAINED) ** 2:
         return None
     level = mean - max(float(freedom @ grows) / float(freedom.sum()), 0.0)
     return Noise(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
-
-
-def growing_power(power: Array, motion: Array) -> tuple[Array, Array]:
-    """The part of the mean power (b,) that grows with the motion's, and its standard error (b,), by powers (blocks, b)
-    of both."""
-    grows, errors = np.zeros(power.shape[1]), np.full(power.shape[1], np.inf)
-    for band, (one, moved) in enumerate(zip(power.T, motion.T, strict=True)):
-        if len(one) < 4 or not np.ptp(moved) > 0 or not one.mean() > 0:
-            continue
-        columns = np.column_stack([np.ones(len(one)), moved / moved.mean()])
-        expected = np.full(len(one), one.mean())
-        for _ in range(_ROUNDS):
-            weights = expected**-2
-            inverse = np.linalg.inv(columns.T @ (weights[:, None] * columns))
-            found = inverse @ (columns.T @ (weights * one))
-            expected = np.maximum(columns @ found, 0.1 * one.mean())
-        spread = float(weights @ (one - columns @ found) ** 2) / (_OVERLAP * len(one) - 2)
-        grows[band], errors[band] = float(found[1]), float(np.sqrt(spread * inverse[1, 1] / _OVERLAP))
-    return grows, errors
 
 
 def _is_related(shape: Shape) -> bool:

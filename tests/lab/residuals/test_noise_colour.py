@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from logger.lab.diagnosis import diagnose
-from logger.lab.residuals.noise_colour import growing_power
+from logger.lab.likelihood.growing_power import growing_power
 from logger.report.diagnosis_text import summary
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
