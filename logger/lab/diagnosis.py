@@ -27,7 +27,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import BAND_SIGMA, CONFLICT_SIGMA, FARTHEST_SIGMA, UNUSUAL_SIGMA
+from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -168,7 +168,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         wider = posterior.with_rough_file()
         again = searched(wider)
         # A few numbers that are far off even so are not explained by a rough file.
-        if not wider.prior.any_beyond(again[-1].state.logs, FARTHEST_SIGMA):
+        if not wider.prior.any_beyond(again[-1].state.logs, UNUSUAL_SIGMA):
             return replace(_assess(wider, effects, present, *again), rough_file=True)
     return _assess(posterior, effects, present, *found)
 
@@ -218,7 +218,7 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        car=fitted_car(fine, baseline, state), tolerance=BAND_SIGMA * posterior.tolerance.numbers,
+        car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.band * posterior.tolerance.numbers,
     )
 
 

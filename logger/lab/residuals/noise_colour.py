@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.growing_power import UPPER_SIGMA, growing_power
+from logger.lab.likelihood.growing_power import growing_power
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import Bands
@@ -26,10 +26,11 @@ COLOUR = frozenset({"whiteness", "frequency"})
 """Tests of a residual that only say that it has a colour."""
 
 
-def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise | None:
+def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape, sigma: float = 2.0) -> Noise | None:
     """The noise of a residual that has a colour; None where it may be more than that, or the runs do not show it.
 
     every    the bands of each run; those of one signal, the same in all runs, are asked for
+    sigma    what grows with the motion is taken to be so many standard errors more than it is found to be
     """
     bands = [one for one in every if isinstance(one, Bands)]
     if len(bands) < len(every) or len({one.edges_hz.tobytes() for one in bands}) > 1 or _is_related(shape):
@@ -40,7 +41,7 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise |
     grows, error = growing_power(power, motion)
     freedom = np.sum([one.freedom for one in bands], axis=0)
     mean = float(freedom @ power.mean(axis=0)) / float(freedom.sum())
-    may_grow = (max(float(freedom @ grows), 0.0) + UPPER_SIGMA * float(np.linalg.norm(freedom * error))) / float(
+    may_grow = (max(float(freedom @ grows), 0.0) + sigma * float(np.linalg.norm(freedom * error))) / float(
         freedom.sum())
     if not mean - may_grow > mean / (1 + UNEXPLAINED) ** 2:
         return None
