@@ -213,7 +213,11 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
         baseline_error=fine.error(baseline), final_error=fine.error(state),
-        noise=noise, noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
+        noise=noise,
+        # A colour is known in the bands that are compared: what all of the noise makes is no more than what is left.
+        noise_floor_error=floor_error(fine, noise) if colour is None else min(floor_error(fine, noise),
+                                                                               fine.error(state)),
+        candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,

@@ -4,7 +4,8 @@ Problem: the sensor's noise is read where no car moves the sensor, at the highes
 Noise that falls or rises with frequency then looks like missing physics. Solution: what a car does grows with how much
 it is shaken, and follows the road; what a sensor adds does neither. A residual is noise if hardly any of its power may
 grow with the motion (``growing_power``), the uncertainty of that counted in, and none of the tests of a residual
-relates it to the road, to the car, to a time or to a place, or finds a tone in it.
+relates it to the road, to the car, to a time or to a place, or finds a tone in it; and if it falls or rises with
+frequency throughout.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape, sigma: flo
                      for some in (_whole(residuals.residual, bands), _whole(residuals.model, bands)))
     grows, error = growing_power(power, motion)
     freedom = np.sum([one.freedom for one in bands], axis=0)
+    if not is_monotonic(power.mean(axis=0), freedom):
+        return None
     mean = float(freedom @ power.mean(axis=0)) / float(freedom.sum())
     may_grow = (max(float(freedom @ grows), 0.0) + sigma * float(np.linalg.norm(freedom * error))) / float(
         freedom.sum())
@@ -47,6 +50,25 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape, sigma: flo
         return None
     level = mean - max(float(freedom @ grows) / float(freedom.sum()), 0.0)
     return Noise(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
+
+
+def is_monotonic(levels: Array, freedom: Array, sigma: float = 3.0) -> bool:
+    """Whether levels (b,) with these degrees of freedom fall or rise with frequency throughout, as a sensor's noise
+    does; a hum makes a hill. None may lie above the nearest levels that do (isotonic regression) by more than what
+    counts as explained and so many standard errors."""
+    most = (1 + UNEXPLAINED) ** 2 * (1 + sigma * np.sqrt(2 / freedom))
+    falling = rising_levels(levels[::-1], freedom[::-1])[::-1]
+    return any(bool((levels <= most * nearest).all()) for nearest in (falling, rising_levels(levels, freedom)))
+
+
+def rising_levels(levels: Array, weights: Array) -> Array:
+    """The nearest levels (b,) that never fall: the largest of the least weighted means of what begins at or before each
+    and ends at or after it (R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972)."""
+    weight, total = (np.concatenate([[0.0], np.cumsum(one)]) for one in (weights, weights * levels))
+    count = len(levels)
+    return np.array([max(min((total[end] - total[first]) / (weight[end] - weight[first])
+                             for end in range(place + 1, count + 1)) for first in range(place + 1))
+                     for place in range(count)])
 
 
 def _is_related(shape: Shape) -> bool:
