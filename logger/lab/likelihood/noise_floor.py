@@ -149,8 +149,9 @@ def _steady_of(signal: SignalResiduals) -> Array:
         return np.zeros(1)
     motions = [run.measured_mps2 * run.read - residual
                for run, residual in zip(signal.runs, signal.residuals, strict=True)]
-    return steady_power(*(np.concatenate([one.block_powers(samples) for one, samples in zip(bands, some, strict=True)])
-                          for some in (signal.residuals, motions)))
+    power, motion = (np.concatenate([one.block_powers(samples) for one, samples in zip(bands, some, strict=True)])
+                     for some in (signal.residuals, motions))
+    return steady_power(power, motion)
 
 
 def excess_over_noise(posterior: Posterior, state: State, chance: float, noise: Noise | None = None) -> float:
