@@ -27,9 +27,9 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import BAND_SIGMA, CONFLICT_SIGMA, FARTHEST_SIGMA
+from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from
@@ -175,7 +175,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         search_again, selection_again = searched(wider)
         selection_again, after_again = _fit_finely(search_again, selection_again)
         # A few numbers that are far off even so are not explained by a rough file.
-        if not wider.prior.any_beyond(after_again.state.logs, FARTHEST_SIGMA):
+        if not wider.prior.any_beyond(after_again.state.logs, UNUSUAL_SIGMA):
             found = _assess(wider, effects, present, search_again, selection_again, after_again)
             return replace(found, rough_file=True)
     return _assess(posterior, effects, present, search, selection, after)
@@ -221,12 +221,16 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
         baseline_error=fine.error(baseline), final_error=fine.error(state),
-        noise=noise, noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
+        noise=noise,
+        # A colour is known in the bands that are compared: what all of the noise makes is no more than what is left.
+        noise_floor_error=floor_error(fine, noise) if colour is None else min(floor_error(fine, noise),
+                                                                               fine.error(state)),
+        candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        car=fitted_car(fine, baseline, state), tolerance=BAND_SIGMA * posterior.tolerance.numbers,
+        car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.band * posterior.tolerance.numbers,
     )
 
 
@@ -255,7 +259,8 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
-    that are at an end of their range then are dropped."""
+    that are at an end of their range then are dropped, and those that are not unusually far from doing nothing: they
+    gained because numbers of the car were held at their soft bounds, and do what these numbers may do as well."""
     search.progress("fitting it finely")
     fine = selection.before.posterior.without_soft_bounds(fine=True)
     while True:
@@ -264,7 +269,11 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         after = fit_model(fine, start, selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
-            return selection, after
+            found = standard_errors(after)[0][search.present:]
+            weakest = min(found, key=deviations_from_null, default=None)
+            if weakest is None or deviations_from_null(weakest) > UNUSUAL_SIGMA:
+                return selection, after
+            ended = [weakest.effect.name]
         selection = search.without_effect(selection, ended[0])
 
 

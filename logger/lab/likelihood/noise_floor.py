@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.repeats import find_repeats
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
@@ -129,13 +130,28 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
 
 def gain_of_full_explanation(posterior: Posterior, state: State) -> float:
     """Decrease of minus twice the log-likelihood if the residuals were just small enough to count as explained; at
-    least 0. Bands that are quiet make up for those that are not."""
+    least 0. Bands that are quiet make up for those that are not. What surely does not grow with the motion is noise of
+    a colour, which no effect explains."""
     found = 0.0
     for signal in _by_signal(posterior, state):
-        noise = ((1 + UNEXPLAINED) * _noise_of(signal).deviation_mps2) ** 2
+        steady = _steady_of(signal)
+        noise = (1 + UNEXPLAINED) ** 2 * np.maximum(_noise_of(signal).deviation_mps2**2, steady)
         found += sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise / share, one.floor)))
                      for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True))
     return max(0.0, found)
+
+
+def _steady_of(signal: SignalResiduals) -> Array:
+    """Power (b,) of a sensor's residuals that surely does not grow with the motion; 0 of another signal, and where runs
+    are compared in several bands."""
+    bands = signal.bands
+    if signal.name or len({one.edges_hz.tobytes() for one in bands}) > 1:
+        return np.zeros(1)
+    motions = [run.measured_mps2 * run.read - residual
+               for run, residual in zip(signal.runs, signal.residuals, strict=True)]
+    power, motion = (np.concatenate([one.block_powers(samples) for one, samples in zip(bands, some, strict=True)])
+                     for some in (signal.residuals, motions))
+    return steady_power(power, motion)
 
 
 def excess_over_noise(posterior: Posterior, state: State, chance: float, noise: Noise | None = None) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
-from logger.lab.likelihood.priors import WIDE_NUMBERS, Tolerance, VehiclePrior
+from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.runs import normalised_rms_error
@@ -77,15 +77,15 @@ class Posterior:
                          self.readings)
 
     def with_rough_file(self) -> Posterior:
-        """The posterior of a vehicle whose file is a rough one (``priors.WIDE_NUMBERS``)."""
-        tolerance = replace(self.tolerance, numbers=WIDE_NUMBERS)
+        """The posterior of a vehicle whose file is a rough one (``Tolerance.rough``)."""
+        tolerance = replace(self.tolerance, numbers=self.tolerance.rough)
         prior = replace(VehiclePrior.of(self.vehicle, tolerance), soft_bounds=self.prior.soft_bounds)
         return Posterior(self.runs, self.vehicle, tolerance, self.start_vehicle, prior, self.readings)
 
     @property
     def may_be_rough(self) -> bool:
         """Whether a rough file's numbers would be more uncertain than these are taken to be."""
-        return self.tolerance.numbers < WIDE_NUMBERS
+        return self.tolerance.numbers < self.tolerance.rough
 
     def with_rounding_at(self, state: State) -> Posterior:
         """The posterior with rounded readings taken for bounds, given the predictions of a state; itself where rounding

@@ -28,18 +28,6 @@ in thirty comparisons (normal distribution)."""
 CONFLICT_SIGMA = 4.0
 """A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
 as far in 1300 comparisons (normal distribution)."""
-BAND_SIGMA = 1.6
-"""A band that numbers may well be off by ends at so many standard deviations: one of 4 % either way has 2.5 %."""
-WIDE_NUMBERS = 0.1 / BAND_SIGMA
-"""Standard deviation, as a share, of masses, springs and dampers of a file that turns out to be a rough one: a band of
-10 % either way. A judgement: it is what data sheets and textbook cars are off by."""
-_KNOWN, _SEVERAL = 0.5, 4
-"""A number is measured where its standard error is less than this share of its prior's; so many say what a file is
-worth (``another_car`` asks for as many)."""
-FARTHEST_SIGMA = 2.5
-"""None of a rough file's numbers is farther off (16 %), and none counts as farther off where a file is judged: a
-missing effect pulls few numbers, but far. Of a dozen right numbers one goes as far in seven files (normal
-distribution)."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +39,17 @@ class Tolerance:
     gain         of the acceleration, as a share
     droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
                  each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
+    rough        of masses, inertias, springs and dampers in a file that turns out to be a rough one, as a share: a band
+                 of 10 % either way (a judgement: data sheets and textbook cars are off by as much)
+    band         in which numbers may well be, in these deviations: 4 % either way have 2.5 %
     """
 
     numbers: float = 0.025
     lengths: float = 0.02
     gain: float = 0.005
     droop: float = 0.4
+    rough: float = 0.0625
+    band: float = 1.6
 
 
 def is_length(names: Sequence[str]) -> npt.NDArray[np.bool_]:
@@ -117,13 +110,20 @@ class VehiclePrior:
         """Whether a mass, spring or damper lies farther off than so many standard deviations (p,)."""
         return bool((np.abs(logs / self.deviations)[~is_length(self.names)] > deviations).any())
 
-    def off_on_the_whole(self, logs: Array, errors: Array) -> bool:
+    def off_on_the_whole(self, logs: Array, errors: Array, band: float = Tolerance.band, known: float = 0.5,
+                         several: int = 4, farthest: float = 2.5) -> bool:
         """Whether the masses, springs and dampers that were measured, by these standard errors (p,), lie beyond the
         band that they may well be off by, on the whole (r.m.s.): then it is the file that is rough, and not an effect
-        that is missing."""
-        measured = ~is_length(self.names) & (errors < _KNOWN * self.deviations)
-        off = np.minimum(np.abs(logs[measured]) / self.deviations[measured], FARTHEST_SIGMA)
-        return len(off) >= _SEVERAL and float(np.sqrt(np.mean(off**2))) > BAND_SIGMA
+        that is missing.
+
+        band        its end, in deviations of the prior
+        known       a number is measured where its standard error is less than this share of its prior's
+        several     so many say what a file is worth (``another_car`` asks for as many)
+        farthest    none counts as farther off than so many deviations: a missing effect pulls few numbers, but far
+        """
+        measured = ~is_length(self.names) & (errors < known * self.deviations)
+        off = np.minimum(np.abs(logs[measured]) / self.deviations[measured], farthest)
+        return len(off) >= several and float(np.sqrt(np.mean(off**2))) > band
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
         """The vehicle with its numbers times the exponentials of these logarithms (p,)."""

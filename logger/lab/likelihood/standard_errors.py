@@ -52,6 +52,18 @@ def number_errors(found: LinearModel) -> NumberErrors:
     return NumberErrors.of_covariance(names, _covariance(linear) * np.outer(units, units))
 
 
+def deviations_from_null(one: Chosen) -> float:
+    """By how many standard errors an effect is from doing nothing (A. Wald's test), by the strength of which that is
+    most; infinite where none has a standard error."""
+    found = []
+    for parameter in one.effect.parameters:
+        value, error = one.values[parameter.name], one.standard_errors.get(parameter.name, np.inf)
+        if parameter.null is not None and 0 < error < np.inf:
+            null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
+            found.append(abs((parameter.coordinate(value) - null) / (error * slope_of(parameter, value))))
+    return max(found, default=float("inf"))
+
+
 def _covariance(linear: LinearModel) -> Array:
     """Covariance of the logarithms of the car's numbers, then of the effects' numbers on their scales; infinite where
     nothing is known."""

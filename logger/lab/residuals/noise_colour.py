@@ -2,11 +2,10 @@
 
 Problem: the sensor's noise is read where no car moves the sensor, at the highest frequencies, and taken to be white.
 Noise that falls or rises with frequency then looks like missing physics. Solution: what a car does grows with how much
-it is shaken, and follows the road; what a sensor adds does neither. The residual's power in each band, block by block,
-is regressed on that of the model's motion: its intercept is the noise, of whatever colour (weighted least squares, as
-of gamma distributed powers). A residual is noise if hardly any of it may grow with the motion, the uncertainty of that
-counted in, and none of the tests of a residual relates it to the road, to the car, to a time or to a place, or finds a
-tone in it.
+it is shaken, and follows the road; what a sensor adds does neither. A residual is noise if hardly any of its power may
+grow with the motion (``growing_power``), the uncertainty of that counted in, and none of the tests of a residual
+relates it to the road, to the car, to a time or to a place, or finds a tone in it; and if it falls or rises with
+frequency throughout.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.growing_power import growing_power
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import Bands
@@ -25,16 +25,13 @@ Array = npt.NDArray[np.float64]
 
 COLOUR = frozenset({"whiteness", "frequency"})
 """Tests of a residual that only say that it has a colour."""
-_UPPER_SIGMA = 2.0
-"""What grows with the motion is taken to be so many standard errors more than it is found to be."""
-_OVERLAP = 0.947  # blocks with Hann's taper that overlap by half are worth this share of their number (Welch 1967)
-_ROUNDS = 6
 
 
-def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise | None:
+def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape, sigma: float = 2.0) -> Noise | None:
     """The noise of a residual that has a colour; None where it may be more than that, or the runs do not show it.
 
     every    the bands of each run; those of one signal, the same in all runs, are asked for
+    sigma    what grows with the motion is taken to be so many standard errors more than it is found to be
     """
     bands = [one for one in every if isinstance(one, Bands)]
     if len(bands) < len(every) or len({one.edges_hz.tobytes() for one in bands}) > 1 or _is_related(shape):
@@ -44,8 +41,10 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise |
                      for some in (_whole(residuals.residual, bands), _whole(residuals.model, bands)))
     grows, error = growing_power(power, motion)
     freedom = np.sum([one.freedom for one in bands], axis=0)
+    if not is_monotonic(power.mean(axis=0), freedom):
+        return None
     mean = float(freedom @ power.mean(axis=0)) / float(freedom.sum())
-    may_grow = (max(float(freedom @ grows), 0.0) + _UPPER_SIGMA * float(np.linalg.norm(freedom * error))) / float(
+    may_grow = (max(float(freedom @ grows), 0.0) + sigma * float(np.linalg.norm(freedom * error))) / float(
         freedom.sum())
     if not mean - may_grow > mean / (1 + UNEXPLAINED) ** 2:
         return None
@@ -53,23 +52,23 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise |
     return Noise(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
 
 
-def growing_power(power: Array, motion: Array) -> tuple[Array, Array]:
-    """The part of the mean power (b,) that grows with the motion's, and its standard error (b,), by powers (blocks, b)
-    of both."""
-    grows, errors = np.zeros(power.shape[1]), np.full(power.shape[1], np.inf)
-    for band, (one, moved) in enumerate(zip(power.T, motion.T, strict=True)):
-        if len(one) < 4 or not np.ptp(moved) > 0 or not one.mean() > 0:
-            continue
-        columns = np.column_stack([np.ones(len(one)), moved / moved.mean()])
-        expected = np.full(len(one), one.mean())
-        for _ in range(_ROUNDS):
-            weights = expected**-2
-            inverse = np.linalg.inv(columns.T @ (weights[:, None] * columns))
-            found = inverse @ (columns.T @ (weights * one))
-            expected = np.maximum(columns @ found, 0.1 * one.mean())
-        spread = float(weights @ (one - columns @ found) ** 2) / (_OVERLAP * len(one) - 2)
-        grows[band], errors[band] = float(found[1]), float(np.sqrt(spread * inverse[1, 1] / _OVERLAP))
-    return grows, errors
+def is_monotonic(levels: Array, freedom: Array, sigma: float = 3.0) -> bool:
+    """Whether levels (b,) with these degrees of freedom fall or rise with frequency throughout, as a sensor's noise
+    does; a hum makes a hill. None may lie above the nearest levels that do (isotonic regression) by more than what
+    counts as explained and so many standard errors."""
+    most = (1 + UNEXPLAINED) ** 2 * (1 + sigma * np.sqrt(2 / freedom))
+    falling = rising_levels(levels[::-1], freedom[::-1])[::-1]
+    return any(bool((levels <= most * nearest).all()) for nearest in (falling, rising_levels(levels, freedom)))
+
+
+def rising_levels(levels: Array, weights: Array) -> Array:
+    """The nearest levels (b,) that never fall: the largest of the least weighted means of what begins at or before each
+    and ends at or after it (R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972)."""
+    weight, total = (np.concatenate([[0.0], np.cumsum(one)]) for one in (weights, weights * levels))
+    count = len(levels)
+    return np.array([max(min((total[end] - total[first]) / (weight[end] - weight[first])
+                             for end in range(place + 1, count + 1)) for first in range(place + 1))
+                     for place in range(count)])
 
 
 def _is_related(shape: Shape) -> bool:

@@ -21,7 +21,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import FARTHEST_SIGMA
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
@@ -161,7 +161,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
         wider = given.with_rough_file()
         rough = add(wider, present, added, candidates)
-        if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), FARTHEST_SIGMA):
+        if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), UNUSUAL_SIGMA):
             return rough
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
         after.state.logs, base_fit.state.logs, effect_fit.state.logs))

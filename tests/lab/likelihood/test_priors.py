@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import norm
 
-from logger.lab.likelihood.priors import BAND_SIGMA, Tolerance, VehiclePrior, is_length
+from logger.lab.likelihood.priors import Tolerance, VehiclePrior, is_length
 from logger.vehicle.named_parameters import read
 
 from ...support.lab.runs_with_residual import CAR
@@ -80,5 +80,5 @@ def test_a_file_is_rough_where_most_of_what_was_measured_is_off() -> None:
 def test_numbers_within_their_band_are_never_a_rough_file() -> None:
     rng = np.random.default_rng(2)
     for _ in range(200):
-        logs = rng.uniform(-BAND_SIGMA, BAND_SIGMA, len(PRIOR.names)) * PRIOR.deviations
+        logs = rng.uniform(-Tolerance.band, Tolerance.band, len(PRIOR.names)) * PRIOR.deviations
         assert not PRIOR.off_on_the_whole(logs, 0.2 * PRIOR.deviations)

@@ -3,6 +3,7 @@ numbers themselves."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ import pytest
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
-from logger.lab.likelihood.standard_errors import standard_errors, with_standard_errors
+from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors, with_standard_errors
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.effect_sizes import grows_with_mass
@@ -30,6 +31,19 @@ SEEDS = 24
 def found() -> LinearModel:
     posterior = posterior_of(noisy_runs([tire_damping(300.0)]))
     return fit(align(posterior, posterior.start([tire_damping(200.0)])))
+
+
+@pytest.mark.parametrize(("name", "values", "errors", "far"), [
+    ("sensor_offset", {"offset_m": -0.06}, {"offset_m": 0.02}, 3.0),
+    ("damper_asymmetry", {"rebound_to_bump_ratio": 2.0}, {"rebound_to_bump_ratio": 0.1}, 20 * np.log(2.0)),
+    ("top_mount_compliance", {"mount_stiffness_n_per_m": 2e5}, {"mount_stiffness_n_per_m": 4e4}, 5.0),
+    ("occupant", {"mass_kg": 30.0}, {"mass_kg": 10.0, "frequency_hz": 0.1, "damping_ratio": 0.01}, 3.0),
+    ("wheel_lift", {}, {}, np.inf),
+    ("sensor_offset", {"offset_m": 0.1}, {"offset_m": np.inf}, np.inf),
+])
+def test_how_far_an_effect_is_from_doing_nothing_is_told_on_the_scale_of_its_strength(
+        name: str, values: dict[str, float], errors: dict[str, float], far: float) -> None:
+    assert deviations_from_null(replace(hidden(name, **values), standard_errors=errors)) == pytest.approx(far)
 
 
 @pytest.mark.slow

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from logger.lab.diagnosis import diagnose
-from logger.lab.residuals.noise_colour import growing_power
+from logger.lab.likelihood.growing_power import growing_power
+from logger.lab.residuals.noise_colour import is_monotonic, rising_levels
 from logger.report.diagnosis_text import summary
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -35,6 +37,25 @@ def test_what_grows_with_the_motion_is_found_within_its_error(share: float) -> N
 def test_motion_that_never_changes_says_nothing() -> None:
     _, errors = growing_power(np.ones((50, 2)), np.ones((50, 2)))
     assert np.isinf(errors).all()
+
+
+def test_noise_falls_or_rises_throughout_and_a_hum_does_not() -> None:
+    rng = np.random.default_rng(4)
+    freedom = np.linspace(40.0, 300.0, 20)
+    for slope in (-1.5, 0.0, 0.8):
+        levels = np.exp(slope * np.linspace(0, 2, 20)) * rng.gamma(freedom / 2, 2 / freedom, (200, 20))
+        assert np.mean([is_monotonic(one, freedom) for one in levels]) > 0.95
+        humming = levels * np.where(np.arange(20) == 12, 4.0, 1.0)
+        assert not any(is_monotonic(one, freedom) for one in humming)
+
+
+def test_the_nearest_levels_that_rise_are_those_of_least_squares() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        levels, weights = rng.gamma(2.0, 1.0, 8), rng.uniform(0.5, 3.0, 8)
+        steps = lsq_linear(np.sqrt(weights)[:, None] * np.tri(8), np.sqrt(weights) * levels,
+                           ([-np.inf, *[0.0] * 7], np.inf), tol=1e-12)
+        assert rising_levels(levels, weights) == pytest.approx(np.cumsum(steps.x), abs=1e-5)
 
 
 def test_a_sensor_whose_noise_has_a_colour_lacks_no_physics() -> None:

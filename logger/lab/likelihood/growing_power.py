@@ -1,0 +1,38 @@
+"""The part of a residual's power that grows with the motion: what a car does grows with how much it is shaken, what a
+sensor adds does not. In each band the power, block by block, is regressed on that of the model's motion (weighted least
+squares, as of gamma distributed powers); the intercept is noise, of whatever colour.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def steady_power(power: Array, motion: Array, sigma: float = 2.0) -> Array:
+    """The part of the mean power (b,) that surely does not grow with the motion's, by powers (blocks, b) of both: what
+    grows is taken to be so many standard errors more than it is found to be."""
+    grows, errors = growing_power(power, motion)
+    return np.maximum(power.mean(axis=0) - np.maximum(grows, 0.0) - sigma * errors, 0.0)
+
+
+def growing_power(power: Array, motion: Array, worth: float = 0.947, rounds: int = 6) -> tuple[Array, Array]:
+    """The part of the mean power (b,) that grows with the motion's, and its standard error (b,), by powers (blocks, b)
+    of both; ``worth``: of a block with Hann's taper that overlaps the next one by half, as a share of one that does not
+    (P. D. Welch 1967)."""
+    grows, errors = np.zeros(power.shape[1]), np.full(power.shape[1], np.inf)
+    for band, (one, moved) in enumerate(zip(power.T, motion.T, strict=True)):
+        if len(one) < 4 or not np.ptp(moved) > 0 or not one.mean() > 0:
+            continue
+        columns = np.column_stack([np.ones(len(one)), moved / moved.mean()])
+        expected = np.full(len(one), one.mean())
+        for _ in range(rounds):
+            weights = expected**-2
+            inverse = np.linalg.inv(columns.T @ (weights[:, None] * columns))
+            found = inverse @ (columns.T @ (weights * one))
+            expected = np.maximum(columns @ found, 0.1 * one.mean())
+        spread = float(weights @ (one - columns @ found) ** 2) / (worth * len(one) - 2)
+        grows[band], errors[band] = float(found[1]), float(np.sqrt(spread * inverse[1, 1] / worth))
+    return grows, errors
