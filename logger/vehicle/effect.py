@@ -136,6 +136,11 @@ class Parameter:
         weakest = self.coordinate(self.low if self.null <= self.low else self.high)
         return abs(self.coordinate(value) - weakest) < _AT_BOUND * self.usual_range(weakest)
 
+    def is_lowest(self, value: float) -> bool:
+        """Whether a value is at the low end of what it may be, to the same share."""
+        lowest = self.coordinate(self.low)
+        return abs(self.coordinate(value) - lowest) < _AT_BOUND * self.usual_range(lowest)
+
 
 @dataclass(frozen=True)
 class Misalignment:
@@ -167,6 +172,8 @@ class Effect(ABC):
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     sought       whether a search tries it where nobody asked for it by name
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
+    also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
+                 their lows
     """
 
     name: str
@@ -180,6 +187,7 @@ class Effect(ABC):
     replaces: tuple[str, ...] = ()
     sought: Sought = Sought.ALWAYS
     needs_road: bool = False
+    also_by: tuple[str, ...] = ()
     stage: int = 0
 
     @property
@@ -330,7 +338,9 @@ class Chosen:
         """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
         can be no weaker: what looks like it is something else."""
         numbers = [one for one in self.effect.parameters if one.is_free]
-        if any(one.at_weakest_bound(self.values[one.name]) for one in numbers):
+        besides = [one for one in numbers if one.name in self.effect.also_by]
+        if (any(one.at_weakest_bound(self.values[one.name]) for one in numbers)
+                and all(one.is_lowest(self.values[one.name]) for one in besides)):
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)

@@ -37,3 +37,10 @@ def test_a_strength_is_at_its_weakest_at_one_end_and_not_where_it_is_usual(name:
     weakest = one.coordinate(one.low if ends[0] else one.high)
     tenth = one.value(weakest + 0.1 * (one.coordinate(one.start) - weakest))
     assert not one.at_weakest_bound(tenth)  # whatever its unit
+
+
+def test_friction_of_the_body_alone_is_no_friction_that_could_be_no_weaker() -> None:
+    friction = EFFECTS["frame_friction"]
+    assert not chosen(friction, {"friction_force_n": 0.0, "body_friction_force_n": 0.5}).at_bound
+    assert not chosen(friction, {"friction_force_n": 0.5}).at_bound
+    assert chosen(friction, {"friction_force_n": 0.0, "body_friction_force_n": 0.0}).at_bound

@@ -23,38 +23,29 @@ from logger.lab.selection.screening import screen
 from logger.lab.selection.stepwise import Search, Selection
 from logger.runs import LowPass
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Misalignment
+from logger.vehicle.effects.sensor_bandwidth import SensorBandwidth
 
 Complex = npt.NDArray[np.complex128]
 
 _IMITATED_BY = "sensor_bandwidth"
-_HIGHEST_ORDER = 8
-# As ``sensor_bandwidth`` tries them.
-_LOWEST_HZ, _HIGHEST_OF_RATE, _CUTOFF_RATIO = 6.0, 0.45, 1.12
 
 
-class _ForthAndBack(SensorEffect):
-    """Butterworth's low-pass, run forth and back on the samples: no effect of a car, and in no catalogue."""
+class _ForthAndBack(SensorBandwidth):
+    """Butterworth's low-pass, run forth and back on the samples: no effect of a car, and in no catalogue. Its cut-off
+    and order are those of each way."""
 
     name = "filter_without_delay"
     title = "a low-pass that was run forth and back"
-    parameters = (
-        Parameter("cutoff_hz", 25.0, 0.5, 2000.0, float("inf"), Scale.RECIPROCAL, (25.0,), "of each way"),
-        Parameter("order", 4.0, 1.0, 8.0, None, Scale.LINEAR, (4.0,), "of each way",
-                  choices=tuple(map(float, range(1, _HIGHEST_ORDER + 1)))),
-        Parameter("sampled_hz", 100.0, 1e-3, 1e6, None, Scale.LINEAR, (100.0,), "samples a second", given=True),
-    )
-    source = "S. Butterworth, On the Theory of Filter Amplifiers (1930)"
     signature = "the measurement falls behind the model more and more as the frequency rises, and comes no later"
     shown_by = "look at the records as they were recorded"
-    stage = 3
+    realigns = False
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        return super().trials()[:1]
 
     def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
-        highest_hz = _HIGHEST_OF_RATE * seen.rate_hz
-        count = round(np.log(highest_hz / _LOWEST_HZ) / np.log(_CUTOFF_RATIO))
-        return [[{"cutoff_hz": float(cutoff_hz), "order": float(order), "sampled_hz": seen.rate_hz}
-                 for cutoff_hz in np.geomspace(highest_hz, _LOWEST_HZ, count + 1)]
-                for order in range(1, _HIGHEST_ORDER + 1)]
+        return [kind for kind in super().delaying_trials(seen) if kind[0]["sampled_hz"]]
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         one_way = butterworth(int(p.order), s, p.cutoff_hz, p.sampled_hz)

@@ -33,10 +33,6 @@ Array = npt.NDArray[np.float64]
 # Bounds of the best strength over that of a trial, as far as a quadratic is to be believed (judgements). An effect that
 # shifts all of a run is linear much farther, and is tried with next to nothing.
 _STRONGEST, _STRONGEST_SHIFT, _WEAKEST = 10.0, 1000.0, 0.03
-# Of trials with their delay: one kind has so many that gain less and less, and no more are tried; and those that gain
-# such a share of the best are starts of fits, at most so many (judgements: a trial gains within a tenth of its fit).
-_FALLS, _AS_GOOD, _MOST_STARTS = 3, 0.8, 4
-_SLOW_HZ = 1.0  # motions that are slow: a body's bounce
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,10 +219,15 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
 
 
-def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment) -> list[Trial]:
+def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment, falls: int = 3, as_good: float = 0.8,
+                    most: int = 4) -> list[Trial]:
     """The best trials of an effect that delays, with the delay taken out of the distances: fitted without the effect,
     these have absorbed it, and a delay by half a wave more is beyond what is linear. On a rig, whose clock is one,
     nothing has.
+
+    falls            after so many trials of one kind, each of which gains less than the one before, no more are tried
+    as_good, most    so many kinds at most, which gain such a share of the best, are starts of fits (judgements: a trial
+                     gains nine tenths of its fit)
     """
     bests = []
     timed = all(run.timed for run in base.posterior.runs.runs)
@@ -237,22 +238,22 @@ def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment) -> list[
             delay_s = 0.0 if timed else _delay_s(one)
             earlier = (chosen(TIME_OFFSET, {"delay_s": -delay_s}),) if delay_s else ()
             tried.append((_trial_at_values(base, one, base.state.logs, earlier), delay_s))
-            last = [trial.gain for trial, _ in tried[-_FALLS - 1 :]]
-            if len(last) > _FALLS and all(later < before for before, later in pairwise(last)):
+            last = [trial.gain for trial, _ in tried[-falls - 1 :]]
+            if len(last) > falls and all(later < before for before, later in pairwise(last)):
                 break
         bests.append(max(tried, key=lambda pair: pair[0].gain))
     bests.sort(key=lambda pair: -pair[0].gain)
-    worth = [(trial, delay_s) for trial, delay_s in bests[:_MOST_STARTS]
-             if trial.gain > max(_AS_GOOD * bests[0][0].gain, 0.0)]
+    worth = [(trial, delay_s) for trial, delay_s in bests[:most]
+             if trial.gain > max(as_good * bests[0][0].gain, 0.0)]
     speeds = [error.coefficients_of(error.run.speed_mps) for error in base.posterior.record_errors] if worth else []
     return [_begun_earlier(base, trial, [delay_s * one for one in speeds]) for trial, delay_s in worth]
 
 
-def _delay_s(one: Chosen) -> float:
-    """By how much an effect on the sensor delays slow motions [s]."""
+def _delay_s(one: Chosen, slow_hz: float = 1.0) -> float:
+    """By how much an effect on the sensor delays slow motions, such as a body's bounce [s]."""
     assert isinstance(one.effect, SensorEffect)
-    slow = np.array([2j * np.pi * _SLOW_HZ])
-    return float(-np.angle(one.effect.factor(one.p, slow)[0]) / (2 * np.pi * _SLOW_HZ))
+    slow = np.array([2j * np.pi * slow_hz])
+    return float(-np.angle(one.effect.factor(one.p, slow)[0]) / (2 * np.pi * slow_hz))
 
 
 def _begun_earlier(base: Baseline, trial: Trial, farther: Sequence[Array]) -> Trial:

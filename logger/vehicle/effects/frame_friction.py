@@ -33,6 +33,7 @@ class FrameFriction(ForceEffect):
     signature = "small motions of wheel and body die away at once, also those in which the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
     sought = Sought.ON_RIGS
+    also_by = ("body_friction_force_n",)
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0 and p.body_friction_force_n == 0:
