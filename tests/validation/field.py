@@ -84,7 +84,9 @@ def main() -> int:
         if stands_out and min(stands_out) > STANDS_OUT:
             named.take(is_right)
         truth = {one["name"] for one in hidden(record)}
-        wrong.take(bool(record["said"] and set(record["said"]["verdict"]) - truth and not is_right))
+        names = record["said"]["verdict"] if record["said"] else []
+        alike = is_right and names and names[0] not in truth  # it says that it cannot distinguish it from the truth
+        wrong.take(bool(set(names[1:] if alike else names) - truth))
         found = list(numbers(record)) if record["said"] and all_found(record) else []
         for one in found:
             known.take(one.found is not None and abs(one.found - one.true) <= 3 * (one.standard_error or 0.0))

@@ -29,7 +29,6 @@ from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
-_NO_CHANGE = 1e-3  # of a response: less than its table is right to
 ABSORBED_BY_ROAD = 0.02
 """The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
 show it seven times as well (root of 1 / 0.02)."""
@@ -168,8 +167,12 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     )
 
 
-def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
-    """Effects that cannot be tried, and why."""
+def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen],
+               no_change: float = 1e-3) -> dict[str, str]:
+    """Effects that cannot be tried, and why.
+
+    no_change    of a response, as a share: no more than its table is right to
+    """
     found, nominal = {}, problem.response(present, problem.start_vehicle)
     for name, effect in effects.items():
         why = effect.obstacle(problem.vehicle, True)
@@ -187,7 +190,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             try:
                 there = problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
                 off = np.abs(there - nominal).max() / np.abs(nominal).max()
-                if isinstance(effect, ForceEffect) and off <= _NO_CHANGE:
+                if isinstance(effect, ForceEffect) and off <= no_change:
                     why = "it only adds what is not in proportion to the road, which takes a measured road"
             except ValueError:
                 why = "no linear car stands in for one that has it, which takes a measured road"

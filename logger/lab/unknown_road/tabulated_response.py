@@ -76,18 +76,18 @@ class Motion:
     waviness: float
 
 
-_MOVING_CPM = np.geomspace(FLATTENED_BELOW_CPM, 4.0, 80)
-"""Waves by which a suspension is moved: from those that a road's spectrum is flat below to a tire's length."""
-
-
 def is_linear(car: Car) -> bool:
     """Whether a car answers in proportion to the road."""
     return not car.records and all(map(_is_linear, car.laws))
 
 
-def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion]) -> Complex:
+def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion], highest_cpm: float = 4.0,
+                 waves: int = 80) -> Complex:
     """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
     is not linear, the same for all of one that is.
+
+    highest_cpm, waves    a suspension is moved by so many waves of the road, from those below which its spectrum is
+                          flat to those as short as a tire's contact
 
     ValueError for effects on the record in time, and for laws that are others at another place or time.
     """
@@ -101,10 +101,11 @@ def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion]) -> Complex
     by_axle = np.eye(axles.max() + 1)[axles]
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     behind = recorder_gain(f_hz / rate_hz)
+    moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, highest_cpm, waves)
     found = []
     for motion in motions:
-        psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, _MOVING_CPM))[1:]
-        linear = linearised(car, output, motion.speed_mps, _MOVING_CPM, psd_m3)
+        psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, moving_cpm))[1:]
+        linear = linearised(car, output, motion.speed_mps, moving_cpm, psd_m3)
         found.append(behind * (linear.by_wheel(f_hz) @ by_axle).T)
     return np.asarray(found)
 
