@@ -296,7 +296,7 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
 
 
 def _candidates(selection: Selection, after: State, count: int) -> tuple[Candidate, ...]:
-    """All candidates: the missing effects, then the others, the largest gain first."""
+    """All candidates: the missing effects, then the others, the least likely by chance first."""
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
     before = selection.before.hold_out
@@ -311,7 +311,7 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
     others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
                if one.effect.name not in selection.gains]
-    return (*found, *sorted(others, key=lambda one: -one.gain))
+    return (*found, *sorted(others, key=lambda one: (one.p_value, -one.gain)))
 
 
 def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:
