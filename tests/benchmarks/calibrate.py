@@ -68,6 +68,9 @@ def cost(figures: Figures) -> None:
         found = find([path], fingerprint(vehicle, GAIN, CalibrationSettings()))
         took_s = time.perf_counter() - started_s
     figures.at_most("finding it again" if found else "NOT FOUND AGAIN", 1e3 * took_s, 20.0, "ms")
+    started_s = time.perf_counter()
+    rms_relation(known_vehicle(RAV4))
+    figures.at_most("the integral, when a service starts", 1e3 * (time.perf_counter() - started_s), 100.0, "ms")
 
 
 def agreement(figures: Figures) -> None:

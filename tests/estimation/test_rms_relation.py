@@ -1,6 +1,5 @@
 """The r.m.s. relation against drives in the time domain, and its standard error against the exact IRI of windows."""
 
-import time
 
 import numpy as np
 import pytest
@@ -59,13 +58,8 @@ def test_relation_between_and_outside_its_speeds() -> None:
     assert np.isnan(relation.iri(np.array([1.0, 1.0, 1.0]), np.array([4.99, 10.01, np.nan]))).all()
 
 
-def test_relation_is_quick_and_covers_3_to_45_mps() -> None:
-    took_s = []
-    for _ in range(3):
-        begin = time.perf_counter()
-        relation = rms_relation(known_vehicle(RAV4))
-        took_s.append(time.perf_counter() - begin)
-    assert min(took_s) < 0.1
+def test_relation_covers_3_to_45_mps() -> None:
+    relation = rms_relation(known_vehicle(RAV4))
     assert (relation.speeds_mps[0], relation.speeds_mps[-1]) == (3.0, 45.0)
     assert (np.diff(relation.iri_per_accel_rms) < 0).all()
     fine = rms_relation(known_vehicle(RAV4), None, np.arange(3, 45, 0.1))

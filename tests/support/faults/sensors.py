@@ -131,11 +131,13 @@ class Car:
         self.receiver: Callable[[float], bytes] = lambda s: epoch(s, self.speed_mps, self.travelled_m)
         folder.mkdir(exist_ok=True)
         config = Config(status_file=folder / "status.json")
+        settings = settings or Bma220Settings()
         if serial:
             config = replace(config, accelerometer=AccelerometerConfig("pasco", "+z"))
-        elif settings is not None:
+        else:
+            chip = Bma220Config(range_g=settings.range_g, oversample=settings.oversample)
             config = replace(config, accelerometer=AccelerometerConfig(
-                sections=AccelerometerConfig().sections | {"bma220": Bma220Config(range_g=settings.range_g)}))
+                sections=AccelerometerConfig().sections | {"bma220": chip}))
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = wiring.instrument(self.config.accelerometer)
         vehicle = read_model(self.config.vehicle)
@@ -145,7 +147,7 @@ class Car:
         self.rows = Rows()
         self.core = EventCore(sensor.decoder, self.decoder, self.pipeline, self.rows)
         source: Source = SerialSource("pasco", lambda: self.lines, self.clock, 0.0) if serial else chip_source(
-            lambda: self.bus, settings or Bma220Settings(), self.clock, lambda seconds: None)
+            lambda: self.bus, settings, self.clock, lambda seconds: None)
         self.accelerometer = Supervisor(source, self.clock)
         self.gps = Supervisor(SerialSource("nmea", self.port.opened, self.clock, 0.0), self.clock)
         counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": dict}
