@@ -27,6 +27,10 @@ RECEIVER_ERROR_LASTS_S = 60.0
 """Correlation time of the errors of a receiver's places (a judgement: the ionosphere's is longer, reflections'
 shorter)."""
 
+LATE_WITHIN_S = 0.3
+"""How late the road is felt is looked for so far from window to window: above what receivers are late by, below half a
+bounce of a body."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -54,6 +58,7 @@ class RecordFacts:
     noise_mps2               r.m.s. of the sensor's noise, before rounding [m/s2]
     place_std_m              standard error of a place on the profile [m]
     delay_s, delay_std_s     of the receiver, and its standard error; taken out [s]
+    speed_scale, speed_scale_std    of its speeds over those on the profile, and its standard error; taken out
     pass_band_hz             frequencies, the lowest and the highest, between which the record is to be believed [Hz]
     places_by                ``BY_ROAD`` where places were found by the road as this vehicle's model feels it, or
                              ``BY_RECEIVER``
@@ -68,11 +73,22 @@ class RecordFacts:
     place_std_m: float | None = None
     delay_s: float | None = None
     delay_std_s: float | None = None
+    speed_scale: float | None = None
+    speed_scale_std: float | None = None
     pass_band_hz: tuple[float, float] | None = None
     places_by: str | None = None
     vehicle: str | None = None
     source: str | None = None
     signals: tuple[Signal, ...] = ()
+
+    @property
+    def late_std_s(self) -> float | None:
+        """Standard deviation of a delay that all places have in common [s]; None: they have none. A receiver's places
+        have its own. Those that were found by the road took with them whatever made it be felt late, the phase of a
+        model that is not right as well as a clock: any time within reach, one as likely as the other."""
+        if self.places_by == BY_ROAD:
+            return LATE_WITHIN_S / float(np.sqrt(3))
+        return self.delay_std_s or None if self.places_by == BY_RECEIVER else None
 
 
 UNKNOWN = RecordFacts()

@@ -35,6 +35,10 @@ Tell = Callable[[str], None]
 RATE_HZ = 100.0
 LEAST_S, LEAST_M = 5.0, 30.0
 """A shorter run is of no use to the lab: it leaves out the first two seconds."""
+_LINE_SCALE_STD = 0.001
+"""Of lengths along a line (a judgement: odometers of profilers are checked to one or two thousandths; a receiver's
+speeds, by the Doppler shift, have no scale error to speak of)."""
+_UNUSUAL = 4.0  # standard deviations: one run in 16 000 is so far off by chance (normal distribution)
 _AROUND_M = 150.0  # of the profile, kept before and after what was driven: a model comes to the first sample over it
 
 
@@ -48,6 +52,8 @@ class ExtractedRun:
     place_std_m     standard error of a place on the profile; None likewise
     by_road         the road was recognised; False: its places are the receiver's; None likewise
     delay_s, delay_std_s    of the receiver, taken out, and its standard error
+    speed_scale     of its speeds over those on the profile, taken out, and its standard error; None: the road was not
+                    recognised
     gaps            holes between readings, each too short to end the run
     """
 
@@ -59,13 +65,22 @@ class ExtractedRun:
     by_road: bool | None
     delay_s: float
     delay_std_s: float
+    speed_scale: tuple[float, float] | None
     gaps: int
 
     def as_json(self) -> dict[str, Any]:
         """For a program."""
         return {"run": str(self.run), "seconds": self.seconds, "metres": self.metres,
                 "on_profile_m": self.on_profile_m, "place_std_m": self.place_std_m, "by_road": self.by_road,
-                "delay_s": self.delay_s, "delay_std_s": self.delay_std_s, "gaps": self.gaps}
+                "delay_s": self.delay_s, "delay_std_s": self.delay_std_s, "gaps": self.gaps,
+                **dict(zip(("speed_scale", "speed_scale_std"), self.speed_scale or (None, None), strict=True))}
+
+    @property
+    def unusual_speed_scale(self) -> tuple[float, float] | None:
+        """The scale of the speeds where a receiver and a careful measurement of the profile do not differ by as much;
+        else None."""
+        scale, std = self.speed_scale or (1.0, 0.0)
+        return self.speed_scale if abs(scale - 1) > _UNUSUAL * float(np.hypot(std, _LINE_SCALE_STD)) else None
 
 
 @dataclass(frozen=True)
@@ -332,14 +347,16 @@ def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: Measured
     receiver, found = recorded.receiver, drive.registered
     place_std_m = None if found is None else float(f"{_place_std_m(found, drive, receiver):.3g}")
     by_road = None if found is None else found.by_road
+    scale = None if found is None else found.speed_scale
     write_run_facts(folder, replace(
         recorded.facts, place_std_m=place_std_m, delay_s=receiver.delay_s, delay_std_s=receiver.std_s,
+        speed_scale=scale[0] if scale else None, speed_scale_std=scale[1] if scale else None,
         places_by={None: None, True: BY_ROAD, False: BY_RECEIVER}[by_road],
         vehicle=recorded.model.vehicle.name if by_road else None, source=source))
     metres = float(np.ptp(drive.distance_m))
     gaps = int(np.count_nonzero(np.diff((drive.usable == NO_READING).astype(int)) == 1))
     return ExtractedRun(folder, len(drive.time_s) / RATE_HZ, metres, None if found is None else metres, place_std_m,
-                        by_road, receiver.delay_s, receiver.std_s, gaps)
+                        by_road, receiver.delay_s, receiver.std_s, scale, gaps)
 
 
 def _place_std_m(found: Registered, drive: _Drive, receiver: Belief) -> float:

@@ -154,6 +154,9 @@ def lines(source: Path, found: Extracted) -> list[str]:
         if one.delay_s or one.delay_std_s:
             words += f"; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s"
         printed.append(words)
+        if (scale := one.unusual_speed_scale) is not None:
+            printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} +- {100 * scale[1]:.2f} % of "
+                           "those on the profile; a receiver's are not so far off: is the profile's distance_m right?")
     if found.left_out_s >= 1:
         printed.append(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:

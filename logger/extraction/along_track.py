@@ -110,6 +110,16 @@ def place_std_m(motion: TrackMotion, speeds: Observations, places: Observations,
     return np.asarray(np.sqrt(np.mean([one[:, 0] ** 2 for one in drawn], axis=0)))
 
 
+def speed_scale(motion: TrackMotion, speeds: Observations, places: Observations) -> tuple[float, float]:
+    """The speeds of fixes (k,) over those of a motion that follows known places, between the first and the last of
+    these, and the standard error of that."""
+    inside = (speeds.time_s >= places.time_s.min()) & (speeds.time_s <= places.time_s.max())
+    driven_mps, value_mps = motion.speed_mps(speeds.time_s)[inside], speeds.value[inside]
+    weights = _without_wild((value_mps - driven_mps) / motion.noise_mps)
+    size = float(weights @ driven_mps**2)
+    return float((weights * driven_mps) @ value_mps) / size, motion.noise_mps / float(np.sqrt(size))
+
+
 def _strengths(speeds: Observations) -> tuple[float, float]:
     """The walk of the acceleration and the noise of the speeds with the most evidence, by the middle of a drive."""
     first = max(0, (len(speeds.time_s) - _ENOUGH_FIXES) // 2)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m
+from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m, speed_scale
 from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
 from logger.profiles.track import Track
 from logger.runs import RECEIVER_ERROR_LASTS_S, Run
@@ -38,11 +38,13 @@ class Registered:
     motion         along the profile
     place_std_m    r.m.s. standard error of a place [m]
     by_road        whether the road was recognised; False: places are those of the receiver
+    speed_scale    of the receiver's speeds over those on the profile, and its standard error; None: by those speeds
     """
 
     motion: TrackMotion
     place_std_m: float
     by_road: bool
+    speed_scale: tuple[float, float] | None = None
 
 
 Predict = Callable[[Array], Array]
@@ -63,7 +65,8 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
     by_road = _by_road(motion, speeds, time_s, accel_mps2, rate_hz, track, predict)
     motion, known = by_road or (motion, weak)
     std_m = place_std_m(motion, speeds, known)
-    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), by_road is not None)
+    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), by_road is not None,
+                      None if by_road is None else speed_scale(motion, speeds, known))
 
 
 def _by_road(motion: TrackMotion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,

@@ -41,12 +41,15 @@ from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
+from logger.runs import BY_ROAD
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
 
 ALREADY_PRESENT = "the model has it"
+LAID_BY_THE_ROAD = ("it only shifts the record, and these runs were laid where the road was felt, which takes that out "
+                    "(run.yaml says how much)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,10 +251,13 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     """Effects that cannot be tried, and why."""
     runs = posterior.runs.runs
     two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
+    by_road = all(run.facts.places_by == BY_ROAD for run in runs)
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
         why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
+        if why is None and by_road and not effect.reshapes:
+            why = LAID_BY_THE_ROAD
         if why is not None:
             found[name] = why
     return found

@@ -44,14 +44,14 @@ def place(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
     return folder
 
 
-def line(drive: Drive, mirrored: bool = False) -> str:
+def line(drive: Drive, mirrored: bool = False, scale: float = 1.0) -> str:
     at_m = SPACING_M * np.arange(len(drive.road.elevation_m)) - LEAD_M
     inside = (at_m >= FROM_M) & (at_m <= TO_M)
     at_m, height = at_m[inside], drive.road.elevation_m[inside]
     lat, lon = (np.interp(at_m, drive.motion.distance_m, one) for one in (drive.motion.lat_deg, drive.motion.lon_deg))
     if mirrored:
         lat, lon = lat[::-1], lon[::-1]
-    rows = [f"{ZERO_M + one - FROM_M:.3f},{z:.6f}," + (f"{a:.8f},{b:.8f}" if number % 200 == 0 else ",")
+    rows = [f"{ZERO_M + scale * (one - FROM_M):.5f},{z:.6f}," + (f"{a:.8f},{b:.8f}" if number % 200 == 0 else ",")
             for number, (one, z, a, b) in enumerate(zip(at_m, height, lat, lon, strict=True))]
     return "\n".join(["distance_m,elevation_m,lat_deg,lon_deg", *rows]) + "\n"
 
@@ -81,6 +81,18 @@ def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Dri
     assert facts["sensor"]["step_mps2"] == pytest.approx(0.612916, abs=1e-6)
     assert facts["places"] == {"by": "road", "vehicle": "rav4-2009"}
     assert "noise_mps2" not in facts["sensor"]  # nobody measured it
+
+
+@pytest.mark.slow
+def test_a_line_whose_distance_is_too_long_is_said(place: Path, drive: Drive, tmp_path: Path) -> None:
+    (tmp_path / "line.csv").write_text(line(drive, scale=1.01))
+    for profile, words in ((place / "line.csv", 0), (tmp_path / "line.csv", 1)):
+        done = called("extract", place / "town.dump", "--out", tmp_path / "runs", "--profile", profile)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.count("is the profile's distance_m right?") == words
+    said = yaml.safe_load((tmp_path / "runs" / "town" / "run.yaml").read_text())["receiver"]
+    assert said["speed_scale"] == pytest.approx(1 / 1.01, abs=3 * said["speed_scale_std"])
+    assert said["speed_scale_std"] < 0.002
 
 
 @pytest.mark.slow

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m
+from logger.extraction.along_track import Observations, TrackMotion, motion_of, place_std_m, speed_scale
 
 NOISE_MPS = 0.08
 
@@ -65,6 +67,19 @@ def test_places_pin_the_distance_down() -> None:
     near = found.time_s <= places.time_s[-1]
     assert np.abs(found.state[near, 0] - distance[near]).max() < 0.5
     assert place_std_m(found, speeds, places)[near].max() < 0.25
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.01])
+def test_known_places_say_by_what_factor_the_speeds_are_off(scale: float) -> None:
+    off = []
+    for seed in range(6):
+        speeds, distance, _ = fixes(5.0, seed)
+        speeds = replace(speeds, value=scale * speeds.value)
+        places = Observations(speeds.time_s[::15], distance[::15], np.full(len(distance[::15]), 0.02))
+        found, error = speed_scale(motion_of(speeds, places, motion_of(speeds)), speeds, places)
+        off.append((found - scale) / error)
+        assert error < 0.001
+    assert np.sqrt(np.mean(np.square(off))) < 2.0
 
 
 def test_the_banded_solution_is_the_dense_one() -> None:

@@ -8,12 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import ALREADY_PRESENT, CONFLICT_SIGMA, Diagnosis, diagnose, obstacles_of
+from logger.lab.diagnosis import (
+    ALREADY_PRESENT,
+    CONFLICT_SIGMA,
+    LAID_BY_THE_ROAD,
+    Diagnosis,
+    diagnose,
+    obstacles_of,
+)
 from logger.lab.likelihood.noise_floor import UNEXPLAINED
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior, is_length
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.report.diagnosis_text import summary
-from logger.runs import Run
+from logger.runs import RecordFacts, Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read
@@ -169,6 +176,15 @@ def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: Simula
     found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
     assert found == {"sensor_gain": ALREADY_PRESENT, "roll": why}
     assert offset.not_tried == {"roll": why} and "roll" in offset.catalogue
+
+
+def test_what_only_shifts_records_is_not_tried_on_runs_that_were_laid_where_the_road_was_felt() -> None:
+    first, *others = secret_runs(seed=2).runs
+    laid = [replace(run, facts=RecordFacts(places_by="road", vehicle="some")) for run in (first, *others)]
+    tried = {name: EFFECTS[name] for name in ("time_offset", "speed_scale", "sensor_bandwidth")}
+    found = obstacles_of(posterior_of(SimulatedRuns(laid)), tried, [])
+    assert found == dict.fromkeys(("time_offset", "speed_scale"), LAID_BY_THE_ROAD)
+    assert obstacles_of(posterior_of(SimulatedRuns([first, *laid[1:]])), tried, []) == {}
 
 
 def test_effects_that_the_runs_would_hide_are_reported(flawless: SimulatedRuns) -> None:

@@ -7,7 +7,8 @@ Statistical Science 11, 1996); whatever in the distance is rougher than any car 
 sizes of the first three maximise the evidence of the runs: the likelihood with the error integrated out (D. J. C.
 MacKay, Neural Computation 4, 1992), under a prior around a good recorder's. Where a run states a standard error of its
 places, its start and its walk are larger in proportion; where its places are a receiver's, an unknown delay of the
-receiver shifts all of the run by one time.
+receiver shifts all of the run by one time. So does, where they were found by the road, how late the model was that it
+was felt with: by how much the phase of a body's bounce is wrong, and whatever was late in the record.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
-from logger.runs import BY_RECEIVER, RECEIVER_ERROR_LASTS_S, Run
+from logger.runs import RECEIVER_ERROR_LASTS_S, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -87,12 +88,11 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 @dataclass(frozen=True, eq=False)
 class RecordError:
     """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
-    of the receiver if its places are a receiver's, the scale, the share of its roughness), then two of its recorder
-    (gain, droop).
+    of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop).
 
     basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]
     knot_s         time between the knots of the spline
-    delay_std_s    standard error of the receiver's delay; None: places are not a receiver's
+    delay_std_s    standard error of the delay of its places; None: they have none
     """
 
     run: Run
@@ -106,7 +106,7 @@ class RecordError:
         """The record error of a run."""
         lasts_s = (run.count - 1) / run.rate_hz
         pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
-        delay_std_s = run.facts.delay_std_s or None if run.facts.places_by == BY_RECEIVER else None
+        delay_std_s = run.facts.late_std_s
         late = [run.speed_mps] if delay_std_s else []
         basis = np.vstack([_cubic_b_splines(pieces, run.count), *late, run.distance_m - run.distance_m[0],
                            -_roughness(run)])
@@ -171,8 +171,8 @@ class RecordError:
         return csr_array(self.basis.T)
 
     def without_trend(self, k: Array) -> Array:
-        """The numbers (k,) without start and scale error: a straight line along the way is subtracted. A receiver's
-        delay is described by the spline then."""
+        """The numbers (k,) without start and scale error: a straight line along the way is subtracted. A delay is
+        described by the spline then."""
         moved, way = self.distance_error_m(k), self.run.distance_m - self.run.distance_m[0]
         trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
         found = self.coefficients_of(moved - trend)

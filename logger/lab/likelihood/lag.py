@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.runs import Run
+from logger.runs import LATE_WITHIN_S, Run
 
 Array = npt.NDArray[np.float64]
 
@@ -137,9 +137,8 @@ def constant_lag(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool 
     return time, length, squares_time < squares_length if fast > apart * slow else None
 
 
-def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
-             least_correlation: float = 0.5) -> list[tuple[float, ...]]:
-    size, reach = round(WINDOW_S * run.rate_hz), round(reach_s * run.rate_hz)
+def _windows(number: int, run: Run, prediction: Array, least_correlation: float = 0.5) -> list[tuple[float, ...]]:
+    size, reach = round(WINDOW_S * run.rate_hz), round(LATE_WITHIN_S * run.rate_hz)
     derivative = np.gradient(prediction, 1 / run.rate_hz)
     read = run.read
     found: list[tuple[float, ...]] = []

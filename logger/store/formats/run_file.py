@@ -22,7 +22,7 @@ RUN = "run.yaml"
 
 
 _SENSOR = ("step_mps2", "range_mps2", "noise_mps2")
-_RECEIVER = ("delay_s", "delay_std_s")
+_RECEIVER = ("delay_s", "delay_std_s", "speed_scale", "speed_scale_std")
 _KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places", "signals")
 # What signals measure: the unit that their columns end in, and the parts that they are of.
 _CORNERS = ("front", "rear", "front_left", "front_right", "rear_left", "rear_right")

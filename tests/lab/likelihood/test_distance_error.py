@@ -310,3 +310,25 @@ def test_runs_are_found_metres_off_and_nothing_is_made_of_it(seed: int) -> None:
     assert worst_rms(left, truth) < 0.05
     for one in (chosen(TIME_OFFSET, TIME_OFFSET.usual), chosen(SPEED_SCALE, SPEED_SCALE.usual)):
         assert gain_of(runs, one)[0] < 10.0
+
+
+# --- runs that were laid where the road was felt ---
+
+
+BY_THE_ROAD = RecordFacts(place_std_m=0.07, places_by="road", vehicle="some")
+
+
+@pytest.mark.parametrize("size", [USUAL, ErrorSize(0.05, 0.001, 0.01)])
+def test_places_by_the_road_may_all_be_late_by_as_much_as_is_looked_for(size: ErrorSize) -> None:
+    error = RecordError.of(replace(RUN, facts=BY_THE_ROAD), Tolerance())
+    late = np.linalg.inv(error.precision(size))[error.spline_count, error.spline_count]
+    assert late == pytest.approx((0.6 / np.sqrt(12)) ** 2)  # evenly within 0.3 s
+    assert error.basis[error.spline_count] == pytest.approx(RUN.speed_mps)
+    assert np.linalg.slogdet(error.precision(size))[1] == pytest.approx(error.log_determinant(size), abs=1e-6)
+
+
+def test_what_a_model_of_another_phase_felt_late_is_no_late_clock() -> None:
+    """The same 20 ms in all runs, as of a body's bounce by a damper that is off by a third."""
+    late = [replace(run, distance_m=run.distance_m + 0.02 * run.speed_mps) for run in noisy_runs(lasts_s=20.0)]
+    one = chosen(TIME_OFFSET, {"delay_s": -0.02})
+    assert gain_of(late, one)[0] > 10.0 > gain_of([replace(run, facts=BY_THE_ROAD) for run in late], one)[0]
