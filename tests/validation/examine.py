@@ -9,7 +9,7 @@ Each case is one line of the results file as soon as it is over: stopped, the ex
 the file to begin again, as one should after a change of the program. Writes examination.md, .html and .svg, and the
 counts that ``ridelog study lab-examination`` shows: with --docs beside these pages, else into the package.
 
-Seeds 2000 to 2099 are for development: the lab may be changed by what comes of them. Seeds 7000 to 7999 are for
+Seeds 2000 to 2099 are for development: the lab may be changed by what comes of them. Seeds 7000 to 9999 are for
 releases: no development run uses them, they are refused without --release, and the report says of which kind its cases
 are (``cases.seeds``).
 """

@@ -1,7 +1,8 @@
 """Dampers that fade as they grow hot: oil gets thin by the power that it takes up, and cools again.
 
-The lost share s of a damper grows with the energy that the linear damper takes up, and falls off in time:
-s' = a c v^2 - s / T; the force of the linear damper is (1 - s) c v.
+The viscosity of oil falls with its temperature by an exponential (O. Reynolds, Phil. Trans. Royal Society 177, 1886,
+157), the temperature rises with the energy that the damper takes up, and falls off in time. With h, how much the
+logarithm of the damping has lost, the force of the linear damper is exp(-h) c v, and h' = a exp(-h) c v^2 - h / T.
 """
 
 from __future__ import annotations
@@ -12,15 +13,12 @@ from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
-LEAST = 0.05  # of a damper's force stays however hot it is
-
-
 def force(p, seen):
-    return -np.minimum(seen.memory[0], 1.0 - LEAST) * p.damping_n_s_per_m * seen.rate_mps
+    return (np.exp(-seen.memory[0]) - 1.0) * p.damping_n_s_per_m * seen.rate_mps
 
 
 def rates(p, seen):
-    taken_up_w = p.damping_n_s_per_m * seen.rate_mps**2
+    taken_up_w = np.exp(-seen.memory[0]) * p.damping_n_s_per_m * seen.rate_mps**2
     return (p.lost_per_j * taken_up_w - seen.memory[0] / p.cooling_time_s,)
 """
 _METHOD = """
@@ -40,8 +38,8 @@ class DamperHeat(Family):
         return [Draft(
             family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
             parameters=(
-                Parameter("lost_per_j", 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, (3e-5, 3e-4),
-                          "share of its force that a damper loses by what it takes up"),
+                Parameter("lost_per_j", 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, (3e-5, 3e-4, 3e-3),
+                          "what the logarithm of a damper's force loses by what it takes up"),
                 Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
                           "in which what was lost comes back to 37 %")),
             source="J. C. Dixon, The Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot",
@@ -49,8 +47,8 @@ class DamperHeat(Family):
             functions=_FUNCTIONS, method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return (f"dampers that fade as they grow hot, {say('lost_per_j', 1e5, '%')} lost for each kJ, back within "
-                f"{say('cooling_time_s')}")
+        return (f"dampers that fade as they grow hot, by exp(-h): h grows by {say('lost_per_j', 1000.0, '')} for each "
+                f"kJ that one takes up, and falls back within {say('cooling_time_s')}")
 
 
 FAMILY = DamperHeat()
