@@ -1,4 +1,4 @@
-"""A mass on a spring: somewhere on the body, as a trailer, an engine on its mounts, a load that swings; or at each wheel.
+"""A mass on a spring: somewhere on the body (a trailer, an engine on its mounts, a load that swings), or at each wheel.
 
 It is more than the model's masses, in a half car that of one side. At the centre of gravity it is ``occupant`` of the
 list.

@@ -1,4 +1,4 @@
-"""Inertia in the suspensions that moves with their travel, maybe behind a spring: an inerter, a mount filled with fluid.
+"""Inertia in the suspensions that moves with their travel, maybe behind a spring: an inerter, a fluid mount.
 
 A flywheel that is geared to the travel, or a column of fluid that a rubber spring pushes to and fro through a channel,
 resists as a mass would that is so many times the channel's (M. C. Smith, IEEE Trans. Automatic Control 47, 2002, 1648;
