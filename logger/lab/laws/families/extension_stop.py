@@ -1,7 +1,7 @@
 """A stop that ends the suspensions' extension, with a damping of its own: rubber, or a cushion of oil in the damper.
 
-Beyond a clearance it answers with k (x - d) + c x', and lets go where that would pull (K. H. Hunt and F. R. E. Crossley, J.
-Applied Mechanics 42, 1975, 440: spring and damper in contact). Its damping is given by the time c / k.
+Beyond a clearance it answers with k (x - d) + c x', and lets go where that would pull: spring and damper in contact
+(K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42, 1975, 440). Its damping is given by the time c / k.
 """
 
 from __future__ import annotations
