@@ -18,13 +18,14 @@ from ...support.lab.secret_runs import posterior_of, secret_runs
 DAMPING_N_S_PER_M, PER_J, COOLS_S = 1500.0, 2e-3, 20.0
 
 
-def test_a_steady_rate_brings_it_to_where_loss_and_cooling_are_equal() -> None:
+@pytest.mark.parametrize("variant", ["alike", "by_axle"])
+def test_a_steady_rate_brings_it_to_where_loss_and_cooling_are_equal(variant: str) -> None:
     """At a steady rate h = a T c v^2 exp(-h) in the end: Lambert's W of a T c v^2."""
     posterior = posterior_of(secret_runs())
-    draft, = FAMILY.drafts(LawContext(posterior, posterior.start()))
+    draft = next(one for one in FAMILY.drafts(LawContext(posterior, posterior.start())) if one.variant == variant)
     assert isinstance(draft.effect, ForceEffect)
-    law, = draft.effect.laws(SimpleNamespace(lost_per_j=PER_J, cooling_time_s=COOLS_S),
-                             linear(DAMPING_N_S_PER_M)).motions
+    p = SimpleNamespace(lost_per_j=PER_J, rear_lost_per_j=PER_J, front_lost_per_j=0.0, cooling_time_s=COOLS_S)
+    law, = draft.effect.laws(p, linear(DAMPING_N_S_PER_M, rear=True)).motions
     assert law.rates is not None
     rate_mps, h, step_s = 0.3, 0.0, 0.05
     for _ in range(int(400 / step_s)):
