@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, align, fit
+from logger.lab.likelihood.map_fit import CONVERGED, align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -72,6 +72,15 @@ def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
     assert other.score == pytest.approx(damped().score, abs=2 * CONVERGED)
     assert other.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
         damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
+
+
+def test_a_fit_that_was_cut_short_goes_on_to_the_same_end() -> None:
+    posterior = damped().posterior
+    cut = fit(align(posterior, posterior.start([tire_damping(3000.0)])), rounds=1)
+    assert cut.score > damped().score + 2 * CONVERGED
+    ended = fit_to_the_end(cut)
+    assert ended.score == pytest.approx(damped().score, abs=2 * CONVERGED)
+    np.testing.assert_allclose(ended.state.logs, damped().state.logs, atol=0.2 * posterior.prior.deviations.max())
 
 
 def test_nothing_near_a_fit_is_likelier() -> None:
