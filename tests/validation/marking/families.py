@@ -30,7 +30,7 @@ NAMES: dict[str, frozenset[str]] = {
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
     CORRECTION: frozenset({"record_factor", "clipping", "loose_sensor"}),
-    REPEATS: frozenset({"hum", "wheel_turns"}),
+    REPEATS: frozenset({"hum", "wheel_turns", "flat_spot"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
     INERTIA: frozenset({"inertia_behind_spring"}),
     PROFILE: frozenset({"smoothed_profile"}),
