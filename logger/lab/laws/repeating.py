@@ -103,7 +103,7 @@ def comb_frequency(context: LawContext, per_m: tuple[float, float]) -> float | N
     signals = _along_the_way(context, white_residuals(context))
     longest = max(map(len, signals))
     size = 2 ** int(np.ceil(np.log2(_FINER * _MULTIPLES * longest)))
-    power = sum(np.abs(np.fft.rfft(one - one.mean(), size)) ** 2 / len(one) for one in signals)
+    power = np.sum([np.abs(np.fft.rfft(one - one.mean(), size)) ** 2 / len(one) for one in signals], axis=0)
     lines = np.arange(*(round(one * size * _EVEN_M) for one in per_m))
     return _peak(lines / (size * _EVEN_M), np.sum([power[n * lines] for n in range(1, _MULTIPLES + 1)], axis=0))
 

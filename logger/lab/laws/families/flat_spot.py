@@ -56,10 +56,12 @@ class FlatSpot(Family):
         return []
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        what = "a flat spot of a tire" if found.values["force_n"] > 0 else "a bump on a tire"
+        what, sign, how = (("a flat spot of a tire", 1.0, "less") if found.values["force_n"] > 0
+                           else ("a bump on a tire", -1.0, "more"))
+        force = say("force_n", sign, "N").replace("± -", "± ")
         begins = BEGINS * draft.variant.endswith(EACH)
         return (f"{what}, {say('length_m', 1000.0, 'mm')} long, once in each turn of a wheel of "
-                f"{say('turn_radius_m')}, by which the tire pushes {say('force_n')} less{begins}")
+                f"{say('turn_radius_m')}, where it pushes {force} {how}{begins}")
 
 
 def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float, places_m: Sequence[float]) -> Draft:
