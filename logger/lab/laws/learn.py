@@ -21,7 +21,7 @@ from logger.lab.diagnosis import Diagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, LawContext
 from logger.lab.laws.screening import free_count, screen_law
-from logger.lab.likelihood.map_fit import fit_to_the_end
+from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
@@ -217,7 +217,8 @@ class _LawChoice:
             return None, None
         best = self._simplest(accepted)
         self.search.progress(f"{best.family.title}: fitting the car with it")
-        fitted = Baseline.of(fit_to_the_end(self.search.refit(best.fit).linear))
+        found = best.fit.found
+        fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
         model, gains = self.search.eliminate_backward(self.selection.before, fitted)
         if best.draft.name not in gains or model.score > least:
             return None, None

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit, fit_model, fit_to_the_end, own_slopes
+from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
@@ -154,7 +154,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     ValueError where the vehicle lacks what an effect needs.
     """
     given = posterior
-    before = fit_to_the_end(fit_model(posterior, posterior.start(present)))
+    before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
     after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added), near)
     unbounded = posterior.without_soft_bounds()
@@ -196,11 +196,11 @@ def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple
     places = [posterior.state_at(refitted, one.logs, one.record, one.size)
               for one in (before.state, near) if one is not None]
     starts = [align(posterior, one) for one in (*places, posterior.start(nominal))]
-    return fit_to_the_end(fit(min(starts, key=lambda one: one.score)))
+    return fit_to_the_end(min(starts, key=lambda one: one.score))
 
 
 def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
     """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
     if found.posterior.prior.at_soft_bounds(found.state.logs):
-        found = fit_to_the_end(fit(LinearModel(unbounded, found.state), found.numbers))
+        found = fit_to_the_end(LinearModel(unbounded, found.state), found.numbers)
     return found, standard_errors(found)[1]

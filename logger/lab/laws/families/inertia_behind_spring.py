@@ -28,11 +28,9 @@ def force(p, seen):
 def rates(p, seen):
     moved_m, moved_mps = seen.memory
     omega = 2 * np.pi * p.frequency_hz
-    lost_mps2 = {lost}
+    lost_mps2 = 2 * p.damping_ratio * omega * moved_mps + p.square_per_m * moved_mps * np.abs(moved_mps)
     return (moved_mps, omega**2 * (seen.travel_m - moved_m) - lost_mps2)
 """
-_BY_RATE = "2 * p.damping_ratio * omega * moved_mps"
-_BY_SQUARE = "p.square_per_m * moved_mps * np.abs(moved_mps)"
 _METHOD = ("def laws(self, p, laws):\n"
            "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0, 0.0))")
 _RIGID = """
@@ -50,13 +48,14 @@ class InertiaBehindSpring(Family):
     def drafts(self, context: LawContext) -> list[Draft]:
         front = context.vehicle.front
         stiffness = rounded(_SHARE * front.suspension_stiffness_n_per_m)
-        spring = (Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                            "of the spring, where the inertia behind it stands still"),
-                  Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"))
-        by_rate = Parameter("damping_ratio", 0.2, 0.01, 3.0, None, Scale.LOG, (0.2,), "of its motion")
-        # At a tenth of a metre a second the middle one takes as much as a damping ratio of 0.3 at 8 Hz.
-        by_square = Parameter("square_per_m", 300.0, 3.0, 30000.0, None, Scale.LOG, (300.0,),
-                              "of what holds its motion back by the square of its speed, over its inertia")
+        # At 0.3 m/s the square takes as much as a damping ratio of 0.15 at 8 Hz.
+        sprung = (
+            Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
+                      "of the spring, where the inertia behind it stands still"),
+            Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"),
+            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, (0.2,), "of its motion", step=0.01),
+            Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
+                      "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
         common: dict[str, Any] = {
             "family": self.name, "shown_by": self.shown_by,
             "source": "M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE "
@@ -69,21 +68,17 @@ class InertiaBehindSpring(Family):
                                   "the mass that a suspension's ends feel against each other"),),
             signature="the wheels hop at a lower frequency, and the body feels it",
             method=_RIGID, imports=("from dataclasses import replace",), **common)
-        return [rigid, *(
-            Draft(kind="ForceEffect", title="inertia behind a spring in the suspensions", variant=variant,
-                  parameters=(*spring, *more), functions=_FUNCTIONS.format(lost=lost), method=_METHOD,
-                  signature="the suspension is softer below a frequency, and stiffer above it", imports=BETWEEN,
-                  at="loop", **common)
-            for variant, more, lost in (("linear", (by_rate,), _BY_RATE), ("turbulent", (by_square,), _BY_SQUARE),
-                                        ("both", (by_rate, by_square), f"{_BY_RATE} + {_BY_SQUARE}")))]
+        return [rigid, Draft(
+            kind="ForceEffect", title="inertia behind a spring in the suspensions", variant="sprung", parameters=sprung,
+            functions=_FUNCTIONS, method=_METHOD, signature="the suspension is softer below a frequency, and stiffer "
+            "above it", imports=BETWEEN, at="loop", **common)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "rigid":
             return f"an inertia of {say('inertance_kg')} that moves with the suspensions' travel: an inerter"
-        lost = {"damping_ratio": "a damping ratio of {}", "square_per_m": "a loss by the square of its speed of {}"}
-        said = " and ".join(words.format(say(name)) for name, words in lost.items() if name in found.values)
-        return (f"inertia behind a spring of {say('stiffness_n_per_m', 0.001, 'N/mm')}, {say('frequency_hz')} with "
-                f"{said}: an inerter, or a mount filled with fluid")
+        return (f"inertia behind a spring of {say('stiffness_n_per_m', 0.001, 'N/mm')}, {say('frequency_hz')} with a "
+                f"damping ratio of {say('damping_ratio')} and a loss by the square of its speed of "
+                f"{say('square_per_m')}: an inerter, or a mount filled with fluid")
 
 
 FAMILY = InertiaBehindSpring()
