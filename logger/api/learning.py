@@ -122,7 +122,7 @@ def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
         notify("fitting the car without and with the law")
         added = [bench.filed(one) for one in found.law.effects]
         return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
-                                       len(found.law.draft.effect.trials())))
+                                       len(found.law.draft.effect.trials()), found.law.state))
 
 
 def with_law(given: Bench, addition: AddedEffects, law: Path) -> tuple[Bench, AddedEffects]:

@@ -21,8 +21,9 @@ from logger.lab.diagnosis import Diagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, LawContext
 from logger.lab.laws.screening import free_count, screen_law
+from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, screen
@@ -101,6 +102,7 @@ class Law:
 
     one         the law with the numbers of the search
     effects     known effects that are missing as well, with their numbers
+    state       the fitted model with them
     gain        of minus twice the log of the evidence over the model without it
     listed      gain of the known effects alone over the car without any; ``with_law``: of the law and its effects
     rivals      laws of other families that explain as well
@@ -111,6 +113,7 @@ class Law:
     draft: Draft
     one: Chosen
     effects: tuple[Chosen, ...]
+    state: State
     gain: float
     listed: float
     with_law: float
@@ -214,7 +217,9 @@ class _LawChoice:
             return None, None
         best = self._simplest(accepted)
         self.search.progress(f"{best.family.title}: fitting the car with it")
-        model, gains = self.search.eliminate_backward(self.selection.before, self.search.refit(best.fit))
+        found = best.fit.found
+        fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
+        model, gains = self.search.eliminate_backward(self.selection.before, fitted)
         if best.draft.name not in gains or model.score > least:
             return None, None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
@@ -222,8 +227,8 @@ class _LawChoice:
         rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        law = Law(best.family, best.draft, one, effects, gains[best.draft.name], before - now, before - model.score,
-                  rivals, self._nearest(model, best, gains[best.draft.name]))
+        law = Law(best.family, best.draft, one, effects, model.state, gains[best.draft.name], before - now,
+                  before - model.score, rivals, self._nearest(model, best, gains[best.draft.name]))
         return law, model
 
     def _fits_to(self, base: Baseline) -> list[LawFit]:

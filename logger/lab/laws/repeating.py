@@ -79,6 +79,54 @@ def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
     return found / len(signal)
 
 
+# --- a short pulse that repeats along the way ---
+
+_MULTIPLES = 6
+"""Of a wheel's turns: the seventh of a tire's is shorter than the contact patch."""
+_EVEN_M = 0.05
+
+
+def _along_the_way(context: LawContext, signals: list[Array]) -> list[Array]:
+    """Signals (n,) of the samples that count, at even places along the way of each run."""
+    found = []
+    for run, signal, error_m in zip(context.runs, signals, context.posterior.distance_error_m(context.state.record),
+                                    strict=True):
+        way = np.maximum.accumulate((run.distance_m + error_m)[run.first:])
+        # From a multiple of the spacing, so that all runs have the same places.
+        begin = np.ceil(way[0] / _EVEN_M) * _EVEN_M
+        found.append(np.interp(np.arange(begin, way[-1], _EVEN_M), way, signal))
+    return found
+
+
+def comb_frequency(context: LawContext, per_m: tuple[float, float]) -> float | None:
+    """The wave number within a range [1/m] whose multiples are together strongest; None where they are not."""
+    signals = _along_the_way(context, white_residuals(context))
+    longest = max(map(len, signals))
+    size = 2 ** int(np.ceil(np.log2(_FINER * _MULTIPLES * longest)))
+    power = np.sum([np.abs(np.fft.rfft(one - one.mean(), size)) ** 2 / len(one) for one in signals], axis=0)
+    lines = np.arange(*(round(one * size * _EVEN_M) for one in per_m))
+    return _peak(lines / (size * _EVEN_M), np.sum([power[n * lines] for n in range(1, _MULTIPLES + 1)], axis=0))
+
+
+def best_lags_m(context: LawContext, there: list[Array], turn_m: float, apart: bool) -> list[float]:
+    """By how much, within a turn, what predictions (n,) per run add to the model's has to come later along the way to
+    be most like the residual [m]; of all runs together, or of each (``apart``)."""
+    posterior, residuals = context.posterior, context.posterior.residuals(context.state)
+    adds = []
+    for run, bands, residual, other in zip(context.runs, posterior.bands, residuals, posterior.residuals_of(there),
+                                           strict=True):
+        white = bands.whitener(residual).in_time(residual - other)
+        adds.append(np.asarray(white[: run.count - run.first]))
+    likeness = []
+    for signal, added in zip(_along_the_way(context, white_residuals(context)), _along_the_way(context, adds),
+                             strict=True):
+        size = 2 * len(signal)
+        lagged = np.fft.irfft(np.fft.rfft(signal, size) * np.conj(np.fft.rfft(added, size)), size)
+        likeness.append(lagged[: int(turn_m / _EVEN_M)])
+    kinds = likeness if apart else [np.sum(likeness, axis=0)]
+    return [float(one.argmax()) * _EVEN_M for one in kinds]
+
+
 # --- a tone whose frequency wanders ---
 
 

@@ -72,11 +72,12 @@ class MapFit:
         return LinearModel(self.posterior, self.state, self.numbers, whiteners if keep_size else None)
 
 
-def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6,
-        min_gain: float = 0.0) -> LinearModel:
+def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6, min_gain: float = 0.0,
+        at_most: int = 0) -> LinearModel:
     """A model fitted in full, linearised at its maximum.
 
     numbers     derivatives by the car's numbers taken near the start; None: they are taken now
+    at_most     rounds, if more: after ``rounds`` that gained each takes derivatives of its own
     min_gain    a round that gains less is the last, if that is more than ``CONVERGED``
     """
     posterior, fresh = start.posterior, numbers is None
@@ -85,17 +86,25 @@ def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int 
     best = now = start.with_number_slopes(numbers)
     least = best.score
     enough = max(CONVERGED, min_gain)
-    for done in range(1, rounds + 1):
+    last = max(rounds, at_most)
+    for done in range(1, last + 1):
         now = relinearise(posterior, optimise_numbers(now, now.state, moves), numbers, least)
         gained = least - now.score
         if gained > 0:
             best, least = now, now.score
-        if done == rounds or (gained < enough and fresh):
+        if done == last or (gained < enough and fresh):
             break
-        if gained < enough or done == 1:
+        if gained < enough or done == 1 or done >= rounds:
             fresh, numbers = True, posterior.number_slopes(best.state, _fine_steps(best))
             now = best = best.with_number_slopes(numbers)
     return best
+
+
+def fit_to_the_end(start: LinearModel, numbers: Sequence[Array] | None = None) -> LinearModel:
+    """A model fitted until nothing is gained any more. A search has no time for it: where a law bends all that the car
+    does, as play in its dampers does, the derivatives of one round say little of the next, and the rounds of ``fit``
+    end on the way."""
+    return fit(start, numbers, at_most=40)
 
 
 def fit_rounded_readings(found: LinearModel) -> LinearModel:

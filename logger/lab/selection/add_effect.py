@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit, fit_model, own_slopes
+from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
@@ -143,24 +143,27 @@ def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
     return sorted(found, key=lambda one: -abs(one.shift))
 
 
-def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen], candidates: int = 1) -> AddedEffects:
+def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen], candidates: int = 1,
+        near: State | None = None) -> AddedEffects:
     """Fit the vehicle, with the effects that are present, without and with those that are added; the values that these
     have are where the fit begins, and were chosen among so many candidates. A vehicle's file that turns out to be a
     rough one (``priors``) is taken for one.
+
+    near    car and distances of a search that found the effects; the fit begins there, where that is better
 
     ValueError where the vehicle lacks what an effect needs.
     """
     given = posterior
     before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
-    after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added))
+    after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added), near)
     unbounded = posterior.without_soft_bounds()
     (base_fit, errors_before), (effect_fit, errors_after) = (
         _fit_without_soft_bounds(unbounded, one) for one in (before, after))
     prior, nominal = posterior.prior, posterior.vehicle
     if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
         wider = given.with_rough_file()
-        rough = add(wider, present, added, candidates)
+        rough = add(wider, present, added, candidates, near)
         if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), UNUSUAL_SIGMA):
             return rough
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
@@ -186,17 +189,18 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
 
 
 def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],
-                      nominal: tuple[Chosen, ...]) -> LinearModel:
-    """Fit the model with more effects, from the refitted car or from the nominal one, whichever aligns better: numbers
-    and distances that were refitted without what is missing may be too far off to begin with."""
-    state = before.state
-    starts = [align(posterior, one) for one in (
-        posterior.state_at(refitted, state.logs, state.record, state.size), posterior.start(nominal))]
-    return fit(min(starts, key=lambda one: one.score))
+                      nominal: tuple[Chosen, ...], near: State | None) -> LinearModel:
+    """Fit the model with more effects, from the refitted car, from the nominal one, or from one that a search found,
+    whichever aligns better: numbers and distances that were refitted without what is missing may be too far off to
+    begin with."""
+    places = [posterior.state_at(refitted, one.logs, one.record, one.size)
+              for one in (before.state, near) if one is not None]
+    starts = [align(posterior, one) for one in (*places, posterior.start(nominal))]
+    return fit_to_the_end(min(starts, key=lambda one: one.score))
 
 
 def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
     """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
     if found.posterior.prior.at_soft_bounds(found.state.logs):
-        found = fit(LinearModel(unbounded, found.state), found.numbers)
+        found = fit_to_the_end(LinearModel(unbounded, found.state), found.numbers)
     return found, standard_errors(found)[1]

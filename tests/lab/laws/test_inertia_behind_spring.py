@@ -1,4 +1,4 @@
-"""Inertia behind a spring: beside the matrices of a car that has a wheel's inertia more, and a spring to it."""
+"""Inertia in the suspensions: beside the matrices of a car that has it, and beside a pendulum that turbulence stops."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.families.inertia_behind_spring import FAMILY
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import BodyEffect, Parameter, Scale, chosen
+from logger.vehicle.effect import BodyEffect, Chosen, ForceEffect, Parameter, Scale, chosen
+from logger.vehicle.laws import Seen, linear
 from logger.vehicle.structure import Structure
 
 from ...support.lab.secret_runs import CAR, posterior_of, secret_runs
@@ -43,12 +46,52 @@ class InMatrices(BodyEffect):
             wheels=np.pad(structure.wheels, ((0, 0), (0, w))), travel=np.pad(structure.travel, ((0, 0), (0, w))))
 
 
-def test_it_is_a_car_with_one_more_coordinate_in_each_suspension() -> None:
-    runs = SimulatedRuns(secret_runs().runs)
+def draft_of(variant: str) -> Draft:
     posterior = posterior_of(secret_runs())
-    draft, = FAMILY.drafts(LawContext(posterior, posterior.start()))
-    law = chosen(draft.effect, {"stiffness_n_per_m": STIFFNESS_N_PER_M, "frequency_hz": HZ, "damping_ratio": RATIO})
-    cars = [compose(CAR, effects) for effects in ([law], [chosen(InMatrices(), {"size": 1.0})], [])]
+    return next(one for one in FAMILY.drafts(LawContext(posterior, posterior.start())) if one.variant == variant)
+
+
+def check_alike(law: Chosen, other: Chosen) -> None:
+    """Two cars move alike, beside what either differs by from the plain one."""
+    runs = SimulatedRuns(secret_runs().runs)
+    cars = [compose(CAR, effects) for effects in ([law], [other], [])]
     for found, expected, before in zip(*map(runs.predict, cars), strict=True):
         kept = slice(300, None)  # both begin at rest on the road there, which a slope is not
         assert np.std((found - expected)[kept]) < 0.01 * np.std((before - expected)[kept])
+
+
+def test_it_is_a_car_with_one_more_coordinate_in_each_suspension() -> None:
+    check_alike(chosen(draft_of("sprung").effect, {
+        "stiffness_n_per_m": STIFFNESS_N_PER_M, "frequency_hz": HZ, "damping_ratio": RATIO, "square_per_m": 0.0}),
+        chosen(InMatrices(), {"size": 1.0}))
+
+
+def test_geared_rigidly_it_has_the_kinetic_energy_of_the_travel() -> None:
+    found = compose(CAR, [chosen(draft_of("rigid").effect, {"inertance_kg": 8.0})]).structure
+    plain, ahead_m = compose(CAR).structure, CAR.front.cg_distance_m
+    # Heave 0.3, pitch 0.1, front wheel -0.2, rear wheel 0.4: the travels' rates by hand.
+    rates = np.array([0.3, 0.1, -0.2, 0.4])
+    assert CAR.rear is not None
+    travels_mps = np.array([0.3 + 0.1 * ahead_m + 0.2, 0.3 - 0.1 * CAR.rear.cg_distance_m - 0.4])
+    more_j = 0.5 * rates @ (found.mass - plain.mass) @ rates
+    assert more_j == pytest.approx(0.5 * 8.0 * travels_mps @ travels_mps)
+    np.testing.assert_array_equal(found.stiffness, plain.stiffness)
+
+
+@pytest.mark.parametrize("by_rate", [0.0, 0.1])
+def test_turbulence_takes_energy_by_the_cube_of_the_speed(by_rate: float) -> None:
+    """Held still, the column swings on its spring: d(b y'^2 / 2 + k y^2 / 2)/dt = -b (e |y'|^3 + 2 z w y'^2)."""
+    effect = draft_of("sprung").effect
+    assert isinstance(effect, ForceEffect)
+    p = SimpleNamespace(stiffness_n_per_m=STIFFNESS_N_PER_M, frequency_hz=HZ, square_per_m=200.0, damping_ratio=by_rate)
+    motion, = effect.laws(p, linear(1000.0)).motions
+    assert motion.rates is not None
+    omega = 2 * np.pi * HZ
+    inertance_kg = STIFFNESS_N_PER_M / omega**2
+    for y_m, y_mps in ((0.01, 0.3), (-0.02, -0.1), (0.0, 0.5)):
+        seen = Seen(*[0.0] * 10, memory=(y_m, y_mps))
+        speed_mps, accel_mps2 = motion.rates(motion.p, seen)
+        power_w = inertance_kg * y_mps * accel_mps2 + STIFFNESS_N_PER_M * y_m * speed_mps
+        lost_w = inertance_kg * (200.0 * abs(y_mps)**3 + 2 * by_rate * omega * y_mps**2)
+        assert power_w == pytest.approx(-lost_w)
+        assert motion.force(motion.p, seen) == pytest.approx(-STIFFNESS_N_PER_M * y_m)

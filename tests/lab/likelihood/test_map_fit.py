@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, align, fit
+from logger.lab.likelihood.map_fit import CONVERGED, align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -72,6 +72,17 @@ def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
     assert other.score == pytest.approx(damped().score, abs=2 * CONVERGED)
     assert other.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
         damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
+
+
+def test_a_fit_to_the_end_goes_on_where_rounds_are_over_and_no_farther_than_it_gains() -> None:
+    posterior = damped().posterior
+    start = align(posterior, posterior.start([tire_damping(3000.0)]))
+    cut, ended = fit(start, rounds=1), fit(start, rounds=1, at_most=12)
+    assert cut.score > damped().score + 2 * CONVERGED
+    for one in (ended, fit_to_the_end(start)):
+        assert one.score == pytest.approx(damped().score, abs=2 * CONVERGED)
+        assert one.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
+            damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
 
 
 def test_nothing_near_a_fit_is_likelier() -> None:

@@ -41,6 +41,14 @@ def test_the_number_that_was_hidden_is_found_within_its_error(added: AddedEffect
     assert one.values["offset_m"] == pytest.approx(OFFSET_M, abs=4 * error)
 
 
+def test_where_a_search_ended_changes_nothing_of_where_the_fit_ends(runs: SimulatedRuns, added: AddedEffects) -> None:
+    posterior, one = posterior_of(runs), hidden("sensor_offset", offset_m=0.2)
+    near = fit(align(posterior, posterior.start([one]))).state
+    again = add(posterior, [], [one], near=near)
+    assert again.effects[0].values["offset_m"] == pytest.approx(added.effects[0].values["offset_m"], abs=0.005)
+    assert again.error_after == pytest.approx(added.error_after, rel=1e-3)
+
+
 def test_each_error_is_less_than_the_one_before_and_the_last_is_hardly_more_than_noise(added: AddedEffects) -> None:
     assert added.error_before > added.error_refitted > added.error_as_written >= added.error_after
     assert added.error_after == pytest.approx(added.noise_floor_error, rel=0.05)

@@ -13,12 +13,14 @@ FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading
 MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
 DRIFT, CHANGE = "sensor drift", "number that changes"
 PROFILE, INERTIA = "profile that lacks waves", "inertia in the suspension"
+STOP = "stop"
 
 REMOVED_DRIFT = "drift that is removed"
 """No family: a sensor's drift is no law of the car, it is removed and said."""
 
 NAMES: dict[str, frozenset[str]] = {
     BY_TRAVEL: frozenset({"force_by_travel"}),
+    STOP: frozenset({"extension_stop"}),
     BY_RATE: frozenset({"force_by_rate"}),
     BY_BOTH: frozenset({"damping_by_travel"}),
     BY_TIRE: frozenset({"tire_force"}),
@@ -28,7 +30,7 @@ NAMES: dict[str, frozenset[str]] = {
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
     CORRECTION: frozenset({"record_factor", "clipping", "loose_sensor"}),
-    REPEATS: frozenset({"hum", "wheel_turns"}),
+    REPEATS: frozenset({"hum", "wheel_turns", "flat_spot"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
     INERTIA: frozenset({"inertia_behind_spring"}),
     PROFILE: frozenset({"smoothed_profile"}),
@@ -62,7 +64,7 @@ RIGHT: dict[str, Right] = {
     "gas_spring": Right((BY_TRAVEL,), "a force by travel, stiffer in compression"),
     "place_damper": Right((BY_BOTH,), "a force by travel and rate together"),
     "stribeck_friction": Right((FRICTION, BY_RATE), "a force by rate that falls; friction"),
-    "rebound_stop": Right((BY_TRAVEL,), "a force by travel and rate, in extension"),
+    "rebound_stop": Right((STOP, BY_TRAVEL), "a force by travel and rate, in extension"),
     "inerter": Right((INERTIA, MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way"),
     "hydraulic_mount": Right((INERTIA, MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
     "wheel_absorber": Right((MASS,), "a mass on a spring at each wheel"),

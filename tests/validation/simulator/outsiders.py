@@ -58,7 +58,7 @@ def fields_of(**names: str) -> Callable[[Scene, Parameters], Scene]:
 
 def _drift(rng: np.random.Generator, car: Car) -> Path:
     sign, size = (1.0 if rng.random() < 0.5 else -1.0), between(0.01, 0.7)
-    return lambda u: {"gain_change_per_run": sign * size(u)}
+    return lambda u: {"gain_change_per_min": sign * size(u)}
 
 
 OUTSIDERS: dict[str, Outsider] = {outsider.name: outsider for outsider in (
@@ -91,7 +91,7 @@ OUTSIDERS: dict[str, Outsider] = {outsider.name: outsider for outsider in (
                     tow_behind_axle_m="behind_axle_m"), akin=("occupant",), models=("half_car",)),
     Outsider("clipping", lambda rng, car: one("limit_mps2", 15.0, 0.4),
              lambda scene, p: scene.with_sensor(clip_mps2=p["limit_mps2"])),
-    Outsider("gain_drift", _drift, lambda scene, p: scene.with_sensor(drift=p["gain_change_per_run"]),
+    Outsider("gain_drift", _drift, lambda scene, p: scene.with_sensor(drift=p["gain_change_per_min"]),
              akin=("sensor_gain",)),
     Outsider("blurred_profile", lambda rng, car: one("blur_m", 0.05, 3.0),
              lambda scene, p: replace(scene, profile_blur_m=p["blur_m"]), akin=("tire_enveloping",)),

@@ -38,7 +38,7 @@ class Sensor:
     gain: float = 1.0
     delay_s: float = 0.0
     clip_mps2: float = np.inf
-    drift: float = 0.0  # of the gain, over the whole run
+    drift: float = 0.0  # of the gain, in a minute: a sensor does not know how long a run will last
     engine_mps2: float = 0.0
     engine_hz: float = 0.0
     engine_wander: float = 0.0
@@ -126,7 +126,7 @@ def _loose(body_mps2, held_mps2, step_s):
     return out
 
 
-def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float, until_s: float) -> Array:
+def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float) -> Array:
     """The sensor's output from the acceleration [m/s2] of the place where it is mounted, both fine."""
     signal = acceleration
     at = first_s + step_s * np.arange(signal.size)
@@ -146,7 +146,7 @@ def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float, un
         signal = _through([below[-1]], below, signal, step_s)
     gain = sensor.gain
     if sensor.drift:
-        gain = gain * (1 + sensor.drift * np.clip(at / until_s, 0, 1))
+        gain = gain * (1 + sensor.drift * np.maximum(at, 0.0) / 60.0)
     if np.isfinite(sensor.soft_mps2):
         signal = sensor.soft_mps2 * np.tanh(signal / sensor.soft_mps2)
     if sensor.offset_mps2:
@@ -158,5 +158,5 @@ def record(rates_mps: Array, step_s: float, first_s: float, sensor: Sensor, at_s
     """Noise-free recorded acceleration [m/s2] at ``at_s`` from the rates (N + 1,) [m/s] of the sensor's place."""
     acceleration = np.diff(rates_mps) / step_s
     middle_s = first_s + 0.5 * step_s
-    sensed = sense(acceleration, step_s, sensor, middle_s, at_s[-1])
+    sensed = sense(acceleration, step_s, sensor, middle_s)
     return band_limited(sensed, middle_s, step_s, at_s - sensor.delay_s)

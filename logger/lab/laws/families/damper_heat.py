@@ -1,10 +1,13 @@
 """Dampers that fade as they grow hot: oil gets thin by the power that it takes up, and cools again.
 
-The lost share s of a damper grows with the energy that the linear damper takes up, and falls off in time:
-s' = a c v^2 - s / T; the force of the linear damper is (1 - s) c v.
+The viscosity of oil falls with its temperature by an exponential (O. Reynolds, Phil. Trans. Royal Society 177, 1886,
+157), the temperature rises with the energy that the damper takes up, and falls off in time. With h, how much the
+logarithm of the damping has lost, the force of the linear damper is exp(-h) c v, and h' = a exp(-h) c v^2 - h / T.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, FormatNumber, LawContext
@@ -12,22 +15,22 @@ from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
-LEAST = 0.05  # of a damper's force stays however hot it is
-
-
 def force(p, seen):
-    return -np.minimum(seen.memory[0], 1.0 - LEAST) * p.damping_n_s_per_m * seen.rate_mps
+    return (np.exp(-seen.memory[0]) - 1.0) * p.damping_n_s_per_m * seen.rate_mps
 
 
 def rates(p, seen):
-    taken_up_w = p.damping_n_s_per_m * seen.rate_mps**2
+    taken_up_w = np.exp(-seen.memory[0]) * p.damping_n_s_per_m * seen.rate_mps**2
     return (p.lost_per_j * taken_up_w - seen.memory[0] / p.cooling_time_s,)
 """
 _METHOD = """
 def laws(self, p, laws):
-    p = SimpleNamespace(damping_n_s_per_m=laws.damping_n_s_per_m, **vars(p))
-    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))
+    lost_per_j = {lost}
+    own = SimpleNamespace(
+        damping_n_s_per_m=laws.damping_n_s_per_m, lost_per_j=lost_per_j, cooling_time_s=p.cooling_time_s)
+    return laws.with_law(Between.BODY_AND_WHEEL, force, own, rates, memory=(0.0,))
 """
+_LOSSES = (3e-5, 3e-4, 3e-3)
 
 
 class DamperHeat(Family):
@@ -37,20 +40,35 @@ class DamperHeat(Family):
     shown_by = "drive a rough road for some minutes without a pause, and again after one"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        return [Draft(
-            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
+        alike = self._draft("alike", {"lost_per_j": "a damper's force"}, _LOSSES, "p.lost_per_j")
+        if not context.axles:
+            return [alike]
+        # Dampers of two sizes grow hot by different energies.
+        return [alike, self._draft(
+            "by_axle", {f"{axle}_lost_per_j": f"the force of a {axle} damper" for axle in context.axles}, _LOSSES[:1],
+            "p.rear_lost_per_j if laws.rear else p.front_lost_per_j")]
+
+    def _draft(self, variant: str, losses: Mapping[str, str], trials: tuple[float, ...], lost: str) -> Draft:
+        return Draft(
+            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by, variant=variant,
             parameters=(
-                Parameter("lost_per_j", 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, (3e-5, 3e-4),
-                          "share of its force that a damper loses by what it takes up"),
+                *(Parameter(name, 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, trials,
+                            f"what the logarithm of {of} loses by what it takes up") for name, of in losses.items()),
                 Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
                           "in which what was lost comes back to 37 %")),
-            source="J. C. Dixon, The Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot",
-            signature="the damping falls while a rough road is driven",
-            functions=_FUNCTIONS, method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"))]
+            source="O. Reynolds, Phil. Trans. Royal Society 177 (1886) 157: viscosity by temperature; J. C. Dixon, The "
+                   "Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot",
+            signature="the damping falls while a rough road is driven", functions=_FUNCTIONS,
+            method=_METHOD.format(lost=lost), imports=(*BETWEEN, "from types import SimpleNamespace"))
+
+    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
+        return super().narrower(draft, context) if draft.variant == "alike" else []
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return (f"dampers that fade as they grow hot, {say('lost_per_j', 1e5, '%')} lost for each kJ, back within "
-                f"{say('cooling_time_s')}")
+        where = {"lost_per_j": "", "front_lost_per_j": " (front)", "rear_lost_per_j": " (rear)"}
+        grows = " and ".join(say(name, 1000.0, "") + axle for name, axle in where.items() if name in found.values)
+        return (f"dampers that fade as they grow hot, by exp(-h): h grows by {grows} for each kJ that one takes up, "
+                f"and falls back within {say('cooling_time_s')}")
 
 
 FAMILY = DamperHeat()

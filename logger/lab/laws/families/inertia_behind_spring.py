@@ -1,19 +1,23 @@
-"""Inertia in the suspensions that moves with their travel, behind a spring: an inerter, or a mount filled with fluid.
+"""Inertia in the suspensions that moves with their travel, maybe behind a spring: an inerter, a fluid mount.
 
 A flywheel that is geared to the travel, or a column of fluid that a rubber spring pushes to and fro through a channel,
 resists as a mass would that is so many times the channel's (M. C. Smith, IEEE Trans. Automatic Control 47, 2002, 1648;
 W. C. Flower, SAE 850975, 1985: hydraulic mounts). With y, how far it has moved, the force is k (x - y), and
-y'' = w2 (x - y) - 2 z w y'.
+y'' = w2 (x - y) - 2 z w y' - e y' |y'|: a column loses pressure by the square of its speed where it is turbulent, and
+where its channel begins and ends (R. Singh, G. Kim, P. V. Ravindra, J. Sound and Vibration 158, 1992, 219). Geared
+rigidly it is a mass that only the travel moves: the force is b x''.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE = 0.5  # of the suspension's own stiffness
+_SHARE = 0.5  # of the suspension's own stiffness, and of the mass of a wheel where there is no spring
 _HZ = (4.0, 8.0, 16.0)
 
 _FUNCTIONS = """
@@ -24,35 +28,57 @@ def force(p, seen):
 def rates(p, seen):
     moved_m, moved_mps = seen.memory
     omega = 2 * np.pi * p.frequency_hz
-    return (moved_mps, omega**2 * (seen.travel_m - moved_m) - 2 * p.damping_ratio * omega * moved_mps)
+    lost_mps2 = 2 * p.damping_ratio * omega * moved_mps + p.square_per_m * moved_mps * np.abs(moved_mps)
+    return (moved_mps, omega**2 * (seen.travel_m - moved_m) - lost_mps2)
 """
 _METHOD = ("def laws(self, p, laws):\n"
            "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0, 0.0))")
+_RIGID = """
+def structure(self, p, structure):
+    return replace(structure, mass=structure.mass + p.inertance_kg * structure.travel.T @ structure.travel)
+"""
 
 
 class InertiaBehindSpring(Family):
     name = "inertia_behind_spring"
-    title = "inertia behind a spring in the suspensions"
+    title = "inertia in the suspensions, maybe behind a spring"
     related_effects = ("top_mount_compliance", "hysteresis")
     shown_by = "drive a rough road, on which the suspensions move at all frequencies up to that of the wheels"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        stiffness = rounded(_SHARE * context.vehicle.front.suspension_stiffness_n_per_m)
-        return [Draft(
-            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
-            parameters=(
-                Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                          "of the spring, where the inertia behind it stands still"),
-                Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"),
-                Parameter("damping_ratio", 0.2, 0.01, 3.0, None, Scale.LOG, (0.2,), "of its motion")),
-            source="M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "
-                   "(1985): hydraulic mounts",
-            signature="the suspension is softer below a frequency, and stiffer above it",
-            functions=_FUNCTIONS, method=_METHOD, imports=BETWEEN, at="loop")]
+        front = context.vehicle.front
+        stiffness = rounded(_SHARE * front.suspension_stiffness_n_per_m)
+        # At 0.3 m/s the square takes as much as a damping ratio of 0.15 at 8 Hz.
+        sprung = (
+            Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
+                      "of the spring, where the inertia behind it stands still"),
+            Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"),
+            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, (0.2,), "of its motion", step=0.01),
+            Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
+                      "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
+        common: dict[str, Any] = {
+            "family": self.name, "shown_by": self.shown_by,
+            "source": "M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE "
+                      "850975 (1985): hydraulic mounts",
+        }
+        wheel_kg = rounded(_SHARE * front.unsprung_mass_kg)
+        rigid = Draft(
+            kind="BodyEffect", title="inertia that moves with the suspensions' travel", variant="rigid",
+            parameters=(Parameter("inertance_kg", wheel_kg, 0.0, 100 * wheel_kg, 0.0, Scale.LINEAR, (wheel_kg,),
+                                  "the mass that a suspension's ends feel against each other"),),
+            signature="the wheels hop at a lower frequency, and the body feels it",
+            method=_RIGID, imports=("from dataclasses import replace",), **common)
+        return [rigid, Draft(
+            kind="ForceEffect", title="inertia behind a spring in the suspensions", variant="sprung", parameters=sprung,
+            functions=_FUNCTIONS, method=_METHOD, signature="the suspension is softer below a frequency, and stiffer "
+            "above it", imports=BETWEEN, at="loop", **common)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
+        if draft.variant == "rigid":
+            return f"an inertia of {say('inertance_kg')} that moves with the suspensions' travel: an inerter"
         return (f"inertia behind a spring of {say('stiffness_n_per_m', 0.001, 'N/mm')}, {say('frequency_hz')} with a "
-                f"damping ratio of {say('damping_ratio')}: an inerter, or a mount filled with fluid")
+                f"damping ratio of {say('damping_ratio')} and a loss by the square of its speed of "
+                f"{say('square_per_m')}: an inerter, or a mount filled with fluid")
 
 
 FAMILY = InertiaBehindSpring()
