@@ -298,10 +298,6 @@ class RecordedPort:
         if not self._gone:
             self._waiting += data
 
-    def has_bytes(self) -> bool:
-        """Some wait to be read."""
-        return bool(self._waiting)
-
     def read(self, size: int, timeout_s: float) -> bytes:
         self._reads += 1
         self._cue()

@@ -11,7 +11,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.errors import DeviceError, NotPresent
@@ -270,54 +269,6 @@ class SerialSource:
         port, self._port = self._port, None
         if port is not None:
             port.close()
-
-
-class PlayedSource:
-    """Events of a recording, given as they are: for a device whose events say all that its driver has to."""
-
-    dropped = 0
-    missed = 0
-    note = ""
-    waiting_since_us = None
-
-    def __init__(self, name: str, now_us: Callable[[], int]) -> None:
-        self.name = name
-        self._now_us = now_us
-        self._loaded: deque[bytes] = deque()
-
-    def load(self, data: bytes) -> None:
-        """The next event happens now."""
-        self._loaded.append(data)
-
-    def has_more(self) -> bool:
-        """Something is loaded."""
-        return bool(self._loaded)
-
-    def open(self) -> None:
-        """There is nothing to open."""
-
-    def poll(self) -> list[Event]:
-        """The next event."""
-        return [Event(self._now_us(), self.name, self._loaded.popleft())] if self._loaded else []
-
-    def rest(self) -> None:
-        """A recording is not waited for."""
-
-    def flush(self) -> list[Event]:
-        """Nothing is held back."""
-        return []
-
-    def close(self) -> None:
-        """There is nothing to let go of."""
-
-
-@dataclass(frozen=True)
-class Played:
-    """A device in a replay: its source, which finds what ``load`` was given; ``has_more``: another look finds more."""
-
-    source: Source
-    load: Callable[[bytes], None]
-    has_more: Callable[[], bool]
 
 
 def serial_advice(state: str) -> str:

@@ -11,7 +11,7 @@ the same samples.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from drivers.machine import Machine
 from drivers.readings import AccelerationBlock
 from drivers.settings import Kind
-from drivers.sources import Played, PlayedSource, SerialSource, Source, serial_advice
+from drivers.sources import SerialSource, Source, serial_advice
 
 SERIAL_WAIT_S = 0.5
 
@@ -121,11 +121,6 @@ class Accelerometer(ABC, Generic[Settings]):
         ``settings``: those given for this replay, or the defaults. SettingsError for what cannot be."""
         return settings
 
-    def played(self, settings: Settings, now_us: Callable[[], int]) -> Played:
-        """The device in a replay: as recorded events, unless its driver shall read them from a recorded wire."""
-        source = PlayedSource(self.name, now_us)
-        return Played(source, source.load, source.has_more)
-
     def simulated(self, settings: Settings, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
         """Readings (n, 3) [m/s2] as the bytes of n events, for drives that are simulated. NotImplementedError where its
         events are not single readings."""
@@ -157,13 +152,6 @@ class SerialAccelerometer(Accelerometer[Settings]):
         port, baud = self.line(settings)
         return SerialSource(self.name, lambda: machine.open_serial(port, baud), machine.now_us, SERIAL_WAIT_S,
                             machine.sleep)
-
-    def played(self, settings: Settings, now_us: Callable[[], int]) -> Played:
-        """A recorded port."""
-        from drivers.recorded_wires import RecordedPort
-
-        port = RecordedPort()
-        return Played(SerialSource(self.name, lambda: port, now_us, wait_s=0.0), port.load, port.has_bytes)
 
     def advice(self, state: str) -> str:
         """What to look at on a serial line."""

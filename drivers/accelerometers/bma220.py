@@ -52,7 +52,7 @@ from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
 from drivers.registers import ToggleRegister
 from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
-from drivers.sources import US_PER_S, ChipSource, Deadlines, Played, Source
+from drivers.sources import US_PER_S, ChipSource, Deadlines, Source
 
 BASE_RATE_HZ = 100
 NOISE_MPS2 = 0.1  # r.m.s., beside its steps, through the filter that goes with 100 Hz; no data sheet states it
@@ -346,14 +346,6 @@ class _Bma220(Accelerometer[Bma220Config]):
             raise SettingsError("expected whole numbers for 'range_g' and 'oversample'")
         return replace(settings, range_g=range_g, oversample=oversample)
 
-    def played(self, settings: Bma220Config, now_us: Callable[[], int]) -> Played:
-        """The driver reads the chip on a recorded bus."""
-        from drivers.accelerometers._bma220_chip import Bma220Chip
-        from drivers.recorded_wires import RecordedBus
-
-        bus = RecordedBus(Bma220Chip())
-        return Played(chip_source(lambda: bus, settings.chip, now_us, _no_wait), bus.load, lambda: False)
-
     def simulated(self, settings: Bma220Config, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
         """Three register bytes per reading: six bits in two's complement, to the left."""
         counts = np.clip(np.rint(accel_mps2 * (32 / settings.range_g / STANDARD_GRAVITY_MPS2)), -32, 31).astype(np.int8)
@@ -387,10 +379,6 @@ def _bus_opener(bus: int | Path, machine: Machine) -> Callable[[], I2cBus]:
         return RecordedBus.playing(Bma220Chip(), events, machine.now_us)
 
     return play
-
-
-def _no_wait(_seconds: float) -> None:
-    """Nothing settles in a recording."""
 
 
 ACCELEROMETER = _Bma220()

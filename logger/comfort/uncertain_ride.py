@@ -117,23 +117,32 @@ def larger(one: PowerSum, other: PowerSum, correlation: float) -> PowerSum:
     return PowerSum(mean, max(second - mean**2, 0.0), share * high.shared + (1 - share) * low.shared)
 
 
-def power_sums(mean: Array, std: Array, correlation: Array) -> tuple[PowerSum, PowerSum]:
-    """Sums of the squares and of the fourth powers of a Gaussian path.
+def square_sum(mean: Array, std: Array, correlation: Array) -> PowerSum:
+    """Sum of the squares of a Gaussian path.
 
     mean           (n,) of it; ``std`` (n,) its standard deviation, [m/s2]
     correlation    (l,) of its errors, by lag; 0 beyond
     """
-    squares, fourths = power_means(mean, std)
+    return PowerSum(expected_squares(mean, std), _variance((2 * mean * std, 2 * std * std), correlation))
+
+
+def fourth_power_sum(mean: Array, std: Array, correlation: Array) -> PowerSum:
+    """Sum of its fourth powers, likewise."""
     square, variance, mixed = mean * mean, std * std, mean * std
-    return (PowerSum(squares, _variance((2 * mixed, 2 * variance), correlation)),
-            PowerSum(fourths, _variance(((4 * square + 12 * variance) * mixed, 12 * (square + variance) * variance,
-                                         24 * mixed * variance, 24 * variance * variance), correlation)))
+    derivatives = ((4 * square + 12 * variance) * mixed, 12 * (square + variance) * variance, 24 * mixed * variance,
+                   24 * variance * variance)
+    return PowerSum(expected_fourth_powers(mean, std), _variance(derivatives, correlation))
 
 
-def power_means(mean: Array, std: Array) -> tuple[float, float]:
-    """Expected sums of the squares and of the fourth powers."""
+def expected_squares(mean: Array, std: Array) -> float:
+    """Expected sum of the squares."""
+    return float((mean * mean + std * std).sum())
+
+
+def expected_fourth_powers(mean: Array, std: Array) -> float:
+    """Expected sum of the fourth powers."""
     square, variance = mean * mean, std * std
-    return float((square + variance).sum()), float((square * (square + 6 * variance) + 3 * variance * variance).sum())
+    return float((square * (square + 6 * variance) + 3 * variance * variance).sum())
 
 
 def _variance(derivatives: tuple[Array, ...], correlation: Array) -> float:

@@ -113,7 +113,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
             pipeline = wiring.pipeline(config, sensor, car, known)
             core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
-            player = Player(core, config.accelerometer, rate, _progress(quiet))
+            player = Player(core, rate, _progress(quiet))
             started_s = time.monotonic()
             played = player.play(reader)
             wall_s = time.monotonic() - started_s

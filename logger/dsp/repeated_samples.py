@@ -17,6 +17,7 @@ sensor may stand at the end of its range. What never moves by several steps betw
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log
 
@@ -70,12 +71,11 @@ def resolution(values: Array) -> float:
     return float(np.median(np.diff(there))) if len(there) > 1 else 0.0
 
 
-def moves(samples: Array) -> Array:
+def moves(samples: Array, resolutions: Sequence[float]) -> Array:
     """How far each sample is from the one before, in steps of its axis, on the axis where that is most: samples
     (n, axes) to (n - 1,)."""
     steps = np.zeros(max(0, len(samples) - 1))
-    for axis in samples.T:
-        step = resolution(axis)
+    for axis, step in zip(samples.T, resolutions, strict=True):
         if step > 0:
             np.maximum(steps, np.abs(np.diff(axis)) / step, out=steps)
     return steps
@@ -111,20 +111,21 @@ def are_fresh(samples: Array, least_stretches: int = 20) -> bool:
 
 def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
     """How many stretches of small moves between two large ones stand still, and how many there are."""
-    move = moves(samples)
+    resolutions = [resolution(axis) for axis in samples.T]
+    move = moves(samples, resolutions)
     large = move > LARGE
     first, end = stretches_inside(move < SMALL)
-    at_end = _at_an_end(samples)
+    at_end = _at_an_end(samples, resolutions)
     good = large[first - 1] & large[end] & ~at_end[first]
     first, end = first[good], end[good]
     still = np.concatenate([[0], np.cumsum(fresh[1:])])
     return int(np.count_nonzero(still[end] == still[first])), len(first)
 
 
-def _at_an_end(samples: Array) -> Bools:
+def _at_an_end(samples: Array, resolutions: Sequence[float]) -> Bools:
     """(n,) where an axis has its largest or smallest value; an axis of few steps, which has it often, does not count
     beside one of many."""
-    spans = [float(np.ptp(axis)) / step if (step := resolution(axis)) > 0 else 0.0 for axis in samples.T]
+    spans = [float(np.ptp(axis)) / step if step > 0 else 0.0 for axis, step in zip(samples.T, resolutions, strict=True)]
     wide = samples[:, np.array(spans) >= min(_WIDE, max(spans))]
     return np.asarray(((wide == wide.max(axis=0)) | (wide == wide.min(axis=0))).any(axis=1))
 

@@ -43,12 +43,14 @@ class BentForces:
         self._laws, self._slopes = moved.car.laws, linear.corners
         f_hz = np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
-        asked = np.where(seen, f_hz, 1.0)
         axle = np.unique(linear.structure.behind_m, return_inverse=True)[1]
-        by_wheel = linear.travel_by_wheel(asked)
-        travel = np.stack([by_wheel[..., axle == one].sum(axis=-1) for one in range(axle.max() + 1)])
-        self._travel = np.where(seen, np.moveaxis(travel, 1, -1), 0.0)  # (axles, corners, f)
-        self._by_force = np.where(seen, linear.by_force(asked).T, 0.0)
+        by_wheel = linear.travel_by_wheel(f_hz[seen])
+        corners = by_wheel.shape[1]
+        self._travel = np.zeros((axle.max() + 1, corners, len(f_hz)), np.complex128)
+        for one, rows in enumerate(self._travel):
+            rows[:, seen] = by_wheel[..., axle == one].sum(axis=-1).T
+        self._by_force = np.zeros((corners, len(f_hz)), np.complex128)
+        self._by_force[:, seen] = linear.by_force(f_hz[seen]).T
         s = np.asarray(2j * np.pi * f_hz, dtype=np.complex128)
         self._rate = s * self._travel
         self._own_rate = np.stack([one.passed(s) for one in self._slopes]) * self._rate

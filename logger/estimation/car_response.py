@@ -51,9 +51,11 @@ class CarResponse:
     def by_axle(self, f_hz: Array) -> ComplexArray:
         """Reading per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
-        by_wheel = self._car.by_wheel(np.where(seen, f_hz, 1.0))
-        response = np.stack([by_wheel[:, self._axle == axle].sum(axis=1) for axle in range(len(self.behind_m))])
-        return np.where(seen, response, 0.0)
+        by_wheel = self._car.by_wheel(f_hz[seen])
+        response = np.zeros((len(self.behind_m), len(f_hz)), np.complex128)
+        for axle, row in enumerate(response):
+            row[seen] = by_wheel[:, self._axle == axle].sum(axis=1)
+        return response
 
     def power_apart(self, speed_mps: float) -> Array:
         """Sum over the axles of each one's own squared gain, at ``WAVE_NUMBERS_CPM`` [1/s4], where ``power`` is the

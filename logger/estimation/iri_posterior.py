@@ -105,7 +105,7 @@ class SlopeErrors:
     def __init__(self, car: CarResponse, rate_hz: float, spacing_m: float, lags: int) -> None:
         self._car = car
         self._rate_hz = rate_hz
-        self._waves = np.cos(2 * pi * WAVE_NUMBERS_CPM[:, None] * spacing_m * np.arange(lags))
+        self._waves = _by_lag(spacing_m, lags)
 
     def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
         """For readings of this variance [(m/s2)2] at this speed [m/s]."""
@@ -121,6 +121,12 @@ class SlopeErrors:
         if self._car.is_exact:
             return 0.0
         return float(np.linalg.norm(self._car.changes(speed_mps).real @ weight)) / float(weight.sum())
+
+
+@lru_cache(maxsize=2)
+def _by_lag(spacing_m: float, lags: int) -> Array:
+    """How each wave at ``WAVE_NUMBERS_CPM`` goes on over so many steps (n, lags); kept, for it is that of any car."""
+    return np.cos(2 * pi * WAVE_NUMBERS_CPM[:, None] * spacing_m * np.arange(lags))
 
 
 @dataclass(frozen=True)
@@ -163,12 +169,12 @@ def window_iri(
     weight = np.full(len(slope), 1 / (len(slope) - 1))
     weight[[0, -1]] *= 0.5
     deviation = _deviation(knowledge, unseen)
-    absolute = mean_absolute(slope, deviation)
-    mean = float(weight @ absolute)
-    own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
     # Were the level higher, more of the readings would be taken for road, and more be left open.
     stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
-    more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
+    absolute, more_absolute = mean_absolute(np.stack([slope, stretched]),
+                                            np.stack([deviation, _deviation(louder, unseen)]))
+    mean, more = float(weight @ absolute), float(weight @ more_absolute)
+    own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
     shared = hypot((more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std)
     points = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
     begins, ends = float(absolute[:points].mean()), float(absolute[-points:].mean())

@@ -53,10 +53,11 @@ class LocalRoughness:
     def at(self, first: int, count: int) -> RelativeVariance:
         """What is known of points ``first`` ... ``first + count - 1``."""
         variance, log_error = np.ones(count), np.zeros(count)
-        number = np.arange(count) + first - self._first
-        known = (number >= 0) & (number < len(self._known.variance))
-        variance[known] = self._known.variance[number[known]]
-        log_error[known] = self._known.log_error[number[known]]
+        ahead = first - self._first
+        here = slice(max(-ahead, 0), max(min(len(self._known.variance) - ahead, count), 0))
+        there = slice(max(ahead, 0), max(min(len(self._known.variance), ahead + count), 0))
+        variance[here] = self._known.variance[there]
+        log_error[here] = self._known.log_error[there]
         return RelativeVariance(variance, log_error)
 
     def learn(

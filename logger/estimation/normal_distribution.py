@@ -23,19 +23,29 @@ _LEAST_NARROWING = 1e-6
 
 def density(u: Array) -> Array:
     """Standard normal density."""
-    return np.exp(-0.5 * u * u) / sqrt(2 * pi)
+    result = u * u
+    result *= -0.5
+    np.exp(result, out=result)
+    result /= sqrt(2 * pi)
+    return result
 
 
 def _tail(u: Array) -> Array:
-    """Probability beyond u >= 0."""
+    """Probability beyond u >= 0. In place: for long rows most of the time goes into new memory."""
     z = u / sqrt(2)
-    t = 1 / (1 + 0.5 * z)
+    t = 0.5 * z
+    t += 1.0
+    np.divide(1.0, t, out=t)
     series = np.full_like(t, _CHEBYSHEV[-1])
-    for coefficient in _CHEBYSHEV[-2::-1]:  # in place: for long rows most of the time goes into new memory
+    for coefficient in _CHEBYSHEV[-2::-1]:
         series *= t
         series += coefficient
-    series -= z * z
-    return 0.5 * t * np.exp(series, out=series)
+    z *= z
+    series -= z
+    np.exp(series, out=series)
+    series *= t
+    series *= 0.5
+    return series
 
 
 def distribution(u: Array) -> Array:

@@ -27,7 +27,10 @@ from logger.estimation.steady_motion import SteadyMotion
 Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
-_TRIALS, _EVENING_ROUNDS = 12, 4
+_TRIALS = 12
+# Each leaves a tenth of the error before it, so that what changed by less is right within a thousandth: where a
+# chip is read four times per sample mostly after two. All four change no IRI by more than 2e-5 of its standard error.
+_EVENING_ROUNDS, _NEARLY_EVEN = 4, 0.01
 _LEAST_WEIGHT = 1e-9  # among the others, where none tells of another
 _LEAST_OTHERS = 1e-3  # of an even reading's information
 _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
@@ -84,10 +87,14 @@ def cavity(motion: SteadyMotion, variance: Array) -> Array:
     trials, log_trials = _trials(variance)
     # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
     log_others = log_trials - np.log(np.maximum(1 / motion.resolved_per_reading(trials) - 1, _LEAST_OTHERS))
-    even = 1 / mean(1 / variance)
-    for _ in range(_EVENING_ROUNDS):
-        others = np.exp(np.interp(np.log(even), log_trials, log_others))
-        even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
+    log_even = -np.log(mean(1 / variance))
+    others = np.exp(_between_even(log_even, log_trials, log_others))
+    for _ in range(_EVENING_ROUNDS - 1):
+        before = others
+        log_even = np.log(np.maximum(1 / mean(1 / (others + variance)) - others, variance.min()))
+        others = np.exp(_between_even(log_even, log_trials, log_others))
+        if np.abs(others - before).max() < _NEARLY_EVEN * others.min():
+            break
     return others
 
 
@@ -105,6 +112,14 @@ def _trials(variance: Array) -> tuple[Array, Array]:
     lowest, highest = log(float(variance.min())), log(float(variance.max()) * 1.001)
     logs: Array = lowest + (highest - lowest) / (_TRIALS - 1) * np.arange(_TRIALS, dtype=np.float64)
     return np.exp(logs), logs
+
+
+def _between_even(at: Array, places: Array, values: Array) -> Array:
+    """What ``np.interp`` gives, (n,) at places ``at`` (n,), quicker because the known places (k,) are even."""
+    steps = (at - places[0]) * ((len(places) - 1) / (places[-1] - places[0]))
+    below = np.clip(steps.astype(np.int64), 0, len(places) - 2)
+    share = np.clip(steps - below, 0.0, 1.0)
+    return values[below] + share * np.diff(values)[below]
 
 
 def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:

@@ -8,15 +8,24 @@ that of the noise, W the weighting. Where nothing was read, all of |W|^2 S is.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
-from math import hypot, sqrt
+from math import exp, hypot, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.comfort.uncertain_ride import PowerSum, RideSums, larger, power_means, power_sums
+from logger.comfort.uncertain_ride import (
+    PowerSum,
+    RideSums,
+    expected_fourth_powers,
+    expected_squares,
+    fourth_power_sum,
+    larger,
+    square_sum,
+)
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
-from logger.estimation.iri_posterior import LEVEL_TRIAL, raised
+from logger.estimation.iri_posterior import LEVEL_TRIAL
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 
@@ -99,17 +108,27 @@ class RidePosterior:
         self._lags = round(_LAGS_S * rate_hz)
         self._running = round(_RUNNING_S * rate_hz)
 
+    def of(self, car: CarResponse) -> RidePosterior:
+        """That of another car, weighted likewise."""
+        other = copy(self)
+        other._car = car
+        return other
+
     def weighted(self, accel_mps2: Array) -> Array:
         """The acceleration (count,) of a block, weighted; its first seconds are those of a start."""
         return np.fft.irfft(np.fft.rfft(accel_mps2) * self._response, self._count)
 
-    def knowledge(self, speed_mps: float, spectrum: RoadSpectrum, variance: float, other_psd: Array | None = None
-                  ) -> RideKnowledge:
-        """For readings of this variance [(m/s2)2] at this speed [m/s]; ``other_psd`` as in ``RidePlace``."""
-        per_cpm = self._car.power(speed_mps) * spectrum.psd_of(LOG_WAVES)
-        ride = np.interp(self._f_hz / speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / speed_mps
-        if other_psd is not None:
-            ride = ride + np.interp(self._f_hz, _frequencies_hz(self._count, self._rate_hz), _thinned(other_psd))
+    def knowledge(self, place: RidePlace) -> tuple[RideKnowledge, RideKnowledge]:
+        """At a place, and were the road there rougher by ``LEVEL_TRIAL``."""
+        per_cpm = self._car.power(place.speed_mps) * place.spectrum.psd_of(LOG_WAVES)
+        road = np.interp(self._f_hz / place.speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / place.speed_mps
+        other: Array | float = 0.0
+        if place.other_psd is not None:
+            other = np.interp(self._f_hz, _frequencies_hz(self._count, self._rate_hz), _thinned(place.other_psd))
+        return self._known(road + other, place.variance), self._known(exp(LEVEL_TRIAL) * road + other, place.variance)
+
+    def _known(self, ride: Array, variance: float) -> RideKnowledge:
+        """Of a ride of this spectrum (f,) [(m/s2)2/Hz], for readings of this variance [(m/s2)2]."""
         noise = 2 * variance / self._rate_hz
         wiener_gain = ride / (ride + noise)
         step_hz = self._rate_hz / _LINES
@@ -129,11 +148,10 @@ class RidePosterior:
         weighted_mps2    (t,) most probable weighted acceleration
         unread           (t,) there was no reading
         """
-        knows = self.knowledge(place.speed_mps, place.spectrum, place.variance, place.other_psd)
+        knows, louder = self.knowledge(place)
         rough = hypot(_rough_log_std(knows.accel_variance, place.sensor), place.scale_log_std)
         if rough > _MOST_ROUGH:
             return None
-        louder = self.knowledge(place.speed_mps, raised(place.spectrum), place.variance, place.other_psd)
         numbers = np.flatnonzero(inside)
         span = slice(max(int(numbers[0]) - self._running + 1, 0), int(numbers[-1]) + 1)
         mean = weighted_mps2[span]
@@ -142,25 +160,26 @@ class RidePosterior:
         stretched = mean * (louder.resolved / max(knows.resolved, _LEAST_RESOLVED))
         louder_std = _deviation(louder, unread[span])
         noise_off = 2 * place.noise_log_std * place.sensor.noise_rms_mps2**2 * knows.noise_share
+        per_log_level = place.log_level_std / LEVEL_TRIAL
 
-        def sums_of(chosen: Bools | slice) -> tuple[PowerSum, PowerSum]:
-            squares, fourths = power_sums(mean[chosen], std[chosen], knows.correlation)
-            more_squares, more_fourths = power_means(stretched[chosen], louder_std[chosen])
-            per_log_level = place.log_level_std / LEVEL_TRIAL
-            count = len(mean[chosen])
-            return (replace(squares, shared=hypot((more_squares - squares.mean) * per_log_level, noise_off * count,
-                                                  2 * rough * squares.mean)),
-                    replace(fourths, shared=hypot((more_fourths - fourths.mean) * per_log_level,
-                                                  6 * noise_off * squares.mean, 4 * rough * fourths.mean)))
+        def squares_of(chosen: Bools | slice) -> PowerSum:
+            squares = square_sum(mean[chosen], std[chosen], knows.correlation)
+            more = expected_squares(stretched[chosen], louder_std[chosen])
+            return replace(squares, shared=hypot((more - squares.mean) * per_log_level, noise_off * len(mean[chosen]),
+                                                 2 * rough * squares.mean))
 
-        squares, fourths = sums_of(inside[span])
+        chosen = inside[span]
+        squares, fourths = squares_of(chosen), fourth_power_sum(mean[chosen], std[chosen], knows.correlation)
+        more = expected_fourth_powers(stretched[chosen], louder_std[chosen])
+        fourths = replace(fourths, shared=hypot((more - fourths.mean) * per_log_level, 6 * noise_off * squares.mean,
+                                                4 * rough * fourths.mean))
         energy = np.concatenate([[0.0], np.cumsum(mean**2 + std**2)])
         ends = numbers - span.start + 1
         sums = energy[ends] - energy[np.maximum(ends - self._running, 0)]
         largest, before = None, 0
         for part in np.array_split(np.arange(len(ends)), 1 + len(ends) // (self._running // _RUNNING_PARTS)):
             end = int(ends[part[np.argmax(sums[part])]])
-            running, _ = sums_of(slice(max(end - self._running, 0), end))
+            running = squares_of(slice(max(end - self._running, 0), end))
             common = max(1 - (end - before) / self._running, 0.0)
             largest, before = running if largest is None else larger(largest, running, common), end
         assert largest is not None

@@ -78,11 +78,16 @@ class TimeGrid:
         in_a_step[:, 1:] = self.by_axle[:, 1:] / np.arange(1, self.by_axle.shape[1])
         power = np.fft.irfft(1j * in_a_step) ** 2
         self.step_power = np.fft.rfft(power / power.sum(axis=1, keepdims=True))
-        half_waves = np.arange(1, int(2 * _DRIFT_BELOW_HZ * count / rate_hz) + 1)
-        phase = pi * half_waves * (np.arange(count * reads)[:, None] + 0.5) / (count * reads)
-        self.drift = np.hstack([np.ones((count * reads, 1)), np.cos(phase)])
+        self.drift = _drift(count * reads, int(2 * _DRIFT_BELOW_HZ * count / rate_hz))
         # The constant is gravity: nothing is known of it. The rest is small.
-        self.drift_precision = np.array([1e-6, *np.full(len(half_waves), _DRIFT_MPS2**-2)])
+        self.drift_precision = np.array([1e-6, *np.full(len(self.drift) - 1, _DRIFT_MPS2**-2)])
+
+
+@lru_cache(maxsize=2)
+def _drift(count: int, half_waves: int) -> Array:
+    """A constant and so many cosines (1 + half_waves, count); kept, for they are those of any car."""
+    phase = pi * np.arange(half_waves + 1)[:, None] * (np.arange(count) + 0.5) / count
+    return np.cos(phase)
 
 
 class Block:
@@ -148,13 +153,13 @@ class Block:
         factor = self.wave_factors(spectrum)
         shaped = factor * self._averaged
         gain = self._gain(weight) * np.abs(factor) ** 2
-        weighted = weight[:, None] * self._grid.drift
-        inner = np.linalg.inv(self._grid.drift.T @ weighted + np.diag(self._grid.drift_precision))
+        weighted = self._grid.drift * weight
+        inner = np.linalg.inv(self._grid.drift @ weighted.T + np.diag(self._grid.drift_precision))
         pair = np.empty((2, len(factor)), np.complex128)
 
         def weigh(row: Array) -> Array:
             """The weights, less what the drift can explain (Woodbury)."""
-            result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
+            result: Array = weight * row - (inner @ (weighted @ row)) @ weighted
             return result
 
         def seen_as(waves: ComplexArray) -> tuple[Array, Array]:
@@ -195,8 +200,8 @@ class Block:
                 pull, held = brought_back(weighed, unlikely)
                 residual = residual - step * (pull + held)
             before = size
-        drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
-        drift_variance = ((self._grid.drift @ inner) * self._grid.drift).sum(axis=1)
+        drift = (inner @ (weighted @ (reading_mps2 - explained))) @ self._grid.drift
+        drift_variance = np.einsum("ij,ij->j", inner @ self._grid.drift, self._grid.drift)
         return Solution(waves, waves * factor, white, explained + drift, drift, drift_variance, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:

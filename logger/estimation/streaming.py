@@ -167,6 +167,7 @@ class RoadEstimator:
         self._spacing_m = self._piece_m / self._points
         self._on_road = on_road
         self._ride_response = ride_response
+        self._ride: RidePosterior | None = None
         self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise)
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
@@ -185,9 +186,17 @@ class RoadEstimator:
         self._kept[car] = _Answers(
             car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
             TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
-            RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None,
+            self._ride_on(response),
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
         return self._kept[car]
+
+    def _ride_on(self, response: CarResponse) -> RidePosterior | None:
+        """Of one car; what the weighting is does not change with it."""
+        if self._ride_response is None:
+            return None
+        if self._ride is None:
+            self._ride = RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ)
+        return self._ride.of(response)
 
     @property
     def noise_stretches(self) -> int:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import gamma
 
 from logger.comfort.iso2631 import a_w, vdv
-from logger.comfort.uncertain_ride import PowerSum, RideSums, gamma_root, larger, power_sums
+from logger.comfort.uncertain_ride import PowerSum, RideSums, fourth_power_sum, gamma_root, larger, square_sum
 
 STEP_S = 0.01
 COUNT = 60
@@ -33,7 +33,8 @@ def test_sums_are_those_of_drawn_paths(scale: float, level: float) -> None:
     covariance = np.outer(std, std) * correlation()[lag]
     rng = np.random.default_rng(1)
     drawn = path(scale) + rng.multivariate_normal(np.zeros(COUNT), covariance, 200_000)
-    for power, found in zip((2, 4), power_sums(path(scale), std, correlation()), strict=True):
+    for power, sum_of in ((2, square_sum), (4, fourth_power_sum)):
+        found = sum_of(path(scale), std, correlation())
         sums = (drawn**power).sum(axis=1)
         assert found.mean == pytest.approx(sums.mean(), rel=0.01)
         assert found.variance == pytest.approx(sums.var(), rel=0.04)
@@ -41,7 +42,7 @@ def test_sums_are_those_of_drawn_paths(scale: float, level: float) -> None:
 
 def test_a_ride_known_exactly_has_the_plain_figures_and_no_error() -> None:
     ride = path(0.4)
-    squares, fourths = power_sums(ride, np.zeros(COUNT), correlation())
+    squares, fourths = (one(ride, np.zeros(COUNT), correlation()) for one in (square_sum, fourth_power_sum))
     found = RideSums(COUNT, squares, fourths, squares, COUNT).figures(STEP_S)
     assert found.a_w.value == pytest.approx(a_w(ride))
     assert found.vdv.value == pytest.approx(vdv(ride, STEP_S))

@@ -112,7 +112,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
         there = moved(now, level, waviness)
         shape = np.sqrt(there.psd(ratio) / now.psd(ratio))
         scaled = np.fft.irfft(np.fft.rfft(matrix, axis=1) * shape, block.count, axis=1)
-        drift = time_grid(1024).drift
+        drift = time_grid(1024).drift.T
         covariance = (scaled * variance) @ scaled.T + NOISE_MPS2**2 * np.eye(1024)
         covariance += drift @ np.diag(1 / time_grid(1024).drift_precision) @ drift.T
         return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * reading @ np.linalg.solve(covariance, reading)

@@ -63,7 +63,7 @@ def settled(reading: np.ndarray, rounds: int = 12) -> RelativeVariance:
 def log_evidence(reading: np.ndarray, variance: np.ndarray) -> float:
     """log N(y; 0, B D B' + drift + noise) of what was read."""
     _, matrix, _ = a_block()
-    drift = a_grid().drift
+    drift = a_grid().drift.T
     covariance = (matrix * variance) @ matrix.T + (drift / a_grid().drift_precision) @ drift.T
     used = weights() > 0
     covariance = (covariance + NOISE_MPS2**2 * np.eye(COUNT))[np.ix_(used, used)]

@@ -112,7 +112,7 @@ OWN = [
     Fault("bma220", "codes of two ranges exchanged", value(bma220, "RANGE_CODES", {2: 0, 4: 1, 8: 3, 16: 2}),
           samples_are_what_it_felt, 1),
     Fault("bma220", "codes of two filters exchanged", value(bma220, "FILTER_CODES", {
-        1000: 0, 500: 1, 250: 2, 125: 3, 64: 5, 32: 4}), samples_are_what_it_felt),
+        1000: 0, 500: 1, 250: 2, 125: 4, 64: 3, 32: 5}), samples_are_what_it_felt),
     Fault("bma220", "oversample forgotten", ONE_READING, samples_are_what_it_felt, 1),
     Fault("bma220", "settings never checked", nothing_checked, lost_settings_are_noticed, 1),
     Fault("bma220", "settings never checked, as after power-on", nothing_checked, lost_settings_are_noticed),

@@ -114,7 +114,7 @@ def recording_alone_gives_the_same_rows(name: str, settings: Any, folder: Path, 
         assert reader.header == header
         config = wiring.config_for_dump(reader.header, None, None)
         core, rows = core_of(config)
-        Player(core, config.accelerometer, 0.0, lambda _: None).play(reader)
+        Player(core, 0.0, lambda _: None).play(reader)
     kind, before, after = driven.kind, driven.fake.settings, config.accelerometer.settings
     assert kind.readings(after) == kind.readings(before)
     stated = [{key: fact for key, fact in kind.facts(one).items() if key not in OUTSIDE} for one in (before, after)]

@@ -19,7 +19,7 @@ from pathlib import Path
 from drivers.dump import Event, open_dump
 from logger.records import WindowRecord
 from logger.service import wiring
-from logger.service.config import AccelerometerConfig, Config, LogConfig
+from logger.service.config import Config, LogConfig
 from logger.service.dump_player import Player
 from logger.service.event_core import EventCore
 from logger.service.storage import Storage
@@ -134,7 +134,7 @@ def soak(day: CarDay, directory: Path, quota_bytes: int) -> Soaked:
     """Let the day happen, with its files in an empty folder."""
     service = _Service(directory, quota_bytes)
     ctypes.CDLL(None).malloc_trim(0)  # room that the making of the day has left would hide a leak
-    player = Player(service, AccelerometerConfig(), 0.0, lambda _: None)
+    player = Player(service, 0.0, lambda _: None)
     began_s, began_cpu_s = time.monotonic(), time.process_time()
     events = player.play(day.events()).events
     wall_s, cpu_s = time.monotonic() - began_s, time.process_time() - began_cpu_s
