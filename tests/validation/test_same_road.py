@@ -37,7 +37,7 @@ def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
     assert reported["steps"][-1]["error"] < reported["steps"][1]["error"] < reported["baseline_error"]
     assert {"sensor_gain", "tire_enveloping"} <= reported["taken_by_road"].keys()
-    assert {"dry_friction", "speed_scale", "roll"} <= reported["not_tried"].keys()
+    assert {"damper_asymmetry", "speed_scale", "roll"} <= reported["not_tried"].keys()
     assert any("share one scale" in one or "only together" in one for one in reported["sentences"])
 
 
