@@ -201,9 +201,12 @@ def test_a_search_is_the_commands(
     few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset")}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     folders = [tmp_path / "slow", tmp_path / "fast"]
-    for folder, run in zip(folders, names["runs"], strict=True):
-        ridelog.write_run(folder, run)
     out = [] if "--same-road" in more else ["--out", str(tmp_path / "lab")]
+    short = ridelog.random_road(iso_class="C", length_m=90.0, seed=2)  # a road that is estimated takes its square
+    runs = names["runs"] if out else [ridelog.simulate(names["car"], short, speed_mps, noise_mps2=0.03)
+                                      for speed_mps in (9.0, 15.0)]
+    for folder, run in zip(folders, runs, strict=True):
+        ridelog.write_run(folder, run)
     assert main([*more, "--vehicle", "rav4-2009", *map(str, folders), *out, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose_same_road(
