@@ -41,8 +41,8 @@ DECISIVE = 2 * INDISTINGUISHABLE
 class Effort:
     """How much work the choice of a law takes.
 
-    listed                          how many known effects are sought first; all as usual where no law alone explains
-                                    what is left
+    listed                          how many known effects are sought first, unless a law outdoes them; all as usual
+                                    where no law alone explains what is left
     worth_narrowing                 families of which one axle alone is tried
     fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
                                     their own
@@ -152,16 +152,16 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     ValueError where the vehicle lacks what an effect needs.
     """
     effort = effort or Effort()
-    few = replace(Usual(), effects=effort.listed)
-    search, selection = search_effects(posterior, effects, present, progress, workers, few)
+    one = replace(Usual(), effects=1)
+    search, selection = search_effects(posterior, effects, present, progress, workers, one)
     choice = _LawChoice(search, selection, families, known, effort)
+    if not choice.outdoes_two():
+        choice = choice.seeking(effort.listed)
     law = choice.explaining_all()
-    if law is None and exceeds_noise(selection.now) and len(selection.gains) == effort.listed:
-        search.effort = Usual()
-        selection = search.run(selection.before)
-        choice = replace(choice, selection=selection)
-    if law is None and exceeds_noise(selection.now):
+    if law is None:
+        choice = choice.seeking(Usual().effects)
         law = choice.with_effects()
+    selection = choice.selection
     context = LawContext(selection.before.posterior, selection.before.state)
     diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
     verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
@@ -180,7 +180,8 @@ def exceeds_noise(model: Baseline) -> bool:
 class _LawChoice:
     """The choice of a law, after the search among the known effects.
 
-    kept    models, with the laws that were fitted on top of each
+    kept     models, with the laws that were fitted on top of each
+    ended    laws that were fitted to the end, with their models and gains
     """
 
     search: Search
@@ -189,6 +190,25 @@ class _LawChoice:
     known: Mapping[str, Effect]
     effort: Effort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
+    ended: dict[LawFit, tuple[Baseline, dict[str, float]]] = field(default_factory=dict)
+
+    def outdoes_two(self) -> bool:
+        """Whether a law gains more than twice what the first known effect does. Two of them that explained as much
+        would be no worse than the law; were their gains to add up, the first to be found would have half of it."""
+        now, before = self.selection.now, self.selection.before
+        if not exceeds_noise(now):
+            return False
+        gained = [before.score - one.score for one in self._fits_to(before) if self._is_accepted(one)]
+        return max(gained, default=0.0) > 2 * (before.score - now.score)
+
+    def seeking(self, most: int) -> _LawChoice:
+        """The choice after a search for up to so many known effects; itself where those that were found explain all, or
+        no more were found than were sought."""
+        search, selection = self.search, self.selection
+        if not exceeds_noise(selection.now) or len(selection.gains) < search.effort.effects:
+            return self
+        search.effort = replace(search.effort, effects=most)
+        return replace(self, selection=search.go_on(selection))
 
     def explaining_all(self) -> Law | None:
         """The law that explains everything by itself, better than the known effects; None where none does, or nothing
@@ -197,39 +217,48 @@ class _LawChoice:
         if now is before and not exceeds_noise(now):
             return None
         least = 0.0 if exceeds_noise(now) else DECISIVE
-        law, model = self._best(self._fits_to(before), now.score - least)
-        return None if model is None or exceeds_noise(model) else law
+        return self._best(self._fits_to(before), now.score - least, explains_all=True)
 
     def with_effects(self) -> Law | None:
-        """The best law together with known effects, or alone if it explains more than they do."""
+        """The best law together with known effects, or alone if it explains more than they do; None where these leave
+        nothing."""
         now, before = self.selection.now, self.selection.before
+        if not exceeds_noise(now):
+            return None
         names = now.state.names[self.search.present:]
         bases = [before, now] if names else [before]
         if len(names) == 2:  # one of them may only imitate the law
             bases += [self.search.without(now, name) for name in names]
-        return self._best([one for base in bases for one in self._fits_to(base)], now.score)[0]
+        return self._best([one for base in bases for one in self._fits_to(base)], now.score)
 
-    def _best(self, fits: Sequence[LawFit], least: float) -> tuple[Law | None, Baseline | None]:
-        """The law with the most evidence, with its model; None where none scores less than ``least``."""
+    def _best(self, fits: Sequence[LawFit], least: float, explains_all: bool = False) -> Law | None:
+        """The law with the most evidence; None where none scores less than ``least``, or it leaves something though it
+        is to explain all."""
         accepted = sorted((one for one in fits if one.score < least and self._is_accepted(one)),
                           key=lambda one: one.score)
         if not accepted:
-            return None, None
+            return None
         best = self._simplest(accepted)
-        self.search.progress(f"{best.family.title}: fitting the car with it")
-        found = best.fit.found
-        fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
-        model, gains = self.search.eliminate_backward(self.selection.before, fitted)
-        if best.draft.name not in gains or model.score > least:
-            return None, None
+        if best not in self.ended:
+            self.ended[best] = self._fit_in_full(best)
+        model, gains = self.ended[best]
+        if best.draft.name not in gains or model.score > least or (explains_all and exceeds_noise(model)):
+            return None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
         effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
         rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        law = Law(best.family, best.draft, one, effects, model.state, gains[best.draft.name], before - now,
+        return Law(best.family, best.draft, one, effects, model.state, gains[best.draft.name], before - now,
                   before - model.score, rivals, self._nearest(model, best, gains[best.draft.name]))
-        return law, model
+
+    def _fit_in_full(self, best: LawFit) -> tuple[Baseline, dict[str, float]]:
+        """The model with a law fitted to the end, without known effects that it needs no more, and the gains of what is
+        left of both."""
+        self.search.progress(f"{best.family.title}: fitting the car with it")
+        found = best.fit.found
+        fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
+        return self.search.eliminate_backward(self.selection.before, fitted)
 
     def _fits_to(self, base: Baseline) -> list[LawFit]:
         """Laws fitted on top of a model, kept from earlier calls."""

@@ -11,14 +11,14 @@ that the effect alone makes the difference.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end, own_slopes
+from logger.lab.likelihood.map_fit import align, fit, fit_model, fit_to_the_end, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
@@ -159,7 +159,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added), near)
     unbounded = posterior.without_soft_bounds()
     (base_fit, errors_before), (effect_fit, errors_after) = (
-        _fit_without_soft_bounds(unbounded, one) for one in (before, after))
+        _fit_without_soft_bounds(unbounded, one, fitted) for one, fitted in ((before, fit), (after, fit_to_the_end)))
     prior, nominal = posterior.prior, posterior.vehicle
     if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
         wider = given.with_rough_file()
@@ -199,8 +199,9 @@ def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple
     return fit_to_the_end(min(starts, key=lambda one: one.score))
 
 
-def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
+def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel, fitted: Callable[..., LinearModel]
+                             ) -> tuple[LinearModel, Array]:
     """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
     if found.posterior.prior.at_soft_bounds(found.state.logs):
-        found = fit_to_the_end(LinearModel(unbounded, found.state), found.numbers)
+        found = fitted(LinearModel(unbounded, found.state), found.numbers)
     return found, standard_errors(found)[1]

@@ -112,9 +112,11 @@ class Search:
 
     def run(self, before: Baseline) -> Selection:
         """Search on top of a fitted model."""
-        now = before
-        steps: list[tuple[str, HoldOut]] = []
-        first = Round((), ())
+        return self.go_on(Selection(before, before, {}, {}, Round((), ()), ()))
+
+    def go_on(self, begun: Selection) -> Selection:
+        """A search that ended because it had found as many effects as it might, with more of them."""
+        before, now, first, steps = begun.before, begun.now, begun.first, list(begun.steps)
         while len(now.state.effects) - self.present < self.effort.effects:
             untried = [one for one in self.effects if one.name not in now.state.names]
             if not untried:

@@ -92,6 +92,19 @@ def test_two_that_are_missing_are_both_found_and_each_gains_beside_the_other() -
         assert gain == pytest.approx(sought.without(selection.now, name).score - selection.now.score)
 
 
+def test_a_search_goes_on_where_it_had_found_as_many_as_it_might() -> None:
+    base = base_of(secret_runs([hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.1)], lasts_s=12.0))
+    two = search(FEW).run(base)
+    sought = search(FEW)
+    sought.effort = replace(sought.effort, effects=1)
+    one = sought.run(base)
+    assert len(one.gains) == 1 and two.gains.keys() == {"sensor_offset", "sensor_gain"}
+    sought.effort = replace(sought.effort, effects=4)
+    found = sought.go_on(one)
+    assert found.gains == pytest.approx(two.gains) and found.before is base and found.first is one.first
+    assert [name for name, _ in found.steps] == [name for name, _ in two.steps]
+
+
 def test_what_explains_as_well_is_named() -> None:
     base = base_of(secret_runs([hidden("sensor_offset", offset_m=0.1)], noise_mps2=0.3))
     selection = search(("sensor_offset", "cg_shift", "sensor_gain")).run(base)
