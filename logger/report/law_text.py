@@ -88,6 +88,9 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
         return ["No known effect of its kind explains any part of it."]
     name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
     numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
+    if nearest.gain > nearest.law_gain:
+        return [f"The known effect {name}{numbers} explains more in its place than the law does (2 ln of the evidence "
+                f"{-gap:.0f} more): prefer it, ridelog add-effect {name}, and learn again if something is left."]
     if nearest.as_good:
         return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
                 f"runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "

@@ -60,7 +60,7 @@ def read_run_facts(folder: Path) -> RecordFacts:
                         for key, names in (("sensor", _SENSOR), ("receiver", _RECEIVER)))
     places = said["places"].mapping(("by",), ("vehicle",)) if "places" in said else {}
     numbers = {**{name: node.number(above=0) for name, node in sensor.items()},
-               **{name: node.number() for name, node in receiver.items()}}
+               **{name: _of_receiver(name, node) for name, node in receiver.items()}}
     return replace(
         UNKNOWN, **numbers,
         place_std_m=said["place_std_m"].number(0) if "place_std_m" in said else None,
@@ -70,6 +70,13 @@ def read_run_facts(folder: Path) -> RecordFacts:
         source=said["source"].text() if "source" in said else None,
         signals=tuple(_signal(name, node) for name, node in said["signals"].mapping().items()
                       ) if "signals" in said else ())
+
+
+def _of_receiver(name: str, node: Node) -> float:
+    """A delay may have either sign, as the recorder may be the late one; a factor is above 0, an error not below."""
+    if name.endswith(("_std", "_std_s")):
+        return node.number(0)
+    return node.number(above=0) if name == "speed_scale" else node.number()
 
 
 def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]) -> None:
