@@ -98,10 +98,13 @@ class KilledService:
         self._stop.set()
 
     def run(self, kills: int, rng: random.Random, longest_s: float) -> Kills:
-        """So many kills, each followed by a start that is killed again; the last start ends well."""
+        """So many kills, each followed by a start that is killed again; the last start ends well. Every second one
+        comes when the service is up, however long its imports take on a busy machine."""
         before: Rows = {}
-        for _ in range(kills):
+        for number in range(kills):
             process = self.start()
+            if number % 2:
+                self._wait_until_repaired(process)
             time.sleep(rng.uniform(0.3, longest_s))
             process.kill()
             process.wait(timeout=PATIENCE_S)
