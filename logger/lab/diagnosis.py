@@ -171,7 +171,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         posterior = below
         search, selection = searched(posterior)
     selection, after = _fit_finely(search, selection)
-    if posterior.may_be_rough and _is_off_on_the_whole(after):
+    if posterior.may_be_rough and (_is_off_on_the_whole(after) or _do_numbers_explain_all(search, selection)):
         # Numbers that are held back where they are not make effects of what they would explain.
         progress("the car's numbers are off by more than their tolerance: again with a wider one")
         wider = posterior.with_rough_file()
@@ -240,6 +240,18 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
 def _is_off_on_the_whole(after: LinearModel) -> bool:
     """Whether the car's numbers lie beyond their tolerance on the whole."""
     return after.posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1])
+
+
+def _do_numbers_explain_all(search: Search, selection: Selection) -> bool:
+    """Whether effects were found although the car's numbers alone, off on the whole and free of their soft bounds,
+    leave no more than noise: then the effects do what a rough file's numbers would, and hide how far these are off."""
+    if not selection.gains:
+        return False
+    search.progress("would the car's numbers alone explain it?")
+    fine, state = selection.before.posterior.without_soft_bounds(fine=True), selection.before.state
+    alone = fit_model(fine, fine.state_at(state.effects, state.logs, state.record, state.size))
+    return (excess_over_noise(alone.posterior, alone.state, FALSE_ALARM) <= UNEXPLAINED
+            and _is_off_on_the_whole(alone))
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:

@@ -99,6 +99,19 @@ def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
     assert "is a rough one" in " ".join(summary(found))
 
 
+@pytest.mark.slow
+def test_a_rough_file_that_an_effect_takes_over_lacks_no_physics_either() -> None:
+    """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
+    rng = np.random.default_rng(3)
+    axles = [f"{axle}.{name}" for name in ("unsprung_mass_kg", "suspension_stiffness_n_per_m",
+                                           "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m")
+             for axle in ("front", "rear")]
+    car = changed(CAR, {name: read(CAR, name) * float(np.exp(0.08 * rng.choice([-1, 1])))
+                        for name in ("sprung_mass_kg", "pitch_inertia_kg_m2", *axles)})
+    found = diagnosed(secret_runs(car=car, lasts_s=30.0, rougher=2.0), ("tire_damping", "sensor_offset", "occupant"))
+    assert nothing_is_missing(found) and found.rough_file
+
+
 # --- what lacks some ---
 
 
