@@ -171,7 +171,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         posterior = below
         search, selection = searched(posterior)
     selection, after = _fit_finely(search, selection)
-    if posterior.may_be_rough and (_is_off_on_the_whole(after) or _do_numbers_explain_all(search, selection)):
+    if posterior.may_be_rough and (_is_off_on_the_whole(after) or _do_numbers_explain_all(search, selection, after)):
         # Numbers that are held back where they are not make effects of what they would explain.
         progress("the car's numbers are off by more than their tolerance: again with a wider one")
         wider = posterior.with_rough_file()
@@ -242,16 +242,16 @@ def _is_off_on_the_whole(after: LinearModel) -> bool:
     return after.posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1])
 
 
-def _do_numbers_explain_all(search: Search, selection: Selection) -> bool:
-    """Whether effects were found although the car's numbers alone, off on the whole and free of their soft bounds,
-    leave no more than noise: then the effects do what a rough file's numbers would, and hide how far these are off."""
+def _do_numbers_explain_all(search: Search, selection: Selection, after: LinearModel) -> bool:
+    """Whether effects were found although the car's numbers alone, in a rough file, have as much evidence: then the
+    effects do what these numbers would, and hide how far they are off."""
     if not selection.gains:
         return False
     search.progress("would the car's numbers alone explain it?")
-    fine, state = selection.before.posterior.without_soft_bounds(fine=True), selection.before.state
-    alone = fit_model(fine, fine.state_at(state.effects, state.logs, state.record, state.size))
-    return (excess_over_noise(alone.posterior, alone.state, FALSE_ALARM) <= UNEXPLAINED
-            and _is_off_on_the_whole(alone))
+    rough = selection.before.posterior.with_rough_file().without_soft_bounds(fine=True)
+    state = selection.before.state
+    alone = fit_model(rough, rough.state_at(state.effects, state.logs, state.record, state.size))
+    return alone.score + alone.numbers_occam_factor <= after.score + after.numbers_occam_factor
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:

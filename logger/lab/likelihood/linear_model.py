@@ -198,6 +198,15 @@ class LinearModel:
         return sum(_log_determinant(root) - one.error.log_determinant(self.size)
                    for root, one in zip(self._roots, self._records, strict=True))
 
+    @property
+    def numbers_occam_factor(self) -> float:
+        """Occam factor of the car's numbers, in minus twice the log of the evidence: what a prior pays for being wider
+        than what the runs leave of it. ``score`` is without it, because it is alike where priors are."""
+        if not self.count:
+            return 0.0
+        information = self.information(self.state.logs)
+        return float(np.linalg.slogdet(information)[1]) + 2 * float(np.log(self.prior.deviations).sum())
+
     def with_size(self, size: ErrorSize) -> LinearModel:
         """The model with distance errors of another size."""
         found = copy(self)
