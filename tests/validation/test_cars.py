@@ -134,8 +134,9 @@ def released(car: Car, extra: Physics, lift_m: float, turn: float, seconds: floa
     first = np.zeros(2 * (6 + n) + INNER * n)
     first[HEAVE], first[PITCH] = lift_m, turn
     first[2 * (6 + n):2 * (6 + n) + n] = -lift_m - turn * ready.corners["ahead"]  # the mounts are at ease
-    flat = np.zeros((2 * round(seconds / step_s) + 1, n))
-    return ready, integrate(ready.body, ready.corners, flat, flat, step_s, ready.sticks, first, True)[1]
+    steps = round(seconds / step_s)
+    flat = np.zeros((2 * steps + 1, n))
+    return ready, integrate(ready.body, ready.corners, flat, flat, step_s, ready.sticks, first, True, np.ones(steps))[1]
 
 
 def energy(states: np.ndarray, extra: Physics) -> np.ndarray:
@@ -244,7 +245,8 @@ def test_a_car_over_a_cliff_falls_freely() -> None:
     ready = assemble(CAR, Physics(wheel_lift=True))
     road = np.full((2 * 1200 + 1, 2), -3.0)
     first = np.zeros(2 * 8 + INNER * 2)
-    _, states = integrate(ready.body, ready.corners, road, np.zeros_like(road), STEP_S, False, first, True)
+    _, states = integrate(ready.body, ready.corners, road, np.zeros_like(road), STEP_S, False, first, True,
+                          np.ones(1200))
     masses = np.array([CAR.sprung_mass_kg, CAR.front.unsprung_mass_kg, CAR.rear.unsprung_mass_kg])
     centre = states[:, [0, 6, 7]] @ masses / masses.sum()
     t = np.arange(centre.size) * STEP_S

@@ -14,6 +14,7 @@ MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
 DRIFT, CHANGE = "sensor drift", "number that changes"
 PROFILE, INERTIA = "profile that lacks waves", "inertia in the suspension"
 STOP = "stop"
+SKY, BY_SPEED = "force by the body's speed", "number that changes with the speed"
 
 REMOVED_DRIFT = "drift that is removed"
 """No family: a sensor's drift is no law of the car, it is removed and said."""
@@ -34,6 +35,8 @@ NAMES: dict[str, frozenset[str]] = {
     DRIFT: frozenset({REMOVED_DRIFT}),
     INERTIA: frozenset({"inertia_behind_spring"}),
     PROFILE: frozenset({"smoothed_profile"}),
+    SKY: frozenset({"skyhook"}),
+    BY_SPEED: frozenset({"changing_with_speed"}),
     CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
 }
 """What ``ridelog learn`` calls the families of each meaning."""
@@ -75,6 +78,8 @@ RIGHT: dict[str, Right] = {
     "warming_sensor": Right((DRIFT,), "an offset that decays"),
     "soft_saturation": Right((CORRECTION,), "of the sensor's reading alone"),
     "rattling_sensor": Right((CORRECTION,), "between the body and the record"),
+    "skyhook_damper": Right((SKY,), "a force by the body's speed against the ground"),
+    "adaptive_damper": Right((BY_SPEED,), "the damping goes with the driving speed"),
 }
 
 PHASES_OF_THEIR_OWN = frozenset({"wheel_imbalance", "engine_vibration", "flat_spot", "driveline_order"})

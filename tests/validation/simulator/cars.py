@@ -34,6 +34,7 @@ _CORNER = np.dtype([(name, np.float64) for name in (
     "mount", "gap", "rubber", "rubber_damper", "bushing", "bushing_yield", "friction", "tire", "tire_cubic",
     "tire_damper", "load", "gas", "by_place", "stribeck", "stribeck_mps", "droop", "droop_stop", "droop_damper",
     "inertance", "inerter_spring", "inerter_damper", "inerter_square", "absorber", "absorber_spring", "absorber_damper",
+    "sky", "sky_most",
 )])
 _BODY = np.dtype([(name, np.float64) for name in (
     "mass", "pitch", "roll", "seat_mass", "seat_spring", "seat_damper", "tow_mass", "tow_spring", "tow_damper",
@@ -129,6 +130,10 @@ class Physics:
     absorber_kg: float = 0.0
     absorber_hz: float = 0.0
     absorber_zeta: float = 0.0
+    sky: float = 0.0  # of a semi-active damper, by the body's own speed ...
+    sky_most: float = 0.0  # ... and at most by the rate of the suspension
+    firmer: float = 0.0  # share by which the dampers are firmer at high speed, and softer at low
+    firmer_at_mps: float = 15.0
     heat_per_j: float = 0.0  # what a joule that the dampers turn into heat takes from the logarithm of their damping
     heat_s: float = 1.0
     warm: float = 0.0  # share by which the tires stiffen
@@ -238,6 +243,7 @@ def _fit(corner: np.void, axle: Axle, extra: Physics) -> None:
     omega = 2 * np.pi * extra.absorber_hz
     corner["absorber"], corner["absorber_spring"] = extra.absorber_kg, extra.absorber_kg * omega**2
     corner["absorber_damper"] = 2 * extra.absorber_zeta * omega * extra.absorber_kg
+    corner["sky"], corner["sky_most"] = extra.sky, extra.sky_most
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,8 +261,8 @@ def _dissipated(state, corners, health):
 
 @njit(cache=True, error_model="numpy")
 def _rates(state, out, body, corners, road, road_rate, dry, health, warmth):
-    """d(state)/dt into ``out``; ``dry`` is each corner's present friction force, ``health`` what fading left of the
-    dampers, ``warmth`` what warming made of the tires."""
+    """d(state)/dt into ``out``; ``dry`` is each corner's present friction force, ``health`` what fading and the
+    driving speed made of the dampers, ``warmth`` what warming made of the tires."""
     n = corners.size
     m = _WHEELS + n
     inner = 2 * m
@@ -265,10 +271,13 @@ def _rates(state, out, body, corners, road, road_rate, dry, health, warmth):
         c = corners[i]
         wheel, wheel_rate = state[_WHEELS + i], state[m + _WHEELS + i]
         x = wheel - state[_HEAVE] - c.ahead * state[_PITCH] - c.left * state[_ROLL]
-        v = wheel_rate - state[m + _HEAVE] - c.ahead * state[m + _PITCH] - c.left * state[m + _ROLL]
+        climb = state[m + _HEAVE] + c.ahead * state[m + _PITCH] + c.left * state[m + _ROLL]
+        v = wheel_rate - climb
         force = force_by_travel(x, v, c) + dry[i] + force_with_memory(state, out, c, x, v, inner + i, n, health)
         if c.friction > 0 and body.slip > 0:
             force += c.friction * np.tanh(v / body.slip)
+        if c.sky > 0 and climb * v < 0:  # semi-active: a damper that pulls only the way that it can
+            force += np.sign(v) * min(c.sky * abs(climb), c.sky_most * abs(v))
         hung = absorber_force(state, out, c, wheel, wheel_rate, inner + i, n)
         squash = road[i] - wheel
         tire = warmth * c.tire * squash + c.tire_cubic * squash**3 + c.tire_damper * (road_rate[i] - wheel_rate)
@@ -325,8 +334,9 @@ def _rub(state, dry, body, corners, dt):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
-    """Runge-Kutta over roads (2 N + 1, corners) given at every half step, from the state ``first``.
+def integrate(body, corners, road, road_rate, dt, sticks, first, keep, firmness):
+    """Runge-Kutta over roads (2 N + 1, corners) given at every half step, from the state ``first``; ``firmness`` (N,):
+    how firm the dampers are in each step, of one.
 
     Returns the rates of heave, pitch and bending after every step (N + 1, 3), and all states if ``keep``.
     """
@@ -356,17 +366,17 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
             health = np.exp(-heat)
         if body.warm > 0:
             warmth = 1 + body.warm * (1 - np.exp(-step * dt / body.warm_s))
-        h = 2 * step
-        _rates(state, k1, body, corners, road[h], road_rate[h], dry, health, warmth)
+        h, fit = 2 * step, health * firmness[step]
+        _rates(state, k1, body, corners, road[h], road_rate[h], dry, fit, warmth)
         for j in range(size):
             trial[j] = state[j] + 0.5 * dt * k1[j]
-        _rates(trial, k2, body, corners, road[h + 1], road_rate[h + 1], dry, health, warmth)
+        _rates(trial, k2, body, corners, road[h + 1], road_rate[h + 1], dry, fit, warmth)
         for j in range(size):
             trial[j] = state[j] + 0.5 * dt * k2[j]
-        _rates(trial, k3, body, corners, road[h + 1], road_rate[h + 1], dry, health, warmth)
+        _rates(trial, k3, body, corners, road[h + 1], road_rate[h + 1], dry, fit, warmth)
         for j in range(size):
             trial[j] = state[j] + dt * k3[j]
-        _rates(trial, k4, body, corners, road[h + 2], road_rate[h + 2], dry, health, warmth)
+        _rates(trial, k4, body, corners, road[h + 2], road_rate[h + 2], dry, fit, warmth)
         for j in range(size):
             state[j] += dt / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
         if sticks:
@@ -385,7 +395,8 @@ def finer(ready: Ready, step_s: float) -> int:
     return max(1, int(np.ceil(steepest * step_s / _STIFFEST)))
 
 
-def ride(ready: Ready, road: Array, road_rate: Array, step_s: float, keep: bool = False) -> tuple[Array, Array]:
+def ride(ready: Ready, road: Array, road_rate: Array, step_s: float, keep: bool = False, firmness: Array | None = None,
+         ) -> tuple[Array, Array]:
     """Drive over wheel paths (2 N + 1, corners) [m], [m/s], from rest on their first elevation.
 
     Returns rates (N + 1, 3) of heave [m/s], pitch [rad/s], bending [m/s] and, if asked, all states.
@@ -400,4 +411,6 @@ def ride(ready: Ready, road: Array, road_rate: Array, step_s: float, keep: bool 
     first[:3] = np.linalg.lstsq(places, start, rcond=None)[0]
     first[_SEAT] = first[_HEAVE]
     first[_TOW] = first[_HEAVE] + ready.body["tow_ahead"] * first[_PITCH]
-    return integrate(ready.body, ready.corners, road, road_rate, step_s, ready.sticks, first, keep)
+    if firmness is None:
+        firmness = np.ones((len(road) - 1) // 2)
+    return integrate(ready.body, ready.corners, road, road_rate, step_s, ready.sticks, first, keep, firmness)

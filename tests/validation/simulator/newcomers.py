@@ -58,6 +58,11 @@ def _warming(rng: np.random.Generator, car: Car) -> Path:
     return lambda u: {"offset_mps2": sign * size(u), "time_s": lasts_s}
 
 
+def _sky(rng: np.random.Generator, car: Car) -> Path:
+    return one("sky_n_s_per_m", 0.02 * damping_of(car), 4 * damping_of(car),
+               most_n_s_per_m=rng.uniform(1.0, 4.0) * damping_of(car))
+
+
 NEWCOMERS: dict[str, Outsider] = {newcomer.name: newcomer for newcomer in (
     Outsider("gas_spring", lambda rng, car: one("height_m", 4.0, 0.1), fields_of(gas_height_m="height_m"), rough=1,
              akin=("progressive_spring",)),
@@ -89,4 +94,8 @@ NEWCOMERS: dict[str, Outsider] = {newcomer.name: newcomer for newcomer in (
              lambda scene, p: scene.with_sensor(soft_mps2=p["limit_mps2"])),
     Outsider("rattling_sensor", lambda rng, car: one("held_mps2", 12.0, 0.3),
              lambda scene, p: scene.with_sensor(held_mps2=p["held_mps2"])),
+    Outsider("skyhook_damper", _sky, fields_of(sky="sky_n_s_per_m", sky_most="most_n_s_per_m"),
+             akin=("damper_asymmetry",)),
+    Outsider("adaptive_damper", lambda rng, car: one("share", 0.01, 0.9, at_mps=rng.uniform(10.0, 20.0)),
+             fields_of(firmer="share", firmer_at_mps="at_mps")),
 )}

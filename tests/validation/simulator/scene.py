@@ -119,6 +119,11 @@ def _flat_spot(physics: Physics, distance_m: Array) -> tuple[Array, Array]:
             np.where(on, np.pi * physics.flat_m / physics.flat_length_m * np.sin(angle), 0.0))
 
 
+def _firmness(physics: Physics, drive: Drive, at_s: Array) -> Array:
+    """How firm adaptive dampers are, of one: soft in town, firm on a motorway."""
+    return 1 + physics.firmer * np.tanh((drive.speed_at_mps(at_s) - physics.firmer_at_mps) / 8.0)
+
+
 def _driveline(physics: Physics, distance_m: Array, speed_mps: Array) -> Array:
     """The rate [m/s] of a body that a shaft shakes, so many times a metre."""
     wave = 2 * np.pi * physics.driveline_per_m
@@ -140,7 +145,7 @@ def clean_acceleration(
     if recorded is not None:
         way = tuple(np.interp(half_steps, drive.times_s, column) for column in recorded)
     height, rate = wheel_paths(scene, drive, half_steps, way)
-    motion, _ = ride(ready, height, rate, step_s)
+    motion, _ = ride(ready, height, rate, step_s, firmness=_firmness(scene.physics, drive, half_steps[:-1:2]))
     sensor_rate = motion[:, 0] + scene.physics.sensor_m * motion[:, 1] + motion[:, 2]
     if scene.physics.driveline_mps2:
         shaft_m, shaft_mps = way or (drive.distance_m(half_steps), drive.speed_at_mps(half_steps))

@@ -1,0 +1,57 @@
+"""Dampers that resist how fast the body moves against the ground, not against the wheel: as if hooked to the sky.
+
+The force between body and wheel is C z', with z' the speed of the body's end of the suspension (D. Karnopp, M. J.
+Crosby and R. A. Harwood, Journal of Engineering for Industry 96, 1974). An active one gives it always. A semi-active
+one can only resist its own rate v: it gives the smaller of C |z'| and B |v| where both have one sign, and else nothing.
+"""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+ACTIVE, SEMI_ACTIVE = "active", "semi-active"
+_ACTIVE = """
+def hooked(p, seen):
+    return p.sky_n_s_per_m * seen.body_mps
+"""
+_SEMI_ACTIVE = """
+def hooked(p, seen):
+    resists = np.minimum(p.sky_n_s_per_m * np.abs(seen.body_mps), p.firmest_n_s_per_m * np.abs(seen.rate_mps))
+    return np.where(seen.body_mps * seen.rate_mps > 0.0, np.sign(seen.rate_mps) * resists, 0.0)
+"""
+_METHOD = """def laws(self, p, laws):
+    return laws.with_law(Between.BODY_AND_WHEEL, hooked, p)
+"""
+_TRIED, _MOST = (0.3, 1.0), 30.0  # of the damper's own damping
+
+
+class Skyhook(Family):
+    name = "skyhook"
+    title = "dampers that resist how fast the body moves against the ground"
+    related_effects = ("damper_asymmetry", "damper_blow_off")
+    shown_by = "drive a road with long waves, on which the body bounces, and a short rough one, on which the wheels hop"
+
+    def drafts(self, context: LawContext) -> list[Draft]:
+        own = context.vehicle.front.suspension_damping_n_s_per_m
+        tried, most = tuple(rounded(share * own) for share in _TRIED), rounded(_MOST * own)
+        sky = Parameter("sky_n_s_per_m", tried[0], 0.0, most, 0.0, Scale.LINEAR, tried,
+                        "force by the speed of the body's end of the suspension")
+        firmest = Parameter("firmest_n_s_per_m", tried[1], rounded(0.01 * own), most, None, Scale.LOG, tried,
+                            "force by the suspension's rate, at most")
+        return [self._draft(ACTIVE, (sky,), _ACTIVE), self._draft(SEMI_ACTIVE, (sky, firmest), _SEMI_ACTIVE)]
+
+    def _draft(self, variant: str, parameters: tuple[Parameter, ...], functions: str) -> Draft:
+        return Draft(
+            family=self.name, kind="ForceEffect", title=f"{variant} {self.title}", parameters=parameters,
+            source="D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)",
+            signature="the body bounces less, and the wheels hop no less", shown_by=self.shown_by, method=_METHOD,
+            functions=functions, variant=variant, imports=("from logger.vehicle.laws import Between",))
+
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
+        said = f"{draft.variant} dampers that resist the body's own speed against the ground, {say('sky_n_s_per_m')}"
+        return said if draft.variant == ACTIVE else f"{said}, by at most {say('firmest_n_s_per_m')} of their rate"
+
+
+FAMILY = Skyhook()

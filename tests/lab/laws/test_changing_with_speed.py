@@ -1,0 +1,57 @@
+"""What changes with the driving speed: at any one speed a car with another number, beside a car that has it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from logger.lab.laws.families.changing_with_speed import FAMILY
+from logger.lab.laws.families.family import LawContext
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import chosen
+from logger.vehicle.vehicle import Axle, Vehicle
+
+from ...support.lab.secret_runs import CAR, SPEEDS_MPS, posterior_of, secret_runs
+
+NUMBERS = {"dampers": ("suspension_damping_n_s_per_m", 300.0), "springs": ("suspension_stiffness_n_per_m", 5000.0),
+           "tires": ("tire_stiffness_n_per_m", 40000.0)}
+
+
+def car_with_more(number: str, more: float) -> Vehicle:
+    """The car, with so much more at both axles."""
+    def changed(axle: Axle) -> Axle:
+        return replace(axle, **{number: getattr(axle, number) + more})
+
+    assert CAR.rear is not None
+    return replace(CAR, front=changed(CAR.front), rear=changed(CAR.rear))
+
+
+def steady_runs() -> list[Run]:
+    """Two drives, each at one speed from end to end."""
+    return [replace(run, speed_mps=np.full(run.count, speed_mps),
+                    distance_m=run.distance_m[0] + speed_mps * np.arange(run.count) / run.rate_hz)
+            for run, speed_mps in zip(secret_runs().runs, SPEEDS_MPS, strict=True)]
+
+
+@pytest.mark.parametrize("of", NUMBERS)
+def test_at_one_speed_it_is_a_car_with_another_number(of: str) -> None:
+    runs = steady_runs()
+    posterior = posterior_of(SimulatedRuns(runs))
+    draft, = (one for one in FAMILY.drafts(LawContext(posterior, posterior.start())) if one.variant == of)
+    number, changed = NUMBERS[of]
+    mean_mps = float(np.mean(SPEEDS_MPS))
+    law = chosen(draft.effect, {draft.strengths[0]: changed})
+    for run, speed_mps in zip(runs, SPEEDS_MPS, strict=True):
+        one = SimulatedRuns([run])
+        (with_law,), (there,), (before,) = (one.predict(compose(car, effects)) for car, effects in (
+            (CAR, [law]), (car_with_more(number, changed * (speed_mps / mean_mps - 1)), []), (CAR, [])))
+        assert np.std(with_law - there) < 0.001 * np.std(before - there)
+
+
+def test_runs_at_one_speed_show_nothing_of_it() -> None:
+    posterior = posterior_of(SimulatedRuns(steady_runs()[:1]))
+    assert FAMILY.drafts(LawContext(posterior, posterior.start())) == []
