@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.api.bench import tolerance_of
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, add, moved_between
 from logger.lab.selection.candidate_fit import chance_of
@@ -18,7 +19,7 @@ from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import read
 
 from ...support.lab.runs_with_residual import CAR
-from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
+from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, car_off_by, hidden, posterior_of, secret_runs
 
 OFFSET_M = 0.4
 
@@ -52,6 +53,7 @@ def test_where_a_search_ended_changes_nothing_of_where_the_fit_ends(runs: Simula
 def test_each_error_is_less_than_the_one_before_and_the_last_is_hardly_more_than_noise(added: AddedEffects) -> None:
     assert added.error_before > added.error_refitted > added.error_as_written >= added.error_after
     assert added.error_after == pytest.approx(added.noise_floor_error, rel=0.05)
+    assert not added.rough_file and added.tolerance == pytest.approx(0.04)
 
 
 def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedRuns, added: AddedEffects) -> None:
@@ -126,6 +128,15 @@ def test_between_first_and_last_numbers_move_from_without_any_to_with_all(added:
     for one, now in zip(added.numbers, later.numbers, strict=True):
         found = between[one.name]
         assert (found.without, found.found, found.written) == (one.without, now.found, now.written)
+
+
+def test_what_numbers_of_a_rough_file_do_as_well_is_no_effect() -> None:
+    """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
+    runs, tires = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0), [hidden("tire_damping")]
+    found = add(posterior_of(runs), [], tires)
+    assert found.rough_file and found.tolerance == pytest.approx(0.1) and not found.helps
+    held = add(posterior_of(runs, tolerance=tolerance_of(0.04)), [], tires)
+    assert not held.rough_file and held.tolerance == pytest.approx(0.04) and held.helps
 
 
 @pytest.mark.slow
