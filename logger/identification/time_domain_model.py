@@ -10,7 +10,7 @@ frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from logger.identification.drive_model import DriveModel
 from logger.identification.obstacle_paths import Obstacle
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
-from logger.profiles.track import Stance, Track, Way, WheelPath, WheelTracks, along_paths
+from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.effect import Chosen
@@ -95,6 +95,10 @@ class _TrackWithObstacles:
 
     track: Track
     obstacles: tuple[Obstacle, ...]
+
+    def resurfaced(self, surface: Surface) -> _TrackWithObstacles:
+        """The road itself under the obstacles, which stay what they are."""
+        return replace(self, track=self.track.resurfaced(surface))
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""

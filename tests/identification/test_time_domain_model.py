@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.studies.drives import rav4
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect import Chosen, Parameter, RoadEffect, Scale, chosen
 from logger.vehicle.effect_parameters import free_number, free_parameter_named
 from logger.vehicle.named_parameters import free
 
@@ -107,6 +108,23 @@ def test_their_standard_errors_are_honest(errors: Array) -> None:
 def test_friction_from_none_at_all() -> None:
     run = recorded(road_record(CAR, 15.0, 12.0, 1, gd_n0_cm3=16.0), [rubbing(80.0)])
     assert np.abs(off(found([run], [rubbing(0.0)], {FRICTION: 0.0}), {FRICTION: 80.0})).max() < 3.0
+
+
+class Written(RoadEffect):
+    name = title = source = signature = shown_by = "written_low"
+    parameters = (Parameter("times", 2.0, 1.0, 10.0, 1.0, Scale.LINEAR, (2.0,), "how much higher the road is"),)
+
+    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
+        return np.asarray(p.times * elevation_m)
+
+
+def test_a_road_that_differs_from_its_profile_does_so_under_a_bump_too() -> None:
+    record = road_record(CAR, 4.0, 14.0, 3)
+    low = replace(record, track=replace(record.track, elevation_m=record.track.elevation_m / 2))
+    bump = RoadInput(bump=Bump(20.0, 0.1, 2.6))
+    expected, = model([record], [effect("payload", mass_kg=0.0)], {MASS: 900.0}, bump).predict(np.array([900.0]))
+    found, = model([low], [chosen(Written(), {"times": 2.0})], {MASS: 900.0}, bump).predict(np.array([900.0]))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_a_bump_of_which_only_the_kind_is_known_beside_friction() -> None:
