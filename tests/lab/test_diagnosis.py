@@ -94,7 +94,7 @@ def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
     numbers = names[~is_length(tuple(names))]
     car = changed(CAR, {name: read(CAR, name) * (1 + float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.1)))
                         for name in numbers})
-    found = diagnosed(secret_runs(car=car, lasts_s=30.0, rougher=2.0), (*FEW, "cg_shift", "occupant"))
+    found = diagnosed(secret_runs(car=car, lasts_s=12.0, rougher=2.0), (*FEW, "cg_shift", "occupant"))
     assert nothing_is_missing(found) and found.rough_file and found.tolerance == pytest.approx(0.1)
     assert "is a rough one" in " ".join(summary(found))
 
@@ -102,7 +102,7 @@ def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
 @pytest.mark.slow
 def test_a_rough_file_that_an_effect_takes_over_lacks_no_physics_either() -> None:
     """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
-    runs = secret_runs(car=car_off_by(0.08, seed=3), lasts_s=30.0, rougher=2.0)
+    runs = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0)
     found = diagnosed(runs, ("tire_damping", "sensor_offset", "occupant"))
     assert nothing_is_missing(found) and found.rough_file
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from logger.api.bench import tolerance_of
-from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
+from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, add, moved_between
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
@@ -18,7 +19,7 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import read
 
-from ...support.lab.runs_with_residual import CAR
+from ...support.lab.runs_with_residual import CAR, measuring
 from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, car_off_by, hidden, posterior_of, secret_runs
 
 OFFSET_M = 0.4
@@ -157,10 +158,16 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
 
 @pytest.mark.slow
 def test_standard_errors_are_as_large_as_numbers_are_off() -> None:
-    off = []
+    there, off = hidden("sensor_offset", offset_m=0.2), []
+    clean = secret_runs([there], lasts_s=10.0, noise_mps2=0.0).runs
     for seed in range(20):
-        posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], lasts_s=10.0, noise_mps2=0.2,
-                                             seed=seed))
-        (one,) = add(posterior, [], [hidden("sensor_offset", offset_m=0.2)]).effects
+        rng = np.random.default_rng(seed)
+        posterior = posterior_of(SimulatedRuns([
+            measuring(run, run.measured_mps2 + rng.normal(0, 0.2, run.count)) for run in clean], 500.0))
+        (one,), _ = standard_errors(fit_to_the_end(align(posterior, posterior.start([there]))))
+        if seed == 0:  # what ``add`` reports is just that
+            (added,) = add(posterior, [], [there]).effects
+            assert (added.values, added.standard_errors) == (pytest.approx(one.values, rel=0.02),
+                                                             pytest.approx(one.standard_errors, rel=0.02))
         off.append((one.values["offset_m"] - 0.2) / one.standard_errors["offset_m"])
     assert 0.2 < np.mean(np.square(off)) < 2.0  # priors make the errors of cars that are just right too large
