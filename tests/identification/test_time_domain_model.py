@@ -86,22 +86,14 @@ def test_a_linear_car_does_as_the_exact_model_says() -> None:
     assert (np.std(slopes[0] - expected_slopes[0], axis=0) < 0.01 * np.std(expected_slopes[0], axis=0)).all()
 
 
-@pytest.fixture(scope="module")
-def errors() -> Array:
-    """Of mass and friction, in standard errors, over draws of the sensor's noise on drives by Newton's laws."""
+@pytest.mark.slow
+def test_mass_and_friction_are_found_on_drives_by_newtons_laws_with_honest_errors() -> None:
+    """Over draws of the sensor's noise."""
     truth = {MASS: CAR.sprung_mass_kg, FRICTION: FRICTION_N}
     there, starts = [rubbing(60.0)], {MASS: 800.0, FRICTION: 60.0}
-    return np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
-
-
-@pytest.mark.slow
-def test_mass_and_friction_are_found_on_drives_by_newtons_laws(errors: Array) -> None:
+    errors = np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
     print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
     assert np.abs(errors).max() < 3.0
-
-
-@pytest.mark.slow
-def test_their_standard_errors_are_honest(errors: Array) -> None:
     assert 0.7 < np.sqrt((errors**2).mean()) < 1.4
 
 
