@@ -67,11 +67,11 @@ class SimulatedModel(DriveModel):
 
     def _step(self, one: Free, value: float) -> float:
         """Of a number where it is."""
-        if (move := self._moves.get(one.name)) is not None:
-            chosen = self.effects[move.effect]
-            parameter = chosen.effect.parameters[move.parameter]
+        if (free := self._free_parameters.get(one.name)) is not None:
+            chosen = self.effects[free.effect]
+            parameter = chosen.effect.parameters[free.parameter]
             here = Chosen(chosen.effect, {**chosen.values, parameter.name: value})
-            step = float(steps_of([*self.effects[: move.effect], here], [move], _STEP, _SHARE_STEP)[0])
+            step = float(steps_of([*self.effects[: free.effect], here], [free], _STEP, _SHARE_STEP)[0])
             return step / slope_of(parameter, value)
         if one.by_factors:
             return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _STEP)
