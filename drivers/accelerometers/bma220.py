@@ -326,7 +326,8 @@ class _Bma220(Accelerometer[Bma220Config]):
         return Bma220Decoder(settings.range_g)
 
     def readings(self, settings: Bma220Config) -> Readings:
-        """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate."""
+        """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate: of
+        another one a recording does not say, and it has to give the same rows."""
         hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.reads, 1))
         return Readings(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
 

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from logger.lab.compare import Comparison
     from logger.lab.diagnosis import Diagnosis
     from logger.lab.likelihood.posterior import Posterior
+    from logger.lab.likelihood.priors import Tolerance
     from logger.lab.selection.add_effect import AddedEffects
     from logger.runs import Array, Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
-_BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
 
@@ -43,10 +43,10 @@ def silent(_words: str) -> None:
 class Bench:
     """A model and runs on it, ready to be worked on.
 
-    word        by which the user knows the vehicle
-    effects     those that there are, by name
-    files       of the user's own among them
-    numbers     deviation of what the car's numbers are usually off by, as a share
+    word         by which the user knows the vehicle
+    effects      those that there are, by name
+    files        of the user's own among them
+    tolerance    by what the car's numbers may well be off
     """
 
     word: str
@@ -54,7 +54,7 @@ class Bench:
     runs: SimulatedRuns
     effects: Mapping[str, Effect]
     files: Mapping[str, str]
-    numbers: float
+    tolerance: Tolerance
 
     def posterior(self, searches: bool = False) -> Posterior:
         """What the lab fits; simulated less finely where it ``searches``.
@@ -62,12 +62,11 @@ class Bench:
         Raises BadInput when the vehicle lacks what it needs.
         """
         from logger.lab.likelihood.posterior import Posterior
-        from logger.lab.likelihood.priors import Tolerance
         from logger.simulation.simulated_runs import SimulatedRuns
 
         runs = SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ) if searches else self.runs
         model = self.model
-        return Posterior(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), model.vehicle)
+        return Posterior(runs, model.given or model.vehicle, self.tolerance, model.vehicle)
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
@@ -101,11 +100,9 @@ class Bench:
     def compared(self) -> Comparison:
         """The model against the runs. BadInput when the vehicle lacks what it needs."""
         from logger.lab.compare import compare
-        from logger.lab.likelihood.priors import Tolerance
 
         with self.blamed():
-            return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
-                           Tolerance(numbers=self.numbers))
+            return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given, self.tolerance)
 
     def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> Diagnosis:
         """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
@@ -199,14 +196,14 @@ class Bench:
             raise BadInput(f"{self.word}: {error}") from None
 
 
-def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str], numbers: float,
-             searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
+def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str],
+             tolerance: Tolerance, searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
     low-passed, or that say so, only the band that remains is compared.
 
     word        by which the user knows the vehicle
-    numbers     as ``deviation_of``
+    tolerance   as ``tolerance_of``
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
     warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
     low_pass_hz what lies above is not compared; None: all is that the records hold
@@ -214,33 +211,40 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))
     if searches is not None:
         require_compiler(searches, effects.values())
-    found = Bench(word, model, runs, effects, files, numbers)
+    found = Bench(word, model, runs, effects, files, tolerance)
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
-    predictions = check_model(word, model, runs, warn, shipped, anyway, numbers)
+    predictions = check_model(word, model, runs, warn, shipped, anyway, tolerance.numbers)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
 
-def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str], numbers: float) -> Bench:
+def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str],
+                  tolerance: Tolerance) -> Bench:
     """The model on drives that nobody has driven yet, without readings. Arguments and BadInput as ``bench_of``, and for
     a road that moves no car."""
     from logger.simulation.simulated_runs import SimulatedRuns
 
     effects, files = known_effects(model, effect_files)
     require_compiler("plan", effects.values())
-    found = Bench(word, model, SimulatedRuns(drives), effects, files, numbers)
+    found = Bench(word, model, SimulatedRuns(drives), effects, files, tolerance)
     check_moves(word, model, found.runs)
     _try_own(found, effect_files)
     return found
 
 
-def deviation_of(tolerance: float) -> float:
-    """The deviation, as a share, that a tolerance either way is taken for. BadInput for one that no car's numbers
-    have."""
-    TOLERANCE.check("tolerance", tolerance)
-    return tolerance / _BAND_DEVIATIONS
+def tolerance_of(share: float | None) -> Tolerance:
+    """What a share either way is taken for that the user said of masses, springs and dampers: then it holds, whatever
+    the runs say. None: the usual one, and a wider one where the file turns out to be rough. BadInput for one that no
+    car's numbers have."""
+    from logger.lab.likelihood.priors import Tolerance
+
+    if share is None:
+        return Tolerance()
+    TOLERANCE.check("tolerance", share)
+    deviation = share / Tolerance.band
+    return Tolerance(numbers=deviation, rough=deviation)
 
 
 def known_effects(model: Model, files: Sequence[str], on_rig: bool = False

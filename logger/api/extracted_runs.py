@@ -38,7 +38,7 @@ LEAST_S, LEAST_M = 5.0, 30.0
 _LINE_SCALE_STD = 0.001
 """Of lengths along a line (a judgement: odometers of profilers are checked to one or two thousandths; a receiver's
 speeds, by the Doppler shift, have no scale error to speak of)."""
-_UNUSUAL = 4.0  # standard deviations: one run in 16 000 is so far off by chance (normal distribution)
+_SCALE_SIGMA = 4.0  # standard deviations: one run in 16 000 is so far off by chance (normal distribution)
 _AROUND_M = 150.0  # of the profile, kept before and after what was driven: a model comes to the first sample over it
 
 
@@ -80,7 +80,7 @@ class ExtractedRun:
         """The scale of the speeds where a receiver and a careful measurement of the profile do not differ by as much;
         else None."""
         scale, std = self.speed_scale or (1.0, 0.0)
-        return self.speed_scale if abs(scale - 1) > _UNUSUAL * float(np.hypot(std, _LINE_SCALE_STD)) else None
+        return self.speed_scale if abs(scale - 1) > _SCALE_SIGMA * float(np.hypot(std, _LINE_SCALE_STD)) else None
 
 
 @dataclass(frozen=True)

@@ -57,12 +57,14 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
     from logger.service.drive_readings import DriveReadings
     from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
+    from logger.service.recorded_rate import check_recorded_rate
     from logger.service.signal_chain import Axis
     from logger.store.formats.vehicle_file import read_model
 
     with open_dump(dump) as reader:
         config = wiring.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         sensor = wiring.instrument(config.accelerometer, wiring.noise_for_dump(reader.header, config, f"{dump}:1"))
+        check_recorded_rate(dump, sensor)
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         axis = Axis.from_word(config.accelerometer.vertical_axis)
         kept = DriveReadings(wiring.signal_chain(config, sensor), DriveAlignment(axis.column, axis.sign), known.delay_s)

@@ -7,9 +7,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.bench import Bench, Notify, among, bench_of, deviation_of, silent
+from logger.api.bench import Bench, Notify, among, bench_of, silent, tolerance_of
 from logger.api.drives import Run, read_run
-from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
@@ -54,13 +53,14 @@ class Comparison(CommandResult):
         return self.spectra
 
 
-def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL_TOLERANCE,
+def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float | None = None,
             low_pass_hz: float | None = None, anyway: bool = False) -> Comparison:
     """Compare a model with measurements: the error, where it sits, and what kind of thing is missing.
 
     vehicle      a model, or a name or file as in ``read_vehicle``
     runs         5 s or longer, of one sample rate of 50 Hz or more, each with a profile and a name of its own
-    tolerance    how far off the car's masses, springs and dampers may well be, as a share, 0.001 to 0.5
+    tolerance    how far off the car's masses, springs and dampers may well be, as a share, 0.001 to 0.5; None: 0.04,
+                 and in searches and fits of an effect 0.1 where the runs say that the vehicle's file is a rough one
     low_pass_hz  what lies above is not compared [Hz]; None: all is that the records hold. Errors are then of the
                  measurement and the model without it
     anyway       go on where a run does not seem to be of this road or this car, or in these units
@@ -134,7 +134,7 @@ class Diagnosis(CommandResult):
 
 def diagnose(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None,
+    effect_files: Sequence[Path | str] = (), tolerance: float | None = None, low_pass_hz: float | None = None,
     progress: Notify = silent, anyway: bool = False,
 ) -> Diagnosis:
     """Which physical effect a model lacks: each that is known is tried, and judged on what no fit saw. It takes from
@@ -232,7 +232,7 @@ class AddedEffect(CommandResult):
 
 def add_effect(
     name: Path | str, vehicle: Model | Path | str, runs: Runs, *, start: Mapping[str, float] | None = None,
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
+    tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False,
 ) -> AddedEffect:
     """Add a physical effect to a model: fitted with the car's numbers on all of the runs.
@@ -276,13 +276,13 @@ def addition_of(found: add_results.AddedEffects, model: Model) -> AddedEffect:
 
 
 def bench_with(
-    vehicle: Model | Path | str, runs: Runs, effect_files: Sequence[Path | str], tolerance: float,
+    vehicle: Model | Path | str, runs: Runs, effect_files: Sequence[Path | str], tolerance: float | None,
     searches: str | None = None, thin: bool = True, low_pass_hz: float | None = None, anyway: bool = False,
 ) -> Bench:
     """All that a question needs, checked together."""
-    numbers, model = deviation_of(tolerance), model_of(vehicle)
+    off, model = tolerance_of(tolerance), model_of(vehicle)
     return bench_of(word_of(vehicle, model), model, checked_runs(lab_drives(runs), thin, model.vehicle),
-                    list(map(str, effect_files)), numbers, searches, low_pass_hz=low_pass_hz, anyway=anyway)
+                    list(map(str, effect_files)), off, searches, low_pass_hz=low_pass_hz, anyway=anyway)
 
 
 def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:

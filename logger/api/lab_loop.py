@@ -20,7 +20,6 @@ from logger.api.lab import (
     diagnosis_of,
 )
 from logger.api.outputs import check_out
-from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.errors import BadInput
@@ -89,7 +88,7 @@ class LabStory(CommandResult):
 def lab(
     vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
+    tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False, learns: bool = True,
 ) -> LabStory:
     """The lab's whole loop: compare, diagnose, learn a law where no effect explains what is missing, add what is

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from logger.api.bench import Bench, Notify, silent
 from logger.api.lab import Runs, bench_with
-from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
 
@@ -76,7 +75,7 @@ class LearnedLaw(CommandResult):
 
 
 def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Path | str] = (),
-          tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
+          tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
           anyway: bool = False) -> LearnedLaw:
     """Learn a law where no known effect explains what a model lacks. It takes minutes, and the compiler of the ``lab``
     extra.

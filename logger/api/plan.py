@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from logger.api.bench import Bench, Notify, among, bench_of, deviation_of, planned_bench, silent
+from logger.api.bench import Bench, Notify, among, bench_of, planned_bench, silent, tolerance_of
 from logger.api.lab import Runs, lab_drives, word_of
-from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, SPEED, USUAL_TOLERANCE
+from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, SPEED
 from logger.api.roads import Profile, read_profile
 from logger.api.run_checks import LEAST_S, checked_runs
 from logger.api.shown import CommandResult
@@ -20,6 +20,7 @@ from logger.errors import BadInput
 from logger.store.formats import drive_file, vehicle_file
 
 if TYPE_CHECKING:
+    from logger.lab.likelihood.priors import Tolerance
     from logger.lab.planning import plan as plan_results
     from logger.profiles.track import Track
     from logger.report.html import Html
@@ -68,7 +69,7 @@ def plan(
     vehicle: Model | Path | str, runs: Runs = (), *, profile: Profile | Path | str | None = None,
     speeds_mps: Sequence[float] = (), noise_mps2: float | None = None, step_mps2: float = 0.0,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Notify = silent,
+    tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
     anyway: bool = False,
 ) -> Plan:
     """Which effects runs, or drives that are planned, could show and distinguish, and which drive would add most. It
@@ -97,9 +98,9 @@ def plan(
     asked = PlannedDrives(None if road is None else drive_file.track_of(road), name, tuple(speeds_mps), noise_mps2,
                           step_mps2)
     bench = None if not given else bench_of(
-        word, model, checked_runs(given, vehicle=model.vehicle), list(map(str, effect_files)), deviation_of(tolerance),
+        word, model, checked_runs(given, vehicle=model.vehicle), list(map(str, effect_files)), tolerance_of(tolerance),
         "plan", low_pass_hz=low_pass_hz, anyway=anyway)
-    return plan_of(planned(word, model, bench, asked, list(map(str, effect_files)), deviation_of(tolerance),
+    return plan_of(planned(word, model, bench, asked, list(map(str, effect_files)), tolerance_of(tolerance),
                            candidates, progress))
 
 
@@ -117,18 +118,17 @@ class PlannedDrives:
 
 def planned(
     word: str, model: vehicle_file.Model, bench: Bench | None, asked: PlannedDrives, effect_files: Sequence[str],
-    numbers: float, candidates: Collection[str] | None = None, notify: Notify = silent,
+    tolerance: Tolerance, candidates: Collection[str] | None = None, notify: Notify = silent,
 ) -> plan_results.Plan:
     """What the lab says. Arguments as of ``bench_of``; ``bench``: of the runs that there are. BadInput as ``plan``."""
-    from logger.lab.likelihood.priors import Tolerance
     from logger.lab.planning.plan import plan as planned_by_lab
     from logger.lab.planning.planned_drive import PlannedCar, SensorNoise
 
     _check(asked, bench)
     drives = _empty_drives(model, asked)
-    ready = bench or planned_bench(word, model, drives, effect_files, numbers)
+    ready = bench or planned_bench(word, model, drives, effect_files, tolerance)
     posterior = ready.posterior(searches=True)
-    there = PlannedCar(posterior.vehicle, posterior.start_vehicle, Tolerance(numbers=numbers), model.effects,
+    there = PlannedCar(posterior.vehicle, posterior.start_vehicle, tolerance, model.effects,
                        posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
     usual = SensorNoise(NOISE_MPS2, asked.step_mps2)
     noise = None if asked.noise_mps2 is None else SensorNoise(asked.noise_mps2, asked.step_mps2)

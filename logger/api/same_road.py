@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import Notify, among, deviation_of, known_effects, silent
+from logger.api.bench import Notify, among, known_effects, silent, tolerance_of
 from logger.api.lab import Diagnosis, Runs, diagnosis_fields, given_runs, word_of
-from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
@@ -52,7 +51,7 @@ class SameRoadDiagnosis(Diagnosis):
 
 def diagnose_same_road(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Notify = silent,
+    effect_files: Sequence[Path | str] = (), tolerance: float | None = None, progress: Notify = silent,
 ) -> SameRoadDiagnosis:
     """Which physical effect a model lacks, where no profile is known: from two drives or more over one road, at
     different speeds. Effects that bend the car's laws are tried by linear ones that stand in for them; profiles are
@@ -153,19 +152,18 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 
 
 def diagnosed(
-    word: str, model: vehicle_file.Model, records: Sequence[Record], effect_files: Sequence[str], tolerance: float,
-    candidates: Collection[str] | None = None, notify: Notify = silent,
+    word: str, model: vehicle_file.Model, records: Sequence[Record], effect_files: Sequence[str],
+    tolerance: float | None, candidates: Collection[str] | None = None, notify: Notify = silent,
 ) -> UnknownRoadDiagnosis:
     """Which effects the model lacks. BadInput as ``diagnose_same_road``.
 
     word    by which the user knows the vehicle
     """
-    from logger.lab.likelihood.priors import Tolerance
     from logger.lab.unknown_road import diagnosis
     from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
     from logger.lab.unknown_road.placement import placed_by_road
 
-    off, given = Tolerance(numbers=deviation_of(tolerance)), model.given or model.vehicle
+    off, given = tolerance_of(tolerance), model.given or model.vehicle
     for one in model.effects:
         if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
             raise BadInput(f"{word}: its effect {one.effect.name} needs a road that is known under the right wheels "

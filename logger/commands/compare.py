@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog compare``."""
-    from logger.api.bench import bench_of, deviation_of
+    from logger.api.bench import bench_of, tolerance_of
     from logger.api.run_checks import lab_runs
     from logger.report.comparison_text import as_json
     from logger.report.lab_text import comparison_lines
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         check_out(args.out, args.runs, [path, *(Path(one.file) for one in model.effects if one.file is not None)])
     runs = lab_runs(args.runs, thin=False, vehicle=model.vehicle)  # an error is that of all samples
-    found = bench_of(args.vehicle, model, runs, (), deviation_of(args.tolerance), warn=warned,
+    found = bench_of(args.vehicle, model, runs, (), tolerance_of(args.tolerance), warn=warned,
                      low_pass_hz=args.low_pass, anyway=args.anyway).compared()
     if args.out is not None:
         from logger.report.lab_page import page

@@ -60,10 +60,11 @@ def add_anyway(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_tolerance(parser: argparse.ArgumentParser) -> None:
-    """--tolerance, for ``deviation_of``."""
-    add_number(parser, "--tolerance", *TOLERANCE, default=USUAL_TOLERANCE, metavar="SHARE",
+    """--tolerance, for ``tolerance_of``."""
+    add_number(parser, "--tolerance", *TOLERANCE, metavar="SHARE",
                help="how far off the vehicle's masses, springs and dampers may well be (default: "
-                    f"{USUAL_TOLERANCE:g}, 4 %%)")
+                    f"{USUAL_TOLERANCE:g}, 4 %%, and 10 %% where a search or the fit of an effect finds that the file "
+                    "is a rough one; what you say holds)")
 
 
 def _add_low_pass(parser: argparse.ArgumentParser) -> None:
@@ -80,16 +81,16 @@ def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
 
 
 def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str] = (),
-               tolerance: float = USUAL_TOLERANCE, searches: str | None = None, low_pass_hz: float | None = None,
+               tolerance: float | None = None, searches: str | None = None, low_pass_hz: float | None = None,
                anyway: bool = False) -> Bench:
     """The same, where they are not of a command line."""
-    from logger.api.bench import bench_of, deviation_of
+    from logger.api.bench import bench_of, tolerance_of
     from logger.api.run_checks import lab_runs
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
 
-    numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
-    return bench_of(vehicle, model, lab_runs(folders, vehicle=model.vehicle), effect_files, numbers, searches, warned,
+    off, model = tolerance_of(tolerance), read_model(vehicle_path(vehicle))
+    return bench_of(vehicle, model, lab_runs(folders, vehicle=model.vehicle), effect_files, off, searches, warned,
                     low_pass_hz, anyway)
 
 

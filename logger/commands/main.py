@@ -66,6 +66,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 _SAID = (
     (r"argument (\S+): invalid float value: '(.*)'", r"\1 \2: expected a number"),
     (r"argument (\S+): invalid int value: '(.*)'", r"\1 \2: expected a whole number"),
+    (r"argument \S+\|\S+: invalid choice: '(.*)' \(choose from (.*)\)", r"expected one of \2, found '\1'"),
     (r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", r"\1 \2: expected one of \3"),
     (r"the following arguments are required: (.*)", r"expected \1"),
     (r"unrecognized arguments: (.*)", r"expected no \1"),

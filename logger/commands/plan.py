@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog plan``."""
-    from logger.api.bench import deviation_of
+    from logger.api.bench import tolerance_of
     from logger.api.plan import PlannedDrives, planned
     from logger.report.plan_text import as_json, plan_lines
     from logger.shipped import vehicle_path
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         check_out(args.out, args.runs, read)
     asked = PlannedDrives(road, str(args.profile), tuple(args.speed), args.noise, args.step)
     with progress() as notify:
-        found = planned(args.vehicle, model, given, asked, args.effect_file, deviation_of(args.tolerance),
+        found = planned(args.vehicle, model, given, asked, args.effect_file, tolerance_of(args.tolerance),
                         notify=notify)
     if args.out is not None:
         from logger.report.plan_page import page

@@ -94,6 +94,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
     from logger.service.receiver_learning import drive_fields
+    from logger.service.recorded_rate import check_recorded_rate
     from logger.store.formats.vehicle_file import read_on_board
     from logger.store.log.folder_lock import FolderLock
     from logger.store.log.log_writer import SegmentLog, next_session, repair
@@ -103,6 +104,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         config = replace(config, log=replace(config.log, directory=out))
         noise = wiring.noise_for_dump(reader.header, config, place=f"{dump}:1")
         sensor = wiring.instrument(config.accelerometer, noise)
+        check_recorded_rate(dump, sensor)
         car = read_on_board(config.vehicle)
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         facts = wiring.sidecar(config, sensor, car, known, noise) | {"replayed_from": dump.name}

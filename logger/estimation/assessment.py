@@ -33,7 +33,7 @@ from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import Chosen
+from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import known_car
 from logger.vehicle.uncertain import NumberErrors, cars_off
 from logger.vehicle.vehicle import Vehicle
@@ -121,6 +121,7 @@ class Assessment:
     least_error_m_per_km    (w,) r.m.s. error of the best possible values
     noise                   of a reading before rounding, where it was learnt from the drive; ``sensor`` has it
     learns_noise            whether that was to be learnt
+    road_effects            names of the effects that make the road that is compared with out of its profile
     """
 
     vehicle: Vehicle
@@ -135,6 +136,7 @@ class Assessment:
     road: RoadProfile | None
     noise: NoiseBelief | None
     learns_noise: bool = False
+    road_effects: tuple[str, ...] = ()
 
 
 def assess(
@@ -143,7 +145,8 @@ def assess(
 ) -> Assessment:
     """Estimate a drive's road in windows [m] and compare it with the track it was driven on, if that is known.
 
-    effects, errors    of the vehicle, and how far its numbers may be off
+    effects, errors    of the vehicle, and how far its numbers may be off; where an effect is of the road, the track is
+                       a profile that differs from the road, and this is what is compared with
 
     Where the noise is to be learnt, the sensor's is a guess. ValueError if the vehicle lacks what its model or an
     effect needs.
@@ -163,12 +166,15 @@ def assess(
         sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)
     windows, road = estimated(car, gridded, window_m, readings, distance_m, cars_off(vehicle, effects, errors))
     exact = np.full(len(windows.iri_m_per_km), np.nan)
+    road_effects = tuple(one.effect.name for one in effects if isinstance(one.effect, RoadEffect))
     if track is not None:
+        track = track.resurfaced(composed.structure.surface)
         exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
     limits = ErrorBound(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
-                      least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise)
+                      least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise,
+                      road_effects if track is not None else ())
 
 
 def _driven(track: Track, vehicle: Vehicle) -> Array:

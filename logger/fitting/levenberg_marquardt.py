@@ -4,7 +4,7 @@ Problem: fits here have hundreds of numbers of which most are known by a prior, 
 may, and bounds. ``scipy.optimize.least_squares`` wants residuals and a Jacobian of them all, for each step.
 Solution: a fit gives its cost and its normal equations, however it comes to them. Steps are damped by the diagonal
 (D. W. Marquardt 1963); a number at a bound that it presses against stays there; and derivatives serve on for as long as
-steps gain what they promised, which is for the fit to make use of: a minimum is believed only with fresh ones.
+steps gain what was predicted, which is for the fit to make use of: a minimum is believed only with fresh ones.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-_KEPT_PROMISE = 0.7
+_KEPT_SHARE = 0.7
 _LEAST_THAT_DAMPS = 1e-4
 
 
@@ -56,7 +56,7 @@ class Minimum(Generic[E]):
     at             what was made of that point
     information    (k, k) of the normal equations that were solved last
     rounds         normal equations that were solved
-    converged      whether no step promised more
+    converged      whether no step was predicted to gain more
     """
 
     x: Array
@@ -78,7 +78,7 @@ def minimise(
     normal_equations    of a point, what was made of it, and whether derivatives are to be taken again: downhill
                         direction g (k,) and information H (k, k), so that a step s changes the cost by s H s / 2 - g s
     small_gain          in cost: what gains less or promises less is not worth a step
-    keep_derivatives    ask for fresh ones only after a step that gained less than it promised; False: always
+    keep_derivatives    ask for fresh ones only after a step that gained less than predicted; False: always
     low, high           bounds (k,), or of all
     longest_step        of any coordinate
     """
@@ -89,12 +89,12 @@ def minimise(
     for rounds in range(1, most_rounds + 1):
         downhill, information = normal_equations(x, at, fresh)
         free = ~(((x <= low) & (downhill < 0)) | ((x >= high) & (downhill > 0)))
-        gained = promised = 0.0
+        gained = predicted_gain = 0.0
         while share <= damping.largest:
             reached = np.clip(x + _step(downhill, information, free, share, longest_step), low, high)
             step = reached - x
-            promised = float(downhill @ step - 0.5 * step @ information @ step)
-            if not promised >= small_gain(at):
+            predicted_gain = float(downhill @ step - 0.5 * step @ information @ step)
+            if not predicted_gain >= small_gain(at):
                 break
             new = evaluate(reached)
             if at.cost - new.cost > 0:
@@ -102,7 +102,7 @@ def minimise(
                 x, at, share = reached, new, max(share / damping.factor, damping.least)
                 break
             share = max(share * damping.factor, _LEAST_THAT_DAMPS)
-        was_fresh, fresh = fresh, not keep_derivatives or gained < _KEPT_PROMISE * promised
+        was_fresh, fresh = fresh, not keep_derivatives or gained < _KEPT_SHARE * predicted_gain
         if gained < small_gain(at):
             if was_fresh:
                 return Minimum(x, at, information, rounds, True)

@@ -54,11 +54,12 @@ class DriveModel:
         self.road, self.effects = road or RoadInput(), tuple(effects)
         wanted = [one.name for one in parameters]
         check_names(wanted, len(records))
-        self._moves = {name: move for name in wanted if (move := free_parameter_named(self.effects, name)) is not None}
+        self._free_parameters = {name: free for name in wanted
+                                 if (free := free_parameter_named(self.effects, name)) is not None}
         for name in wanted:
             if is_input(name):
                 read_input(self.road, name)
-            elif name not in self._moves:
+            elif name not in self._free_parameters:
                 read(vehicle, name)
             part, _, leaf = name.rpartition(".")
             if wanted.count(name) > 1 or (part in AXLES and f"{BOTH}.{leaf}" in wanted):
@@ -89,17 +90,17 @@ class DriveModel:
     def vehicle_with(self, values: Array) -> Vehicle:
         """The vehicle with these values of its free numbers."""
         return changed(self.vehicle, {name: value for name, value in self._named(values)
-                                      if not is_input(name) and name not in self._moves})
+                                      if not is_input(name) and name not in self._free_parameters})
 
     def effects_with(self, values: Array) -> tuple[Chosen, ...]:
         """The effects with these values of their free numbers."""
         effects = list(self.effects)
         for name, value in self._named(values):
-            if (move := self._moves.get(name)) is not None:
-                one = effects[move.effect]
-                parameter = one.effect.parameters[move.parameter]
+            if (free := self._free_parameters.get(name)) is not None:
+                one = effects[free.effect]
+                parameter = one.effect.parameters[free.parameter]
                 kept = min(max(value, parameter.low), parameter.high)
-                effects[move.effect] = replace(one, values={**one.values, parameter.name: kept})
+                effects[free.effect] = replace(one, values={**one.values, parameter.name: kept})
         return tuple(effects)
 
     def car_with(self, values: Array) -> Car:
@@ -109,10 +110,10 @@ class DriveModel:
     def trials(self) -> list[dict[str, float]]:
         """Values of single free numbers of effects, by name, that a search begins at as well: where things stick and
         slip, downhill from one start may end in another place than from the next."""
-        free = {one.name: one for one in self.parameters}
-        return [{name: value} for name, move in self._moves.items()
-                for value in self.effects[move.effect].effect.parameters[move.parameter].trials
-                if free[name].low <= value <= free[name].high]
+        numbers = {one.name: one for one in self.parameters}
+        return [{name: value} for name, free in self._free_parameters.items()
+                for value in self.effects[free.effect].effect.parameters[free.parameter].trials
+                if numbers[name].low <= value <= numbers[name].high]
 
     def road_with(self, values: Array, run: int) -> RoadInput:
         """The road's input in a run, counted from 0, with these values of the free numbers."""

@@ -10,7 +10,7 @@ frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from logger.identification.drive_model import DriveModel
 from logger.identification.obstacle_paths import Obstacle
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
-from logger.profiles.track import Stance, Track, Way, WheelPath, WheelTracks, along_paths
+from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.effect import Chosen
@@ -67,11 +67,11 @@ class SimulatedModel(DriveModel):
 
     def _step(self, one: Free, value: float) -> float:
         """Of a number where it is."""
-        if (move := self._moves.get(one.name)) is not None:
-            chosen = self.effects[move.effect]
-            parameter = chosen.effect.parameters[move.parameter]
+        if (free := self._free_parameters.get(one.name)) is not None:
+            chosen = self.effects[free.effect]
+            parameter = chosen.effect.parameters[free.parameter]
             here = Chosen(chosen.effect, {**chosen.values, parameter.name: value})
-            step = float(steps_of([*self.effects[: move.effect], here], [move], _STEP, _SHARE_STEP)[0])
+            step = float(steps_of([*self.effects[: free.effect], here], [free], _STEP, _SHARE_STEP)[0])
             return step / slope_of(parameter, value)
         if one.by_factors:
             return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _STEP)
@@ -95,6 +95,10 @@ class _TrackWithObstacles:
 
     track: Track
     obstacles: tuple[Obstacle, ...]
+
+    def resurfaced(self, surface: Surface) -> _TrackWithObstacles:
+        """The road itself under the obstacles, which stay what they are."""
+        return replace(self, track=self.track.resurfaced(surface))
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""

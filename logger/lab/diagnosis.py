@@ -39,6 +39,7 @@ from logger.lab.selection.detectability import Undetectable, undetectable_effect
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
+from logger.lab.selection.rough_file import is_file_rough
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
@@ -171,7 +172,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         posterior = below
         search, selection = searched(posterior)
     selection, after = _fit_finely(search, selection)
-    if posterior.may_be_rough and (_is_off_on_the_whole(after) or _do_numbers_explain_all(search, selection, after)):
+    if is_file_rough(selection.before.linear, after, bool(selection.gains)):
         # Numbers that are held back where they are not make effects of what they would explain.
         progress("the car's numbers are off by more than their tolerance: again with a wider one")
         wider = posterior.with_rough_file()
@@ -233,25 +234,8 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.band * posterior.tolerance.numbers,
+        car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
-
-
-def _is_off_on_the_whole(after: LinearModel) -> bool:
-    """Whether the car's numbers lie beyond their tolerance on the whole."""
-    return after.posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1])
-
-
-def _do_numbers_explain_all(search: Search, selection: Selection, after: LinearModel) -> bool:
-    """Whether effects were found although the car's numbers alone, in a rough file, have as much evidence: then the
-    effects do what these numbers would, and hide how far they are off."""
-    if not selection.gains:
-        return False
-    search.progress("would the car's numbers alone explain it?")
-    rough = selection.before.posterior.with_rough_file().without_soft_bounds(fine=True)
-    state = selection.before.state
-    alone = fit_model(rough, rough.state_at(state.effects, state.logs, state.record, state.size))
-    return alone.score + alone.numbers_occam_factor <= after.score + after.numbers_occam_factor
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -80,9 +80,17 @@ class WheelTracks(Protocol):
         """Elevations (M, w) under the wheels on a way, and their means (M - 1, w) over each step [m]."""
 
 
+@runtime_checkable
+class Profiled(WheelTracks, Protocol):
+    """A road of which a profile was written."""
+
+    def resurfaced(self, surface: Surface) -> WheelTracks:
+        """The road itself, where it differs from its profile."""
+
+
 def under_surface(track: WheelTracks, surface: Surface) -> WheelTracks:
     """What moves the wheels where a road differs from its profile. A rig does what it was told to."""
-    return track.resurfaced(surface) if surface and isinstance(track, Track) else track
+    return track.resurfaced(surface) if surface and isinstance(track, Profiled) else track
 
 
 def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.report.band_text import band_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
+from logger.report.rough_file_text import rough_file_json, rough_file_words
 
 _AT_BOUND = 1e-6
 _NAMED = 4
@@ -27,7 +28,7 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
 
 def judgement(found: AddedEffects) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
-    lines = removed_words(found.removed, found.band)
+    lines = [*removed_words(found.removed, found.band), *rough_file_words(found)]
     lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, its noise alone about {}")
@@ -93,7 +94,7 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
         **({} if found.unseen_before is None or found.unseen_after is None else {
             "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error}),
-        **band_json(found.band), **removed_json(found.removed),
+        **band_json(found.band), **removed_json(found.removed), **rough_file_json(found),
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
                      "without_standard_error": one.without_standard_error, "with": one.found,

@@ -13,6 +13,7 @@ from logger.report import residual_text
 from logger.report.band_text import band_json
 from logger.report.quantities import chance, finite, numbers_of, percent, signal_errors
 from logger.report.removed_text import removed_json, removed_words
+from logger.report.rough_file_text import rough_file_json, rough_file_words
 from logger.report.text_layout import enumerated
 from logger.vehicle.effect import Chosen
 
@@ -25,12 +26,7 @@ _SUSPECT = 0.1
 
 def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    removed = removed_words(found.removed, found.band)
-    lines = list(removed)
-    if found.rough_file:
-        lines.append("On the whole the car's masses, springs and dampers are off by more than their tolerance. They "
-                     f"were taken to be good to {found.tolerance:.0%} instead: the vehicle's file is a rough one, and "
-                     "small changes of the car cannot be seen with it (ridelog identify measures its numbers).")
+    lines = [*removed_words(found.removed, found.band), *rough_file_words(found)]
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
@@ -160,7 +156,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
-        "tolerance": found.tolerance, "rough_file": found.rough_file, "coloured_noise": found.coloured,
+        **rough_file_json(found), "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},

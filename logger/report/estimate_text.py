@@ -36,6 +36,7 @@ def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str,
         "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
         "distance_moved_m": drive.moved_m, "compared": found.compared,
+        **({"road_effects": list(found.road_effects)} if found.road_effects else {}),
         **figures(found, windows.speed_mps > 0),
         "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
         "shortest_wavelength_m": road.shortest_m if road else None,
@@ -84,6 +85,9 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
     if summary["distance_moved_m"]:
         shown.append("The distance went back here and there: computed again from the speed, "
                      f"{summary['distance_moved_m']:.2f} m off at most.")
+    if found.road_effects:
+        shown.append(f"Compared with the road that {' and '.join(found.road_effects)} of the vehicle's file makes of "
+                     "the profile.")
     if hint := _unit_hint(found):
         shown.append(hint)
     if not summary["answered_count"]:

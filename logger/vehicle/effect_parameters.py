@@ -38,28 +38,28 @@ def free_parameters_of(effects: Sequence[Chosen], which: Sequence[int] | None = 
     return [FreeParameter(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.is_free]
 
 
-def with_coordinates(effects: Sequence[Chosen], moves: Sequence[FreeParameter], coordinates: Array
+def with_coordinates(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], coordinates: Array
                      ) -> tuple[Chosen, ...]:
     """The effects with other coordinates (m,), on the scales of their parameters."""
     found = list(effects)
-    for move, coordinate in zip(moves, coordinates, strict=True):
-        one = found[move.effect]
-        parameter = one.effect.parameters[move.parameter]
-        found[move.effect] = replace(one, values={**one.values, parameter.name: parameter.value(float(coordinate))})
+    for free, coordinate in zip(free_parameters, coordinates, strict=True):
+        one = found[free.effect]
+        parameter = one.effect.parameters[free.parameter]
+        found[free.effect] = replace(one, values={**one.values, parameter.name: parameter.value(float(coordinate))})
     return tuple(found)
 
 
-def coordinates_of(effects: Sequence[Chosen], moves: Sequence[FreeParameter]) -> Array:
+def coordinates_of(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter]) -> Array:
     """Coordinates (m,) of free parameters, on their scales."""
     places = []
-    for move in moves:
-        one = effects[move.effect]
-        parameter = one.effect.parameters[move.parameter]
+    for free in free_parameters:
+        one = effects[free.effect]
+        parameter = one.effect.parameters[free.parameter]
         places.append(parameter.coordinate(one.values[parameter.name]))
     return np.array(places)
 
 
-def steps_of(effects: Sequence[Chosen], moves: Sequence[FreeParameter], log_step: float = _LOG_STEP,
+def steps_of(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], log_step: float = _LOG_STEP,
              share_step: float = _SHARE_STEP) -> Array:
     """Difference steps (m,) for derivatives, on the scales of the parameters; away from a bound.
 
@@ -67,8 +67,8 @@ def steps_of(effects: Sequence[Chosen], moves: Sequence[FreeParameter], log_step
     share_step    on others, as a share; both where a parameter has no step of its own
     """
     steps = []
-    for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
+    for free, here in zip(free_parameters, coordinates_of(effects, free_parameters), strict=True):
+        parameter = effects[free.effect].effect.parameters[free.parameter]
         step = parameter.step
         if step is None:
             size = max(abs(here), _LEAST_SHARE * parameter.usual_range())
@@ -89,19 +89,19 @@ def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter 
         return None
     index = names.index(effect)
     numbers = [one.name for one in effects[index].effect.parameters]
-    moves = free_parameters_of(effects, [index])
-    if leaf not in numbers or FreeParameter(index, numbers.index(leaf)) not in moves:
-        known = ", ".join(f"{effect}.{numbers[move.parameter]}" for move in moves) or "none of it"
+    free_parameters = free_parameters_of(effects, [index])
+    if leaf not in numbers or FreeParameter(index, numbers.index(leaf)) not in free_parameters:
+        known = ", ".join(f"{effect}.{numbers[free.parameter]}" for free in free_parameters) or "none of it"
         raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
     return FreeParameter(index, numbers.index(leaf))
 
 
-def free_number(effects: Sequence[Chosen], move: FreeParameter, start: float | None = None,
+def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | None = None,
                 bounds: tuple[float, float] | None = None) -> Free:
     """A free parameter as ``identification`` fits it: from its present value, within its range, unless others are
     given. ValueError as ``Free``, and for bounds beyond its range."""
-    one = effects[move.effect]
-    parameter = one.effect.parameters[move.parameter]
+    one = effects[free.effect]
+    parameter = one.effect.parameters[free.parameter]
     name = f"{one.effect.name}.{parameter.name}"
     value = one.values[parameter.name] if start is None else start
     low, high = bounds or (parameter.low, parameter.high)

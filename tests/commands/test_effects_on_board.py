@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,8 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import write_profile
+
+from ..support.command import called
 
 PLAIN = vehicle_file("rav4-2009").read_text("utf-8").replace("effects: []", "")
 ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 600, 0.05, 12), 100.0)
@@ -68,20 +69,19 @@ def test_standard_errors_of_the_file_are_in_those_of_the_windows(
     assert added == pytest.approx(0.1 * unsure["iri_m_per_km"], rel=0.25)
 
 
-def rows_of(ridelog: Path, dump: Path, out: Path, car: Path) -> list[dict[str, str]]:
-    done = subprocess.run([ridelog, "replay", dump, "--out", out, "--vehicle", car, "--json"], capture_output=True,
-                          text=True, check=False, timeout=120)
+def rows_of(dump: Path, out: Path, car: Path) -> list[dict[str, str]]:
+    done = called("replay", dump, "--out", out, "--vehicle", car, "--json")
     assert done.returncode == 0, done.stderr
     return [row for path in sorted(out.glob("*.csv")) for row in csv.DictReader(path.read_text("utf-8").splitlines())]
 
 
 @pytest.mark.slow
-def test_the_service_takes_them_too(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+def test_the_service_takes_them_too(short_dump: Path, tmp_path: Path) -> None:
     """A gain is taken off; a speed that is recorded too high makes the windows shorter, not others."""
-    plain = rows_of(ridelog, short_dump, tmp_path / "a", file_of(tmp_path, "[]"))
-    louder = rows_of(ridelog, short_dump, tmp_path / "b", file_of(tmp_path, "[{name: sensor_gain, gain: 2}]"))
-    scaled = rows_of(ridelog, short_dump, tmp_path / "c", file_of(tmp_path, "[{name: speed_scale, scale: 1.02}]"))
-    friction = rows_of(ridelog, short_dump, tmp_path / "d", file_of(tmp_path, EFFECTS["bent"]))
+    plain = rows_of(short_dump, tmp_path / "a", file_of(tmp_path, "[]"))
+    louder = rows_of(short_dump, tmp_path / "b", file_of(tmp_path, "[{name: sensor_gain, gain: 2}]"))
+    scaled = rows_of(short_dump, tmp_path / "c", file_of(tmp_path, "[{name: speed_scale, scale: 1.02}]"))
+    friction = rows_of(short_dump, tmp_path / "d", file_of(tmp_path, EFFECTS["bent"]))
     assert len(plain) == len(louder) == len(scaled) == len(friction) > 5
     pairs = [[float(one["iri_m_per_km"]) for one in (a, b)] for a, b in zip(plain, louder, strict=True)
              if a["iri_m_per_km"] and b["iri_m_per_km"]]

@@ -47,6 +47,38 @@ def reported(capsys: pytest.CaptureFixture[str], run: Path, *arguments: object) 
     return result
 
 
+OWN = """
+import numpy as np
+from logger.vehicle.effect import Parameter, RoadEffect, Scale
+
+class Written(RoadEffect):
+    name = title = source = signature = shown_by = "written_low"
+    parameters = (Parameter("times", 2.0, 1.0, 10.0, 1.0, Scale.LINEAR, (2.0,), "how much higher the road is"),)
+
+    def road(self, p, spacing_m, elevation_m):
+        return p.times * elevation_m
+
+EFFECT = Written()
+"""
+
+
+def test_the_road_that_an_effect_makes_of_the_profile_is_compared_with(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "written.py").write_text(OWN, "utf-8")
+    car = tmp_path / "car.yaml"
+    car.write_text(vehicle_file(CAR).read_text("utf-8").replace(
+        "effects: []", "effects: [{name: written_low, file: written.py, times: 2}]"), "utf-8")
+    write_profile(tmp_path / "profile.csv", Track(ROAD.spacing_m, ROAD.elevation_m / 2, ROAD.start_m))
+    (tmp_path / "drive.csv").write_bytes((folder / "drive.csv").read_bytes())
+    plain, found = reported(capsys, folder), reported(capsys, tmp_path, "--vehicle", car)
+    exact, same = (np.array([one["iri_exact_m_per_km"] for one in each["windows"]], float) for each in (plain, found))
+    np.testing.assert_allclose(same, exact, rtol=1e-3)
+    assert found["comparison"]["bias"] == pytest.approx(plain["comparison"]["bias"], abs=1e-3)
+    assert found["road_effects"] == ["written_low"] and "road_effects" not in plain
+    assert main(["estimate", str(tmp_path), "--vehicle", str(car)]) == 0
+    assert "with the road that written_low of the vehicle's file makes of the profile." in capsys.readouterr().out
+
+
 def read(run: Path) -> dict[str, np.ndarray]:
     names, *_ = (run / "drive.csv").read_text().split("\n", 1)
     table = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)

@@ -19,7 +19,7 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     """A car on a rough road at 10 and 18 m/s: as recorded, and low-passed at 25 Hz by an engineer, forth and back."""
     top = tmp_path_factory.mktemp("drives")
     road = top / "road.csv"
-    assert main(["road", "generate", "--class", "C", "--length", "700", "--seed", "3", "--out", str(road)]) == 0
+    assert main(["road", "generate", "--class", "C", "--length", "450", "--seed", "3", "--out", str(road)]) == 0
     found: dict[str, list[str]] = {"plain": [], "filtered": []}
     for number, speed in enumerate(("10", "18"), 1):
         plain = top / f"plain{number}"

@@ -33,7 +33,7 @@ def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    return write_runs(tmp_path_factory.mktemp("offset"), named("sensor_offset", offset_m=0.4))
+    return write_runs(tmp_path_factory.mktemp("offset"), named("sensor_offset", offset_m=0.4), lasts_s=12.0)
 
 
 @pytest.fixture

@@ -158,3 +158,17 @@ def test_a_report_never_replaces_a_device(replayed: tuple[Path, str], tmp_path: 
     done = called("report", replayed[0], "--out", tmp_path / "folder")
     assert done.returncode == 2
     assert "expected the name of a file" in done.stderr
+
+
+@pytest.mark.parametrize("command", ["replay", "extract"])
+def test_readings_at_another_rate_than_the_header_says_are_refused(command: str, short_dump: Path, tmp_path: Path
+                                                                   ) -> None:
+    head, rest = gzip.decompress(short_dump.read_bytes()).decode().split("\n", 1)
+    begin, said = head.split("{", 1)[0], json.loads(head[head.index("{"):])
+    said["accelerometer"]["oversample"] = 4
+    dump = tmp_path / "often.dump"
+    dump.write_text(f"{begin}{json.dumps(said)}\n{rest}", "utf-8")
+    done = called(command, dump, "--out", tmp_path / "out")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (f"ridelog: {dump}:1: expected readings at 400 Hz, as 'oversample': 4 says, found them at "
+                           "about 100 Hz\n")

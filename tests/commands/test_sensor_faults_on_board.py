@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 import yaml
 
+from logger.commands.main import main
+from tests.validation.cases import random_case as cases
 from tests.validation.cases.case_files import write_case
 from tests.validation.cases.field_case import noise_of, write_field
 from tests.validation.cases.random_case import Case, case
@@ -43,29 +45,36 @@ def with_fault(scene: Scene, name: str) -> Scene:
     }[name]())
 
 
+@cache
+def sound(sensor: str) -> Case:
+    """The first drive of a case without anything missing."""
+    drawn = cases.draw_drives
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(cases, "draw_drives", lambda rng, rough: drawn(rng, rough)[:1])
+        return case("none", SEED, None, noise_of(sensor))
+
+
 def made(name: str, sensor: str) -> Case:
-    """The case without anything missing, its records with the fault."""
-    whole = case("none", SEED, None, noise_of(sensor))
-    drives = whole.scene.drives[:1]
-    scene = with_fault(replace(whole.scene, drives=drives), name)
+    """The case, its record with the fault."""
+    whole = sound(sensor)
+    scene = with_fault(whole.scene, name)
     clean = measured(scene)[0]
     rng = np.random.default_rng(SEED)
     run = replace(whole.recordings[0], clean_mps2=clean, accel_z_mps2=whole.noise.add(clean, rng))
-    return replace(whole, scene=scene, recordings=(run,), profiles=whole.profiles[:1])
+    return replace(whole, scene=scene, recordings=(run,))
 
 
-def told(ridelog: Path, *arguments: object) -> dict[str, Any]:
+def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     """What a command prints as JSON."""
-    done = subprocess.run([ridelog, *map(str, arguments), "--json"], capture_output=True, text=True, check=False,
-                          timeout=300)
-    assert done.returncode == 0, done.stderr
-    found: dict[str, Any] = json.loads(done.stdout)
+    capsys.readouterr()
+    assert main([*map(str, arguments), "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
     return found
 
 
-def replayed(ridelog: Path, dump: Path, vehicle: Path, out: Path) -> list[float]:
+def replayed(capsys: pytest.CaptureFixture[str], dump: Path, vehicle: Path, out: Path) -> list[float]:
     """The IRI of all windows of a replay [m/km]."""
-    told(ridelog, "replay", dump, "--out", out, "--vehicle", vehicle)
+    told(capsys, "replay", dump, "--out", out, "--vehicle", vehicle)
     rows = [row for path in sorted(out.glob("*.csv")) for row in csv.DictReader(path.read_text("utf-8").splitlines())]
     return [float(row["iri_m_per_km"]) for row in rows if row["iri_m_per_km"]]
 
@@ -74,7 +83,7 @@ def replayed(ridelog: Path, dump: Path, vehicle: Path, out: Path) -> list[float]
 @pytest.mark.parametrize("sensor", ["serial", "bma220"])
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_in_the_file_is_put_right(
-    name: str, sensor: str, ridelog: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, sensor: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     faulty = made(name, sensor)
     write_case(faulty, tmp_path)
@@ -83,11 +92,11 @@ def test_a_fault_in_the_file_is_put_right(
     plain.write_text(yaml.safe_dump(true), "utf-8")
     own.write_text(yaml.safe_dump({**true, "effects": [{"name": name, **FAULTS[name]}]}), "utf-8")
     noise = ["--noise", faulty.noise.white_mps2, "--step", faulty.noise.step_mps2]
-    before, after = (told(ridelog, "estimate", tmp_path / "run1", "--vehicle", one, *noise)["comparison"]
+    before, after = (told(capsys, "estimate", tmp_path / "run1", "--vehicle", one, *noise)["comparison"]
                      for one in (plain, own))
     (dump, line), = write_field(faulty, sensor, plain, tmp_path)
-    exact = told(ridelog, "iri", line)["iri_m_per_km"]
-    logged = [float(np.mean(replayed(ridelog, dump, one, tmp_path / one.stem))) / exact - 1 for one in (plain, own)]
+    exact = told(capsys, "iri", line)["iri_m_per_km"]
+    logged = [float(np.mean(replayed(capsys, dump, one, tmp_path / one.stem))) / exact - 1 for one in (plain, own)]
     with capsys.disabled():
         print(f"\n{name}, {sensor}: estimate R2 {before['r2']:.3f} -> {after['r2']:.3f}, bias {before['bias']:+.1%} -> "
               f"{after['bias']:+.1%}; replay's mean IRI off {logged[0]:+.1%} -> {logged[1]:+.1%}")

@@ -31,6 +31,7 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
 @pytest.mark.parametrize(("arguments", "said"), [
     (["iri", "p.csv", "--window", "3ft"], "--window 3ft: expected a number (try"),
     (["iri", "p.csv", "--windows", "3"], "expected no --windows 3 (try"),
+    (["fleet", "frob"], "expected one of 'ingest', 'summarise', 'report', found 'frob' (try"),
     (["sections", "logs", "--units", "uk"], "--units uk: expected one of 'si', 'us' (try"),
     (["convert", "logs"], "expected --to (try"),
 ])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.studies.drives import rav4
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect import Chosen, Parameter, RoadEffect, Scale, chosen
 from logger.vehicle.effect_parameters import free_number, free_parameter_named
 from logger.vehicle.named_parameters import free
 
@@ -85,28 +86,37 @@ def test_a_linear_car_does_as_the_exact_model_says() -> None:
     assert (np.std(slopes[0] - expected_slopes[0], axis=0) < 0.01 * np.std(expected_slopes[0], axis=0)).all()
 
 
-@pytest.fixture(scope="module")
-def errors() -> Array:
-    """Of mass and friction, in standard errors, over draws of the sensor's noise on drives by Newton's laws."""
+@pytest.mark.slow
+def test_mass_and_friction_are_found_on_drives_by_newtons_laws_with_honest_errors() -> None:
+    """Over draws of the sensor's noise."""
     truth = {MASS: CAR.sprung_mass_kg, FRICTION: FRICTION_N}
     there, starts = [rubbing(60.0)], {MASS: 800.0, FRICTION: 60.0}
-    return np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
-
-
-@pytest.mark.slow
-def test_mass_and_friction_are_found_on_drives_by_newtons_laws(errors: Array) -> None:
+    errors = np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
     print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
     assert np.abs(errors).max() < 3.0
-
-
-@pytest.mark.slow
-def test_their_standard_errors_are_honest(errors: Array) -> None:
     assert 0.7 < np.sqrt((errors**2).mean()) < 1.4
 
 
 def test_friction_from_none_at_all() -> None:
     run = recorded(road_record(CAR, 15.0, 12.0, 1, gd_n0_cm3=16.0), [rubbing(80.0)])
     assert np.abs(off(found([run], [rubbing(0.0)], {FRICTION: 0.0}), {FRICTION: 80.0})).max() < 3.0
+
+
+class Written(RoadEffect):
+    name = title = source = signature = shown_by = "written_low"
+    parameters = (Parameter("times", 2.0, 1.0, 10.0, 1.0, Scale.LINEAR, (2.0,), "how much higher the road is"),)
+
+    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
+        return np.asarray(p.times * elevation_m)
+
+
+def test_a_road_that_differs_from_its_profile_does_so_under_a_bump_too() -> None:
+    record = road_record(CAR, 4.0, 14.0, 3)
+    low = replace(record, track=replace(record.track, elevation_m=record.track.elevation_m / 2))
+    bump = RoadInput(bump=Bump(20.0, 0.1, 2.6))
+    expected, = model([record], [effect("payload", mass_kg=0.0)], {MASS: 900.0}, bump).predict(np.array([900.0]))
+    found, = model([low], [chosen(Written(), {"times": 2.0})], {MASS: 900.0}, bump).predict(np.array([900.0]))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_a_bump_of_which_only_the_kind_is_known_beside_friction() -> None:

@@ -26,7 +26,7 @@ from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read
 
 from ..support.lab.runs_with_residual import CAR, measuring
-from ..support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
+from ..support.lab.secret_runs import EFFECTS, NOISE_MPS2, car_off_by, hidden, posterior_of, secret_runs
 
 FEW = ("sensor_gain", "sensor_offset", "time_offset", "tire_damping")
 SPRINGS = ("front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m")
@@ -94,7 +94,7 @@ def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
     numbers = names[~is_length(tuple(names))]
     car = changed(CAR, {name: read(CAR, name) * (1 + float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.1)))
                         for name in numbers})
-    found = diagnosed(secret_runs(car=car, lasts_s=30.0, rougher=2.0), (*FEW, "cg_shift", "occupant"))
+    found = diagnosed(secret_runs(car=car, lasts_s=12.0, rougher=2.0), (*FEW, "cg_shift", "occupant"))
     assert nothing_is_missing(found) and found.rough_file and found.tolerance == pytest.approx(0.1)
     assert "is a rough one" in " ".join(summary(found))
 
@@ -102,13 +102,8 @@ def test_a_rough_file_lacks_no_physics_and_is_called_rough() -> None:
 @pytest.mark.slow
 def test_a_rough_file_that_an_effect_takes_over_lacks_no_physics_either() -> None:
     """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
-    rng = np.random.default_rng(3)
-    axles = [f"{axle}.{name}" for name in ("unsprung_mass_kg", "suspension_stiffness_n_per_m",
-                                           "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m")
-             for axle in ("front", "rear")]
-    car = changed(CAR, {name: read(CAR, name) * float(np.exp(0.08 * rng.choice([-1, 1])))
-                        for name in ("sprung_mass_kg", "pitch_inertia_kg_m2", *axles)})
-    found = diagnosed(secret_runs(car=car, lasts_s=30.0, rougher=2.0), ("tire_damping", "sensor_offset", "occupant"))
+    runs = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0)
+    found = diagnosed(runs, ("tire_damping", "sensor_offset", "occupant"))
     assert nothing_is_missing(found) and found.rough_file
 
 

@@ -56,6 +56,14 @@ def test_what_is_removed_is_said_before_the_effect() -> None:
     assert as_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
+def test_a_rough_file_is_said_with_the_tolerance_that_was_used() -> None:
+    found = replace(FOUND, rough_file=True, tolerance=0.1)
+    assert judgement(found)[0].startswith("On the whole the car's masses, springs and dampers are off by more than "
+                                          "their tolerance. They were taken to be good to 10% instead")
+    assert (as_json(found)["rough_file"], as_json(found)["tolerance"]) == (True, 0.1)
+    assert (as_json(FOUND)["rough_file"], as_json(FOUND)["tolerance"]) == (False, 0.04)
+
+
 def test_an_effect_that_does_not_help_is_warned_of() -> None:
     assert judgement(replace(FOUND, p_value=0.02))[-1] == (
         "WARNING: it does not help. The probability that noise alone improves the fit as much is 0.02; these runs are "

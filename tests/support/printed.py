@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
 import sys
 import tempfile
+from contextlib import chdir
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from pathlib import Path
+
+from .command import called
 
 INDENT = "    "
 ELSEWHERE = ("sudo ", "cp ", "mkdir ")
@@ -58,7 +60,8 @@ def shown(page: str) -> list[Shown]:
 
 def printed(command: str, folder: Path) -> list[list[str]]:
     """The paragraphs that a command prints, run in a folder."""
-    done = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True, check=False)
+    with chdir(folder):
+        done = called(*shlex.split(command)[1:])
     assert done.returncode == 0, f"{command}: {done.stderr}"
     return [part.splitlines() for part in re.split(r"\n\s*\n", done.stdout.strip("\n"))]
 

@@ -17,7 +17,7 @@ from .cases.same_road import same_road_case
 
 
 def reported_of(seed: int, effect: str | None, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    write_case(same_road_case(seed, effect, length_m=110.0, speeds_mps=(9.0, 15.0)), folder)
+    write_case(same_road_case(seed, effect, length_m=90.0, speeds_mps=(9.0, 15.0)), folder)
     for profile in folder.glob("run*/profile.csv"):
         profile.unlink()
     assert run_same_road(asked(folder, json=True)) == 0

@@ -25,24 +25,24 @@ USUAL = [chosen(effect, effect.usual) for effect in EFFECTS.values()]
 
 
 def test_every_number_that_moves_is_found_by_its_name() -> None:
-    for move in free_parameters_of(USUAL):
-        one = USUAL[move.effect].effect
-        assert free_parameter_named(USUAL, f"{one.name}.{one.parameters[move.parameter].name}") == move
+    for free in free_parameters_of(USUAL):
+        one = USUAL[free.effect].effect
+        assert free_parameter_named(USUAL, f"{one.name}.{one.parameters[free.parameter].name}") == free
     assert free_parameter_named(USUAL, "sprung_mass_kg") is None
 
 
 def test_every_number_is_free_from_where_it_stands() -> None:
-    for move in free_parameters_of(USUAL):
-        parameter = USUAL[move.effect].effect.parameters[move.parameter]
-        value = USUAL[move.effect].values[parameter.name]
-        one = free_number(USUAL, move)
+    for free in free_parameters_of(USUAL):
+        parameter = USUAL[free.effect].effect.parameters[free.parameter]
+        value = USUAL[free.effect].values[parameter.name]
+        one = free_number(USUAL, free)
         assert (one.start, one.low, one.high) == (value, parameter.low, parameter.high)
         assert one.weakest_at(one.start) > 0
 
 
 def test_coordinates_there_and_back() -> None:
-    moves = free_parameters_of(USUAL)
-    back = with_coordinates(USUAL, moves, coordinates_of(USUAL, moves))
+    free_parameters = free_parameters_of(USUAL)
+    back = with_coordinates(USUAL, free_parameters, coordinates_of(USUAL, free_parameters))
     for one, other in zip(back, USUAL, strict=True):
         assert dict(one.values) == pytest.approx(dict(other.values))
 
@@ -75,7 +75,7 @@ def test_numbers_that_begin_at_nothing_are_stepped_and_those_that_cannot_move_ar
             return np.ones_like(s)
 
     effects = [chosen(Own(), {"mass_kg": 0.0, "width_m": 0.0, "fixed_hz": 5.0})]
-    moves = free_parameters_of(effects)
-    assert [move.parameter for move in moves] == [0, 1]
-    assert steps_of(effects, moves) == pytest.approx([0.02 * 0.1 * 20, 0.02 * 0.1 * 3])
+    free_parameters = free_parameters_of(effects)
+    assert [free.parameter for free in free_parameters] == [0, 1]
+    assert steps_of(effects, free_parameters) == pytest.approx([0.02 * 0.1 * 20, 0.02 * 0.1 * 3])
     assert effects[0].at_bound and not chosen(Own(), {"mass_kg": 1.0, "width_m": 1.0, "fixed_hz": 5.0}).at_bound

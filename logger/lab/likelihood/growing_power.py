@@ -26,7 +26,8 @@ def growing_power(power: Array, motion: Array, worth: float = 0.947, rounds: int
     for band, (one, moved) in enumerate(zip(power.T, motion.T, strict=True)):
         if len(one) < 4 or not np.ptp(moved) > 0 or not one.mean() > 0:
             continue
-        columns = np.column_stack([np.ones(len(one)), moved / moved.mean()])
+        # Counted from the mean, motion that hardly varies is no near copy of the ones.
+        columns = np.column_stack([np.ones(len(one)), moved / moved.mean() - 1])
         expected = np.full(len(one), one.mean())
         for _ in range(rounds):
             weights = expected**-2

@@ -82,13 +82,13 @@ def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int 
     """
     posterior, fresh = start.posterior, numbers is None
     numbers = posterior.number_slopes(start.state, posterior.prior.steps) if numbers is None else numbers
-    moves = free_parameters_of(start.state.effects)
+    free_parameters = free_parameters_of(start.state.effects)
     best = now = start.with_number_slopes(numbers)
     least = best.score
     enough = max(CONVERGED, min_gain)
     last = max(rounds, at_most)
     for done in range(1, last + 1):
-        now = relinearise(posterior, optimise_numbers(now, now.state, moves), numbers, least)
+        now = relinearise(posterior, optimise_numbers(now, now.state, free_parameters), numbers, least)
         gained = least - now.score
         if gained > 0:
             best, least = now, now.score
@@ -210,18 +210,18 @@ class _Point:
     cost: float
 
 
-def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[FreeParameter], small_gain: float = 0.15
-                     ) -> State:
+def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequence[FreeParameter],
+                     small_gain: float = 0.15) -> State:
     """Levenberg-Marquardt steps on the car's numbers and the free ones of the effects, with the most likely distance
     errors to first order at each."""
     own: list[Array] | None = None
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
-    realigns = any(state.effects[move.effect].effect.realigns for move in moves)
+    realigns = any(state.effects[free.effect].effect.realigns for free in free_parameters)
     predict = linear.posterior.predictor(state)
 
     def evaluate(x: Array) -> _Point:
-        effects, logs = with_coordinates(state.effects, moves, x[p:]), x[:p] if p else state.logs
+        effects, logs = with_coordinates(state.effects, free_parameters, x[p:]), x[:p] if p else state.logs
         record = linear.state.record
         if realigns and known is not None:
             # The distance error compensates an effect that shifts a run: predicted without it, no step would gain.
@@ -234,16 +234,17 @@ def optimise_numbers(linear: LinearModel, state: State, moves: Sequence[FreePara
 
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal own, known
-        if moves and fresh:
-            slopes = effect_slopes(linear, at.effects, at.logs, moves, at.record, at.predictions)
+        if free_parameters and fresh:
+            slopes = effect_slopes(linear, at.effects, at.logs, free_parameters, at.record, at.predictions)
             own, known = linear.whitened(slopes), (x.copy(), at, slopes)
         information = linear.information(at.logs, own)
         information[p:, p:] += unseen
         return linear.gradient(at.fit.residuals, at.logs, own), information
 
     # A number that the runs say nothing of would be moved by roundings: its step is damped by what its range says.
-    unseen = np.diag([range_of(state.effects[move.effect].effect.parameters[move.parameter])**-2.0 for move in moves])
-    start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
+    unseen = np.diag([range_of(state.effects[free.effect].effect.parameters[free.parameter])**-2.0
+                      for free in free_parameters])
+    start = np.concatenate([state.logs[:p], coordinates_of(state.effects, free_parameters)])
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
 
@@ -253,7 +254,7 @@ def range_of(parameter: Parameter) -> float:
     return abs(parameter.coordinate(parameter.high) - parameter.coordinate(parameter.low))
 
 
-def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[FreeParameter],
+def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, free_parameters: Sequence[FreeParameter],
                   record: Sequence[Array], fine: Sequence[Array]) -> list[Array]:
     """Derivatives of predictions by the effects' numbers, on the scales of the parameters: (m, n) per run, with these
     record errors, by differences of rough simulations, which are near enough.
@@ -263,15 +264,17 @@ def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, m
     posterior = linear.posterior
     predict = partial(posterior.predict, logs=logs, record=record, rough=True)
     before = predict(effects) if posterior.car(effects, logs).rubs else fine
-    return derivatives(lambda there: predict(with_coordinates(effects, moves, there)), coordinates_of(effects, moves),
-                       steps_of(effects, moves), before)
+    return derivatives(lambda there: predict(with_coordinates(effects, free_parameters, there)),
+                       coordinates_of(effects, free_parameters), steps_of(effects, free_parameters), before)
 
 
 def own_slopes(linear: LinearModel) -> list[Array] | None:
     """Derivatives of a model's predictions by the numbers of its effects: (m, n) per run; None where none is free."""
     state = linear.state
-    moves = free_parameters_of(state.effects)
-    return effect_slopes(linear, state.effects, state.logs, moves, state.record, state.predictions) if moves else None
+    free_parameters = free_parameters_of(state.effects)
+    if not free_parameters:
+        return None
+    return effect_slopes(linear, state.effects, state.logs, free_parameters, state.record, state.predictions)
 
 
 def _fine_steps(linear: LinearModel) -> Array:

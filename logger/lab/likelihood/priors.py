@@ -51,6 +51,11 @@ class Tolerance:
     rough: float = 0.0625
     band: float = 1.6
 
+    @property
+    def share(self) -> float:
+        """By how much masses, springs and dampers may well be off, either way."""
+        return self.band * self.numbers
+
 
 def is_length(names: Sequence[str]) -> npt.NDArray[np.bool_]:
     """Which of a vehicle's numbers (p,) are lengths."""

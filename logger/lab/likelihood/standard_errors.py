@@ -31,9 +31,9 @@ def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """
     linear, state = found.without_soft_bounds(), found.state
     deviations = np.sqrt(np.maximum(np.diag(_covariance(linear)), 0.0))
-    own, moves = deviations[linear.count:], free_parameters_of(state.effects)
-    ranges = [range_of(state.effects[move.effect].effect.parameters[move.parameter]) for move in moves]
-    return (with_standard_errors(state.effects, moves, np.where(own < ranges, own, np.inf)),
+    own, free_parameters = deviations[linear.count:], free_parameters_of(state.effects)
+    ranges = [range_of(state.effects[free.effect].effect.parameters[free.parameter]) for free in free_parameters]
+    return (with_standard_errors(state.effects, free_parameters, np.where(own < ranges, own, np.inf)),
             deviations[: linear.count])
 
 
@@ -41,12 +41,12 @@ def number_errors(found: LinearModel) -> NumberErrors:
     """Standard errors and correlations of the numbers of the car and of its effects, in their own units; as
     ``standard_errors``."""
     linear, state = found.without_soft_bounds(), found.state
-    prior, moves = linear.posterior.prior, free_parameters_of(state.effects)
+    prior, free_parameters = linear.posterior.prior, free_parameters_of(state.effects)
     vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
     names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
-    for move in moves:
-        one = state.effects[move.effect]
-        parameter = one.effect.parameters[move.parameter]
+    for free in free_parameters:
+        one = state.effects[free.effect]
+        parameter = one.effect.parameters[free.parameter]
         names.append(f"{one.effect.name}.{parameter.name}")
         units.append(1 / slope_of(parameter, one.values[parameter.name]))
     return NumberErrors.of_covariance(names, _covariance(linear) * np.outer(units, units))
@@ -88,9 +88,9 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
             state.effects, state.logs).rubs:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]
-    for move in free_parameters_of(state.effects):
-        one = state.effects[move.effect]
-        parameter = one.effect.parameters[move.parameter]
+    for free in free_parameters_of(state.effects):
+        one = state.effects[free.effect]
+        parameter = one.effect.parameters[free.parameter]
         value = one.values[parameter.name]
         step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
     scaling = np.array(step)
@@ -100,17 +100,18 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
     return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
-def with_standard_errors(effects: Sequence[Chosen], moves: Sequence[FreeParameter], deviations: Array,
+def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array,
                 share: float = 1e-4) -> tuple[Chosen, ...]:
     """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
     linear over such a share of a number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
-    for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
+    coordinates = coordinates_of(effects, free_parameters)
+    for free, here, deviation in zip(free_parameters, coordinates, deviations, strict=True):
+        parameter = effects[free.effect].effect.parameters[free.parameter]
         step = share * max(abs(here), share)
         # At a bound a value goes one way only: it rises by so much over the way that it went.
         high, low = parameter.value(here + step), parameter.value(here - step)
         way = abs(parameter.coordinate(high) - parameter.coordinate(low))
         rise = abs(high - low) / way if way > 0 else 0.0
-        errors[move.effect] = {**errors[move.effect], parameter.name: float(rise * deviation)}
+        errors[free.effect] = {**errors[free.effect], parameter.name: float(rise * deviation)}
     return tuple(replace(one, standard_errors=found) for one, found in zip(effects, errors, strict=True))

@@ -106,11 +106,11 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
     information = np.diag(precision) + sum(
         one.information(now.logs) - np.diag(one.prior.curvature(now.logs)) for one in models)
-    best, promised = now, np.inf
+    best, predicted = now, np.inf
     for _ in range(_MOST_STEPS):
         squares, gradient = _squares(models, now, precision, start)
         step = np.asarray(np.linalg.solve(information, gradient), float)
-        promised = min(promised, squares - float(gradient @ step))
+        predicted = min(predicted, squares - float(gradient @ step))
         moved = [one.fit_record_errors_to(_after_step(some, one, step), k).record for one, some, k in zip(
             models, now.residuals, now.moved, strict=True)]
         logs = now.logs + step
@@ -121,7 +121,7 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
             best = min(now, best, key=lambda one: one.gain)
             break
         best = now
-    return best, _squares(models, best, precision, start)[0] < _KEPT * promised
+    return best, _squares(models, best, precision, start)[0] < _KEPT * predicted
 
 
 def _squares(models: Sequence[LinearModel], now: _Fit, precision: Array, start: Array) -> tuple[float, Array]:

@@ -12,7 +12,7 @@ that the effect alone makes the difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import HoldOut, cross_validate
+from logger.lab.selection.rough_file import is_file_rough
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -85,6 +86,8 @@ class AddedEffects:
     removed                        sensor drift, distance error and filtering, removed from the errors
     errors                         of the numbers of vehicle and effects together
     signals                        errors of other signals than the sensor's acceleration, without and with the effects
+    tolerance                      share by which the car's masses, springs and dampers may well be off
+    rough_file                     whether they turned out to be off by more, on the whole, than was thought at first
     """
 
     vehicle: Vehicle
@@ -103,6 +106,8 @@ class AddedEffects:
     unseen_before: HoldOut | None = None
     unseen_after: HoldOut | None = None
     band: ComparedBand | None = None
+    tolerance: float = 0.04
+    rough_file: bool = False
 
     @property
     def gains(self) -> bool:
@@ -161,11 +166,13 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     (base_fit, errors_before), (effect_fit, errors_after) = (
         _fit_without_soft_bounds(unbounded, one, fitted) for one, fitted in ((before, fit), (after, fit_to_the_end)))
     prior, nominal = posterior.prior, posterior.vehicle
-    if given.may_be_rough and prior.off_on_the_whole(effect_fit.state.logs, errors_after):
+    p_value = chance_of(after.state.effects[len(before.state.effects):], before.score - after.score, posterior.freedom,
+                        candidates)
+    if is_file_rough(base_fit, effect_fit, p_value < FALSE_ALARM):
         wider = given.with_rough_file()
         rough = add(wider, present, added, candidates, near)
         if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), UNUSUAL_SIGMA):
-            return rough
+            return replace(rough, rough_file=True)
     vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
         after.state.logs, base_fit.state.logs, effect_fit.state.logs))
     numbers = tuple(
@@ -181,11 +188,10 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_after=posterior.error(state),
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-        p_value=chance_of(after.state.effects[len(before.state.effects):], before.score - after.score,
-                          posterior.freedom, candidates),
-        removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
+        p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
         unseen_before=cross_validate(before, own_slopes(before)), unseen_after=cross_validate(after, own_slopes(after)),
-        band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state))
+        band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
+        tolerance=posterior.tolerance.share)
 
 
 def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],

@@ -355,10 +355,10 @@ def scale_strength(one: Chosen, strength: float) -> Chosen | None:
     for place, parameter in enumerate(one.effect.parameters):
         if parameter.null is None or not parameter.is_free:
             continue
-        move = FreeParameter(0, place)
+        free = FreeParameter(0, place)
         null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
-        here = float(coordinates_of([one], [move])[0])
-        return with_coordinates([one], [move], np.array([null + strength * (here - null)]))[0]
+        here = float(coordinates_of([one], [free])[0])
+        return with_coordinates([one], [free], np.array([null + strength * (here - null)]))[0]
     return None
 
 

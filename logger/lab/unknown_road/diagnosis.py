@@ -290,16 +290,16 @@ def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, 
 
 def _with_errors(model: RoadFit) -> tuple[Chosen, ...]:
     """The effects of a model with standard errors."""
-    first = len(model.state.logs)
-    deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
-    return with_standard_errors(model.state.effects, model.moves, deviations)
+    first, count = len(model.state.logs), len(model.free_parameters)
+    deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + count]
+    return with_standard_errors(model.state.effects, model.free_parameters, deviations)
 
 
 def _confounded_numbers(model: RoadFit) -> tuple[Finding, ...]:
     """Masses, springs and dampers that these drives cannot identify while the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
-    road = np.arange(len(names) + len(model.moves), len(model.data))
+    road = np.arange(len(names) + len(model.free_parameters), len(model.data))
     mixed = model.data[np.ix_(own, road)]
     marginal = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
     powers, directions = np.linalg.eigh(marginal)

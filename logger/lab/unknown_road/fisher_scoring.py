@@ -30,15 +30,15 @@ Complex = npt.NDArray[np.complex128]
 class RoadFit:
     """A fitted state, with the information on its numbers.
 
-    moves          free parameters of its effects
-    data           information of the drives on the logs, the moves (on their scales) and the roads' numbers (m, m), at
-                   the last step for which it was computed
-    information    of drives and priors (m, m)
-    problem        with a preconditioner for states near this one
+    free_parameters    of its effects
+    data               information of the drives on the logs, the free parameters (on their scales) and the roads'
+                       numbers (m, m), at the last step for which it was computed
+    information        of drives and priors (m, m)
+    problem            with a preconditioner for states near this one
     """
 
     state: RoadFitState
-    moves: tuple[FreeParameter, ...]
+    free_parameters: tuple[FreeParameter, ...]
     data: Array
     information: Array
     problem: SameRoad
@@ -53,20 +53,20 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
     falling        the information, which takes most of the time, is kept from step to step as long as the expected gain
                    falls to this share or less: at a half steps converge still, if no longer quadratically
     """
-    moves = free_parameters_of(state.effects)
-    p, q = len(state.logs), len(moves)
-    here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
-    low, high, longest = _limits(state.effects, moves, len(here), p)
+    free_parameters = free_parameters_of(state.effects)
+    p, q = len(state.logs), len(free_parameters)
+    here = np.concatenate([state.logs, coordinates_of(state.effects, free_parameters), state.roads])
+    low, high, longest = _limits(state.effects, free_parameters, len(here), p)
     low[-1] = np.log(problem.least_mps2)
 
     def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
-        return here[:p], with_coordinates(state.effects, moves, here[p : p + q]), here[p + q :]
+        return here[:p], with_coordinates(state.effects, free_parameters, here[p : p + q]), here[p + q :]
 
     probes = 1 if len(problem.stretches) > 2 else None  # where there are many stretches, these are a mean as well
     data, last_gain = np.empty((0, 0)), 0.0
     for count in range(steps):
         logs, effects, roads = at(here)
-        gains, slopes = response_and_slopes(problem, effects, moves, logs)
+        gains, slopes = response_and_slopes(problem, effects, free_parameters, logs)
         if problem.rounds > many_rounds:
             problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
         tables = problem.tables(gains, slopes)
@@ -86,7 +86,7 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: floa
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
     state = RoadFitState(effects, logs, roads, problem.response(effects, logs))
-    return RoadFit(state, tuple(moves), data, information, problem)
+    return RoadFit(state, tuple(free_parameters), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
@@ -104,30 +104,31 @@ def inverse(information: Array, ridge: float = 1e-6) -> Array:
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 
-def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[FreeParameter], logs: Array,
-           step: float = 1e-3) -> tuple[Complex, Complex]:
-    """A response (d, x, f) and its derivatives (p + q, d, x, f) by the logs and the moves, over steps of this share."""
+def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_parameters: Sequence[FreeParameter],
+                        logs: Array, step: float = 1e-3) -> tuple[Complex, Complex]:
+    """A response (d, x, f) and its derivatives (p + q, d, x, f) by the logs and the free parameters, over steps of this
+    share."""
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):
         shifted = logs.copy()
         shifted[index] += step
         slopes.append((problem.response(effects, shifted) - gains) / step)
-    here = coordinates_of(effects, moves)
-    for index, own_step in enumerate(steps_of(effects, moves, step, step)):
+    here = coordinates_of(effects, free_parameters)
+    for index, own_step in enumerate(steps_of(effects, free_parameters, step, step)):
         shifted = here.copy()
         shifted[index] += own_step
-        slopes.append((problem.response(with_coordinates(effects, moves, shifted), logs) - gains) / own_step)
+        slopes.append((problem.response(with_coordinates(effects, free_parameters, shifted), logs) - gains) / own_step)
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 
-def _limits(effects: Sequence[Chosen], moves: Sequence[FreeParameter], count: int, first: int,
+def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], count: int, first: int,
             longest_log: float = 0.5) -> tuple[Array, Array, Array]:
-    """Bounds and longest step of each number (count,); those of the moves begin at ``first``."""
+    """Bounds and longest step of each number (count,); those of the free parameters begin at ``first``."""
     low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
-    for index, move in enumerate(moves, first):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
+    for index, free in enumerate(free_parameters, first):
+        parameter = effects[free.effect].effect.parameters[free.parameter]
         low[index], high[index] = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
         if parameter.scale is not Scale.LOG:
-            longest[index] = max(parameter.usual_range(), 0.5 * abs(coordinates_of(effects, [move])[0]))
+            longest[index] = max(parameter.usual_range(), 0.5 * abs(coordinates_of(effects, [free])[0]))
     return low, high, longest

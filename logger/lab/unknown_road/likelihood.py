@@ -189,7 +189,7 @@ class SameRoad:
             yield road.with_cars(tables[first : first + len(parts)]), at, part, [run for run, _ in parts]
             first += len(parts)
 
-    def prior_terms(self, logs: Array, moves: int, roads: Array, waviness_off: float = 0.3,
+    def prior_terms(self, logs: Array, free_parameters: int, roads: Array, waviness_off: float = 0.3,
                     place_off_m: float = 0.05) -> tuple[Array, Array]:
         """Deviations of a state's numbers from the means of their priors (m,), and the prior precisions (m,): of the
         car's, of so many free parameters of effects, which have none, and of the roads'.
@@ -204,7 +204,7 @@ class SameRoad:
             places = part[2:-1]
             off[places] = roads[places] - self._first[places]
             precision[places] = place_off_m**-2
-        free = np.zeros(moves)
+        free = np.zeros(free_parameters)
         return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
 
     def cost(self, state: RoadFitState) -> float:

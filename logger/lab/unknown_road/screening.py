@@ -34,14 +34,14 @@ def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Tri
     """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
     numbers and the roads' are projected out."""
     state = base.state
-    gains, own = response_and_slopes(problem, state.effects, base.moves, state.logs)
+    gains, own = response_and_slopes(problem, state.effects, base.free_parameters, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
     tables = problem.tables(gains, np.array([*own, *changes]))
     slopes, information = problem.score_and_information(tables, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
-    off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)
+    off, precision = problem.prior_terms(state.logs, len(base.free_parameters), state.roads)
     known = inverse(information[np.ix_(rest, rest)] + np.diag(precision))
     by_road = inverse(information[np.ix_(road, road)] + np.diag(precision[p:]))
     score = slopes[rest] - precision * off

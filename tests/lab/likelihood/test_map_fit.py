@@ -91,10 +91,11 @@ def test_nothing_near_a_fit_is_likelier() -> None:
     linear, posterior, state = damped(), damped().posterior, damped().state
     here = linear.objective(state.predictions, state.logs)
     known = 1 / np.sqrt(np.diag(linear.information(state.logs)))
-    moves = free_parameters_of(state.effects)
-    coordinates = coordinates_of(state.effects, moves)
+    free_parameters = free_parameters_of(state.effects)
+    coordinates = coordinates_of(state.effects, free_parameters)
     beside = [(state.effects, state.logs + way * row) for row in np.diag(0.5 * known) for way in (1, -1)]
-    beside += [(with_coordinates(state.effects, moves, coordinates + way * 15.0), state.logs) for way in (1, -1)]
+    beside += [(with_coordinates(state.effects, free_parameters, coordinates + way * 15.0), state.logs)
+               for way in (1, -1)]
     for effects, logs in beside:
         there = posterior.predict(effects, logs, state.record)
         assert linear.objective(there, logs) > here - 0.5 * CONVERGED

@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from logger.lab.diagnosis import diagnose
-from logger.lab.likelihood.growing_power import growing_power
+from logger.lab.likelihood.growing_power import growing_power, steady_power
 from logger.lab.residuals.noise_colour import is_monotonic, rising_levels
 from logger.report.diagnosis_text import summary
 from logger.runs import Run
@@ -37,6 +37,15 @@ def test_what_grows_with_the_motion_is_found_within_its_error(share: float) -> N
 def test_motion_that_never_changes_says_nothing() -> None:
     _, errors = growing_power(np.ones((50, 2)), np.ones((50, 2)))
     assert np.isinf(errors).all()
+
+
+@pytest.mark.parametrize("varies", [1e-6, 1e-8, 1e-15])
+def test_motion_that_hardly_varies_says_next_to_nothing(varies: float) -> None:
+    rng = np.random.default_rng(1)
+    motion, power = 1 + varies * rng.standard_normal((40, 1)), rng.gamma(5.0, 0.2, (40, 1))
+    grows, errors = growing_power(power, motion)
+    assert errors > 0.01 / varies and abs(grows) < 5 * errors
+    assert steady_power(power, motion) == 0
 
 
 def test_noise_falls_or_rises_throughout_and_a_hum_does_not() -> None:

@@ -14,6 +14,7 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 from logger.lab.diagnosis import diagnose, search_effects
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
+from logger.lab.selection.stepwise import Search, Selection
 from logger.simulation.simulated_runs import SimulatedRuns
 
 from ...support.lab.secret_runs import EFFECTS, posterior_of, secret_runs
@@ -31,11 +32,18 @@ def filtered(way: Callable[..., Array], order: int, cutoff_hz: float) -> Posteri
 
 
 @pytest.mark.parametrize(("order", "cutoff_hz"), [pytest.param(2, 16.0, marks=pytest.mark.slow), (4, 20.0)])
-def test_one_that_was_run_forth_and_back_is_named_by_nothing_and_ends_the_band(order: int, cutoff_hz: float) -> None:
-    posterior = filtered(sosfiltfilt, order, cutoff_hz)
-    _, without = search_effects(posterior, TRIED)
-    assert "sensor_bandwidth" in without.gains  # what imitates it
+def test_one_that_was_run_forth_and_back_is_named_by_nothing_and_ends_the_band(
+        order: int, cutoff_hz: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    posterior, asked = filtered(sosfiltfilt, order, cutoff_hz), []
+
+    def noted(search: Search, found: Selection) -> Posterior | None:
+        asked.append(found)
+        return below_filter_without_delay(search, found)
+
+    monkeypatch.setattr("logger.lab.diagnosis.below_filter_without_delay", noted)
     found = diagnose(posterior, TRIED)
+    (without,) = asked  # the search before the band was known
+    assert "sensor_bandwidth" in without.gains  # what imitates it
     assert found.verdict == ()
     assert found.band is not None and found.band.high_hz < cutoff_hz
     assert found.band.cutoff_hz == pytest.approx(cutoff_hz, rel=0.1)

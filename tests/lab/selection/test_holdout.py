@@ -59,12 +59,12 @@ def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     """Error and deviance of models whose numbers were fitted to convergence, by true predictions, without each set of
     stretches in turn; distances stay as they are."""
     posterior, state = found.posterior, found.state
-    runs, moves, p = posterior.runs.runs, free_parameters_of(state.effects), len(state.logs)
-    here = np.concatenate([state.logs, coordinates_of(state.effects, moves)])
+    runs, free_parameters, p = posterior.runs.runs, free_parameters_of(state.effects), len(state.logs)
+    here = np.concatenate([state.logs, coordinates_of(state.effects, free_parameters)])
     scale = np.concatenate([posterior.prior.deviations, np.maximum(0.1 * np.abs(here[p:]), 1e-3)])
 
     def residuals(x: Array) -> list[Array]:
-        there: tuple[Chosen, ...] = with_coordinates(state.effects, moves, x[p:])
+        there: tuple[Chosen, ...] = with_coordinates(state.effects, free_parameters, x[p:])
         predicted = posterior.predict(there, x[:p], state.record)
         return posterior.residuals_of(predicted)
 

@@ -15,6 +15,7 @@ from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.vehicle import Vehicle
 
 from .runs_with_residual import CAR, a_run, measuring
@@ -42,9 +43,20 @@ def secret_runs(effects: Sequence[Chosen] = (), car: Vehicle = CAR, lasts_s: flo
         plain, SimulatedRuns(plain).predict(compose(car, effects)), strict=True)], FINE_HZ)
 
 
-def posterior_of(runs: SimulatedRuns, start_vehicle: Vehicle | None = None) -> Posterior:
+def posterior_of(runs: SimulatedRuns, start_vehicle: Vehicle | None = None, tolerance: Tolerance | None = None
+                 ) -> Posterior:
     """Of the plain car, given runs."""
-    return Posterior(runs, CAR, Tolerance(), start_vehicle)
+    return Posterior(runs, CAR, tolerance or Tolerance(), start_vehicle)
+
+
+def car_off_by(share: float, seed: int) -> Vehicle:
+    """A car all of whose masses, springs and dampers are off, up or down."""
+    rng = np.random.default_rng(seed)
+    axles = [f"{axle}.{name}" for name in ("unsprung_mass_kg", "suspension_stiffness_n_per_m",
+                                           "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m")
+             for axle in ("front", "rear")]
+    return changed(CAR, {name: read(CAR, name) * float(np.exp(share * rng.choice([-1, 1])))
+                         for name in ("sprung_mass_kg", "pitch_inertia_kg_m2", *axles)})
 
 
 class Dense:

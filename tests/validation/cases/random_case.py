@@ -13,6 +13,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Case:
-    """A question and its answer."""
+    """A question and its answer; ``bare``: the scene without what is hidden."""
 
     kind: str
     seed: int
@@ -77,7 +78,21 @@ class Case:
     profiles: tuple[Road, ...]
     both_tracks: bool
     noise_rms_mps2: float
-    error: dict[str, float]
+    bare: Scene
+
+    @cached_property
+    def error(self) -> dict[str, float]:
+        """Normalised errors: of the sensor's noise, of the true car on the distances that were recorded, and of the car
+        without what is hidden; simulated when they are asked for."""
+        taken = tuple(run.accel_z_mps2 for run in self.recordings)
+        size = difference_rms(taken, tuple(np.zeros_like(one) for one in taken))
+        by_way = tuple(
+            clean_acceleration(self.scene, drive, STEP_S * 2, (run.distance_m, run.speed_mps))
+            for drive, run in zip(self.scene.drives, self.recordings, strict=True))
+        plain = measured(self.bare, STEP_S * 2)
+        return {"noise_floor_error": self.noise_rms_mps2 / size,
+                "attainable_error": difference_rms(taken, by_way) / size,
+                "error_without_effects": difference_rms(taken, plain) / size}
 
 
 def generator(kind: str, seed: int, effect: str | None) -> np.random.Generator:
@@ -315,17 +330,10 @@ def recorded(
 ) -> Case:
     full = with_effects(scene, hidden)
     clean = measured(full)
-    plain = measured(without(scene, hidden, *range(len(hidden))), STEP_S * 2)
     wrong = (_log_uniform(rng, *WRONG_MPS), _log_uniform(rng, *WRONG_FOR_S)) if kind == "wandering" else None
     recordings = tuple(
         _recording(rng, drive, noise, one, wrong) for drive, one in zip(scene.drives, clean, strict=True))
-    by_way = tuple(
-        clean_acceleration(full, drive, STEP_S * 2, (run.distance_m, run.speed_mps))
-        for drive, run in zip(scene.drives, recordings, strict=True))
-    taken = tuple(run.accel_z_mps2 for run in recordings)
-    silence = tuple(np.zeros_like(one) for one in taken)
-    size = difference_rms(taken, silence)
-    noise_rms = difference_rms(taken, clean)
+    noise_rms = difference_rms(tuple(run.accel_z_mps2 for run in recordings), clean)
     found = tuple(
         replace(each, strength=difference_rms(clean, measured(without(scene, hidden, i), STEP_S * 2)) / noise_rms)
         for i, each in enumerate(hidden))
@@ -333,10 +341,7 @@ def recorded(
     return Case(
         kind, seed, mistaken(rng, scene.car), full, noise, found, recordings,
         tuple(full.written_road(drive) for drive in full.drives),
-        has_roll or bool(rng.random() < 0.3), noise_rms,
-        {"noise_floor_error": noise_rms / size, "attainable_error": difference_rms(taken, by_way) / size,
-         "error_without_effects": difference_rms(taken, plain) / size},
-    )
+        has_roll or bool(rng.random() < 0.3), noise_rms, without(scene, hidden, *range(len(hidden))))
 
 
 def _recording(
