@@ -14,14 +14,20 @@ from logger.lab.laws.families.damping_by_travel import FAMILY as BY_BOTH
 from logger.lab.laws.families.family import Family, LawContext
 from logger.lab.laws.families.force_by_rate import FAMILY as BY_RATE
 from logger.lab.laws.families.record_factor import FAMILY as FACTOR
-from logger.lab.laws.refusals import Nearest, does_nothing, known_instead, refusal
+from logger.lab.laws.refusals import Nearest, _beyond, does_nothing, known_instead, refusal
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.screening import Baseline
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.uncertain import NumberErrors
 
-from ...support.lab.secret_runs import EFFECTS, hidden, posterior_of, secret_runs
+from ...support.lab.noisy_runs import still_runs
+from ...support.lab.runs_with_residual import CAR
+from ...support.lab.secret_runs import EFFECTS, FINE_HZ, hidden, posterior_of, secret_runs
+from ..likelihood.test_signals import with_signals
 
 TWO = "pair_5"
 
@@ -103,3 +109,11 @@ def test_a_fitted_law_is_refused_for_its_own_numbers(added: float, hz: float, wh
     begun = posterior.state_at((start,), posterior.start().logs)
     refused = refusal(FACTOR, draft, Baseline.of(fit(LinearModel(posterior, begun))))
     assert (refused.why if refused else "").find(why) >= 0 and bool(refused) == bool(why)
+
+
+def test_the_band_of_runs_with_several_signals_is_that_of_all_of_them() -> None:
+    run = with_signals(still_runs(12.0)[1])
+    posterior = Posterior(SimulatedRuns([run], FINE_HZ), CAR, Tolerance())
+    draft = drafts(FACTOR)["pole"]
+    assert "frequency" in _beyond(posterior, found(draft, [0.4, 45.0], [0.1, 1.0]))
+    assert not _beyond(posterior, found(draft, [0.4, 8.0], [0.1, 1.0]))
