@@ -6,7 +6,8 @@ from functools import partial
 from typing import Any
 
 from logger.lab.diagnosis import Diagnosis
-from logger.lab.laws.learn import Law, Learning, Nearest
+from logger.lab.laws.learn import Law, Learning
+from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.diagnosis_text import JUDGED_ON, looks_like
 from logger.report.quantities import finite, measured, numbers_of, unit_of
@@ -38,6 +39,8 @@ def learned(law: Law, addition: AddedEffects) -> Chosen:
 
 def why_none(found: Learning) -> str:
     """Why no law is learned."""
+    if found.refused is not None:
+        return _refused(found.refused)
     if not found.verdict and not found.unexplained:
         return NOTHING
     if not found.verdict:
@@ -48,6 +51,11 @@ def why_none(found: Learning) -> str:
         return (f"{names} explain{'s' * (not many)} part of what is missing, and no law of these families explains it "
                 "better; no law is learned")
     return f"{names} explain{'s' * (not many)} it; no law is learned"
+
+
+def _refused(one: Refusal) -> str:
+    add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
+    return f"{one.title} would explain it best, but {one.why}{add}; no law is learned"
 
 
 def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
@@ -90,9 +98,6 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
         return ["No known effect of its kind explains any part of it."]
     name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
     numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
-    if nearest.gain > nearest.law_gain:
-        return [f"The known effect {name}{numbers} explains more in its place than the law does (2 ln of the evidence "
-                f"{-gap:.0f} more): prefer it, ridelog add-effect {name}, and learn again if something is left."]
     if nearest.as_good:
         return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
                 f"runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
@@ -142,7 +147,9 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             "law": None, "family": None, "words": why_none(found), "parameters": {}, "standard_errors": {},
             "error_before": diagnosis.baseline_error, "error_after": diagnosis.final_error,
             "error_after_unseen": diagnosis.steps[-1].error, "noise_floor_error": diagnosis.noise_floor_error,
-            "verdict": list(diagnosis.verdict), "unexplained": diagnosis.unexplained,
+            "verdict": list(found.verdict), "unexplained": diagnosis.unexplained,
+            "refused": found.refused and {"law": found.refused.title, "why": found.refused.why},
+            "nearest": _nearest_json(found.refused.known if found.refused else None),
             "steps": [{"step": one.words, "error": one.error} for one in diagnosis.steps],
             **removed_json(diagnosis.removed),
         }
@@ -160,15 +167,18 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "log_likelihood_gain": law.gain / 2,
         "listed": {"verdict": list(found.verdict), "error_unseen": found.listed_error,
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
-        "nearest": None if law.nearest is None else {
-            "effect": law.nearest.one.effect.name, "parameters": dict(law.nearest.one.values),
-            "share": law.nearest.share, "as_good": law.nearest.as_good,
-            "log_likelihood_less": (law.nearest.law_gain - law.nearest.gain) / 2},
+        "nearest": _nearest_json(law.nearest),
         "confused_with": [other.family.name for other in law.rivals],
         "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
         **removed_json(addition.removed),
         "sentences": sentences(law, addition),
     }
+
+
+def _nearest_json(one: Nearest | None) -> dict[str, Any] | None:
+    return None if one is None else {
+        "effect": one.one.effect.name, "parameters": dict(one.one.values), "share": one.share, "as_good": one.as_good,
+        "log_likelihood_less": (one.law_gain - one.gain) / 2}
 
 
 def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:

@@ -12,6 +12,8 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
@@ -78,6 +80,7 @@ class CurveFamily(Family):
     powers: tuple[float, ...] = (2.0, 3.0)
     power_ends: tuple[float, float] = (0.3, 8.0)
     ends: tuple[tuple[int, str], ...]
+    straight_at = 1.0
 
     @abstractmethod
     def usual_force_n(self, context: LawContext, usual: float) -> float:
@@ -92,6 +95,16 @@ class CurveFamily(Family):
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
                 *(self._free(variant, [reach(share) for share in shares], size_n)
                   for variant, shares in _POINTS.items())]
+
+    def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
+        if draft.variant == "power":
+            return super().is_straight(draft, found, sigma)
+        force_n, error_n = (np.array([some.get(one.name, np.inf) for one in draft.parameters])
+                            for some in (found.values, found.standard_errors))
+        # The line through rest from which no point is off by more, if there is one.
+        places = np.array(draft.places)
+        slopes = np.sort(np.divide([force_n - sigma * error_n, force_n + sigma * error_n], places), axis=0)
+        return bool(slopes[0].max() < slopes[1].min())
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         motion = self.motion.at
@@ -130,15 +143,15 @@ def force_n(p, at):
         parameters = tuple(_strength(name, size_n, f"at {one:g} {self.motion.unit}", (0.1,))
                            for one, name in names.items())
         return self._draft(variant, "follows a curve of", parameters, functions, places[-1],
-                           ("from scipy.interpolate import PchipInterpolator",))
+                           ("from scipy.interpolate import PchipInterpolator",), tuple(places))
 
     def _draft(self, variant: str, does: str, parameters: tuple[Parameter, ...], functions: str, reference: float,
-               imports: tuple[str, ...] = ()) -> Draft:
+               imports: tuple[str, ...] = (), places: tuple[float, ...] = ()) -> Draft:
         return Draft(
             family=self.name, kind="ForceEffect", title=f"a force that {does} the {self.motion.name}",
             parameters=parameters, source=self.source, signature=self.signature, shown_by=self.shown_by,
             method=f"def laws(self, p, laws):\n    return laws.{self.motion.method}", functions=functions,
-            imports=imports, variant=variant, at=self.motion.at, reference=reference)
+            imports=imports, variant=variant, at=self.motion.at, reference=reference, places=places)
 
 
 def _strength(name: str, size_n: float, meaning: str, trials: Sequence[float] = (0.1, -0.1)) -> Parameter:

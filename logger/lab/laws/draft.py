@@ -46,6 +46,7 @@ class Draft:
     at           what a picture draws its force over: "rate", "travel" or "deflection"; "loop": over the travel as it
                  goes to and fro; "": there is no picture
     reference    where a force is what its number says, if there is such a place
+    places       of a curve's points, in the order of its numbers
     words        the other lines of its class (``needs_road = True``)
     """
 
@@ -63,6 +64,7 @@ class Draft:
     variant: str = ""
     at: str = ""
     reference: float = 0.0
+    places: tuple[float, ...] = ()
     words: tuple[str, ...] = ()
 
     @property

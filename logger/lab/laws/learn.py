@@ -5,7 +5,8 @@ Solution: first the known effects are searched, as in a diagnosis. Where nothing
 families of laws are screened on top of the model without effects, the promising ones are fitted, and the same evidence
 that chooses among effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no
 law alone explains what is missing, laws are tried together with the known effects that were found. Where these explain
-everything, a law replaces them only by decisive evidence.
+everything, a law replaces them only by decisive evidence. A law whose numbers mean nothing is refused, and so is one
+in whose place a known effect explains more.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from logger.lab.diagnosis import Diagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, LawContext
+from logger.lab.laws.refusals import Nearest, Refusal, known_instead, refusal
 from logger.lab.laws.screening import free_count, screen_law
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
@@ -77,26 +79,6 @@ class LawFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Nearest:
-    """The known effect that gains most in the place of a law: its numbers, its gain and the law's, in minus twice the
-    log of the evidence."""
-
-    one: Chosen
-    gain: float
-    law_gain: float
-
-    @property
-    def share(self) -> float:
-        """Share of the law's gain."""
-        return max(self.gain, 0.0) / self.law_gain
-
-    @property
-    def as_good(self) -> bool:
-        """Whether the two cannot be distinguished."""
-        return self.gain > self.law_gain - INDISTINGUISHABLE
-
-
-@dataclass(frozen=True, eq=False)
 class Law:
     """A law that was chosen.
 
@@ -126,6 +108,8 @@ class Learning:
     """The result of learning a law.
 
     law             None: none is learned
+    refused         the law that would have been, why it says nothing, or the known effect that explains more in its
+                    place; None: there was none
     context         at what the car does, which pictures of the law need
     verdict         names of the known effects that are missing where no law is learned, the most certain first
     listed_error    of the model with these, on what its fit did not see
@@ -139,6 +123,7 @@ class Learning:
     listed_error: float
     unexplained: bool
     diagnosis: Diagnosis | None
+    refused: Refusal | None = None
 
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
@@ -166,7 +151,11 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
     verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
     left = exceeds_noise(selection.now) if diagnosis is None else diagnosis.unexplained
-    return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis)
+    refused = choice.refused[-1] if law is None and choice.refused else None
+    if refused is not None and refused.known is not None:
+        better = refused.known.one.effect.name
+        verdict = (better, *(name for name in verdict if name != better))
+    return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis, refused)
 
 
 def exceeds_noise(model: Baseline) -> bool:
@@ -182,6 +171,7 @@ class _LawChoice:
 
     kept     models, with the laws that were fitted on top of each
     ended    laws that were fitted to the end, with their models and gains
+    refused  laws that say nothing, or less than a known effect
     """
 
     search: Search
@@ -191,6 +181,7 @@ class _LawChoice:
     effort: Effort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
     ended: dict[LawFit, tuple[Baseline, dict[str, float]]] = field(default_factory=dict)
+    refused: list[Refusal] = field(default_factory=list)
 
     def outdoes_two(self) -> bool:
         """Whether a law gains more than twice what the first known effect does. Two of them that explained as much
@@ -211,13 +202,16 @@ class _LawChoice:
         return replace(self, selection=search.go_on(selection))
 
     def explaining_all(self) -> Law | None:
-        """The law that explains everything by itself, better than the known effects; None where none does, or nothing
-        is missing."""
+        """The law that explains everything by itself, better than the known effects; None where none does. Where the
+        residual is no louder than the noise nothing is missing, but what is loud at one frequency alone: only laws of
+        that kind are tried."""
         now, before = self.selection.now, self.selection.before
+        choice = self
         if now is before and not exceeds_noise(now):
-            return None
+            lines = {name: one for name, one in self.families.items() if one.stands_out}
+            choice = replace(self, families=lines)
         least = 0.0 if exceeds_noise(now) else DECISIVE
-        return self._best(self._fits_to(before), now.score - least, explains_all=True)
+        return choice._best(choice._fits_to(before), now.score - least, explains_all=True)
 
     def with_effects(self) -> Law | None:
         """The best law together with known effects, or alone if it explains more than they do; None where these leave
@@ -232,8 +226,8 @@ class _LawChoice:
         return self._best([one for base in bases for one in self._fits_to(base)], now.score)
 
     def _best(self, fits: Sequence[LawFit], least: float, explains_all: bool = False) -> Law | None:
-        """The law with the most evidence; None where none scores less than ``least``, or it leaves something though it
-        is to explain all."""
+        """The law with the most evidence; None where none scores less than ``least``, it leaves something though it is
+        to explain all, or it is refused."""
         accepted = sorted((one for one in fits if one.score < least and self._is_accepted(one)),
                           key=lambda one: one.score)
         if not accepted:
@@ -244,13 +238,19 @@ class _LawChoice:
         model, gains = self.ended[best]
         if best.draft.name not in gains or model.score > least or (explains_all and exceeds_noise(model)):
             return None
+        gain = gains[best.draft.name]
+        why = refusal(best.family, best.draft, model)
+        nearest = None if why else self._nearest(model, best, gain)
+        if why := why or known_instead(best.draft, nearest):
+            self.refused.append(why)
+            return None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
         effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
         rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        return Law(best.family, best.draft, one, effects, model.state, gains[best.draft.name], before - now,
-                  before - model.score, rivals, self._nearest(model, best, gains[best.draft.name]))
+        return Law(best.family, best.draft, one, effects, model.state, gain, before - now, before - model.score, rivals,
+                   nearest)
 
     def _fit_in_full(self, best: LawFit) -> tuple[Baseline, dict[str, float]]:
         """The model with a law fitted to the end, without known effects that it needs no more, and the gains of what is

@@ -15,14 +15,15 @@ from logger.lab.laws.families.family import LawContext
 from logger.lab.laws.learn import Learning, learn
 from logger.plugins import catalogue
 from logger.store.formats.effect_file import own_effect, shipped_effects
-from logger.vehicle.effect import Chosen, ForceEffect, chosen
+from logger.vehicle.effect import Chosen, ForceEffect, RecordEffect, Recording, chosen
 from logger.vehicle.laws import CornerLaws, linear
 
-from ...support.lab.secret_runs import EFFECTS, hidden, posterior_of, secret_runs
+from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
 
 FAMILIES = catalogue("logger.lab.laws.families", "FAMILY")
 FEW = ("sensor_gain", "sensor_offset", "tire_damping", "damper_asymmetry")
 SQUARE_N_S2_PER_M2 = 2500.0
+HUM_HZ = 21.3
 
 
 class QuadraticDamping(ForceEffect):
@@ -77,6 +78,22 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
     true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
     assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)
+
+
+class Hum(RecordEffect):
+    """A tone of a fifth of the noise's r.m.s., which raises that by 2 %."""
+
+    name = "hum_of_a_fan"
+
+    def record(self, p: SimpleNamespace, recording: Recording) -> np.ndarray:
+        return recording.accel_z_mps2 + 0.2 * NOISE_MPS2 * np.sqrt(2) * np.sin(2 * np.pi * HUM_HZ * recording.time_s)
+
+
+@pytest.mark.slow
+def test_a_tone_is_learned_that_is_quieter_than_the_noise() -> None:
+    law = learned([chosen(Hum(), {})], rougher=2.0).law
+    assert law is not None and law.family.name == "hum"
+    assert law.one.values["frequency_hz"] == pytest.approx(HUM_HZ, abs=0.01)
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ class DampingByTravel(Family):
     title = "a damping that goes with the travel of the suspensions"
     related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
     shown_by = "drive a rough road slowly, so that the suspension travels far at different rates"
+    straight_at = 0.0
 
     def drafts(self, context: LawContext) -> list[Draft]:
         travel_m, rate_mps = context.reach("travel_m", 0.95), context.reach("rate_mps", 0.95)

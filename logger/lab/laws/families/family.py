@@ -22,6 +22,7 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
+_EXPONENT = "power_ratio"  # what laws that are powers call theirs
 FormatNumber = Callable[..., str]
 """A number of the law in words, with its standard error and unit, by its name: ``say("yield_force_n")`` is "161 ± 4 N";
 ``say("yield_travel_m", 1000.0, "mm")`` the number in another unit."""
@@ -85,12 +86,17 @@ class Family(ABC):
     title              in a few words
     related_effects    names of effects of the list that one of its laws may nearly be
     shown_by           the drive that shows it best, as an instruction
+    straight_at        the exponent at which its laws are straight lines, which are numbers of the car; None: at none
+    stands_out         whether its laws are loud at few frequencies and drafted only where those stand out of the noise:
+                       a whole residual may be no louder than the noise for all that
     """
 
     name: str
     title: str
     related_effects: tuple[str, ...] = ()
     shown_by: str
+    straight_at: float | None = None
+    stands_out: bool = False
 
     @abstractmethod
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -101,6 +107,13 @@ class Family(ABC):
         if draft.kind != "ForceEffect" or draft.axle:
             return []
         return [draft.of_axle(axle) for axle in context.axles]
+
+    def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
+        """Whether a law that was found is a straight line, within so many standard errors."""
+        if self.straight_at is None or _EXPONENT not in found.values:
+            return False
+        error = found.standard_errors.get(_EXPONENT, np.inf)
+        return abs(found.values[_EXPONENT] - self.straight_at) < sigma * error
 
     @abstractmethod
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

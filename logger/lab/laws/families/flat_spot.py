@@ -38,6 +38,7 @@ class FlatSpot(Family):
     name = "flat_spot"
     title = "a flat spot of a tire"
     shown_by = "drive a smooth road slowly, and look at the tires"
+    stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
         if not context.is_driven:

@@ -39,6 +39,7 @@ class Hum(Family):
     name = "hum"
     title = "a hum that the road does not cause"
     shown_by = "stand with the engine running, and drive one road in two gears"
+    stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
         hz = (_LOWEST_HZ, 0.37 * context.runs[0].rate_hz)

@@ -6,8 +6,9 @@ remaining speed away at once (B. Brogliato, Nonsmooth Mechanics, 2016, chapter 1
 coefficient of restitution of 0). The blow is in the record as wide as the recorder's filter makes it.
 
 When it lands goes with where it left, so that a fit has to begin within a few hundredths of what holds it: closely
-spaced values are tried on the model's record. Blows are all upwards, which the residual's skewness shows; where it has
-none, nothing is tried.
+spaced values are tried on the model's record. Blows are few and large, and upwards where flights are short; where they
+last, the record is behind for longer than it is ahead. The residual's kurtosis shows the one, its skewness the other;
+where it has neither, nothing is tried.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ _METHOD = """def record(self, p, recording):
 """
 _WEAKEST, _TRIED, _CLOSER = 0.02, 200, np.linspace(-0.02, 0.02, 17)
 """Of the greatest fall of the body; how many are tried up to there, two hundredths apart; and around the best."""
-_SKEWED = 10.0
-"""Standard errors of the skewness of white noise, sqrt(6 / n)."""
+_STANDS_OUT = 10.0
+"""Standard errors of the skewness of white noise, sqrt(6 / n), and of its kurtosis, sqrt(24 / n)."""
 
 
 class LooseSensor(Family):
@@ -72,10 +73,12 @@ class LooseSensor(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         residual = np.concatenate([one[run.first:] for run, one in zip(context.runs, context.residuals, strict=True)])
-        skewness = float(np.mean(residual**3) / np.mean(residual**2) ** 1.5)
+        size = residual / np.sqrt(np.mean(residual**2))
+        skewness, kurtosis = float(np.mean(size**3)), float(np.mean(size**4)) - 3
+        shown = max(abs(skewness) / np.sqrt(6), kurtosis / np.sqrt(24)) * np.sqrt(len(size))
         predicted = [run.main(one) for run, one in zip(context.runs, context.state.predictions, strict=True)]
         greatest = max(float(-one.min()) for one in predicted)
-        if skewness < _SKEWED * np.sqrt(6 / len(residual)) or not greatest > 0:
+        if shown < _STANDS_OUT or not greatest > 0:
             return []
         effect = self._draft(greatest, greatest).effect
         assert isinstance(effect, RecordEffect)

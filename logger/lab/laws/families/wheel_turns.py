@@ -39,6 +39,7 @@ class WheelTurns(Family):
     name = "wheel_turns"
     title = "a force that comes round with the wheels' turns"
     shown_by = "drive a smooth road at two steady speeds"
+    stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
         if not context.is_driven:
