@@ -275,14 +275,14 @@ class _LawChoice:
         context = LawContext(base.posterior, base.state)
         drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(context)]
         with ThreadPoolExecutor(search.workers) as pool:
-            promised = self._screen_all(pool, base, drafted)
+            screened = self._screen_all(pool, base, drafted)
             # The law with the largest gain of a family is varied.
-            best = list(_best_of_families(promised))[: effort.worth_narrowing]
+            best = list(_best_of_families(screened))[: effort.worth_narrowing]
             narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
-            promised = sorted([*promised, *self._screen_all(pool, base, narrower)],
+            screened = sorted([*screened, *self._screen_all(pool, base, narrower)],
                               key=lambda each: -self._screened_gain(base, each[2]))
-            enough = effort.fit_share * max(self._screened_gain(base, promised[0][2]), 0.0) if promised else 0.0
-            worth = [each for each in _most_of_each(promised, effort.of_a_family)[: effort.fitted]
+            enough = effort.fit_share * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
+            worth = [each for each in _most_of_each(screened, effort.of_a_family)[: effort.fitted]
                      if self._screened_gain(base, each[2]) > enough]
             search.progress(f"fitting {len(worth)} laws")
             rough = list(pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], worth))
@@ -336,20 +336,20 @@ class _LawChoice:
         return Nearest(nearest.chosen, nearest.gain, law_gain)
 
 
-def _best_of_families(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
+def _best_of_families(screened: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
     """The first law of each family, of laws in order."""
     found: dict[str, tuple[Family, Draft, Screened]] = {}
-    for each in promised:
+    for each in screened:
         found.setdefault(each[0].name, each)
     return list(found.values())
 
 
-def _most_of_each(promised: Sequence[tuple[Family, Draft, Screened]], most: int
+def _most_of_each(screened: Sequence[tuple[Family, Draft, Screened]], most: int
                   ) -> list[tuple[Family, Draft, Screened]]:
     """The first laws of each family, at most so many."""
     counts: Counter[str] = Counter()
     found = []
-    for each in promised:
+    for each in screened:
         counts[each[0].name] += 1
         if counts[each[0].name] <= most:
             found.append(each)
