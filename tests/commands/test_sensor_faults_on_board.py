@@ -64,7 +64,7 @@ def made(name: str, sensor: str) -> Case:
     return replace(whole, scene=scene, recordings=(run,))
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+def printed_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     """What a command prints as JSON."""
     capsys.readouterr()
     assert main([*map(str, arguments), "--json"]) == 0
@@ -74,7 +74,7 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, An
 
 def replayed(capsys: pytest.CaptureFixture[str], dump: Path, vehicle: Path, out: Path) -> list[float]:
     """The IRI of all windows of a replay [m/km]."""
-    told(capsys, "replay", dump, "--out", out, "--vehicle", vehicle)
+    printed_json(capsys, "replay", dump, "--out", out, "--vehicle", vehicle)
     rows = [row for path in sorted(out.glob("*.csv")) for row in csv.DictReader(path.read_text("utf-8").splitlines())]
     return [float(row["iri_m_per_km"]) for row in rows if row["iri_m_per_km"]]
 
@@ -92,10 +92,10 @@ def test_a_fault_in_the_file_is_put_right(
     plain.write_text(yaml.safe_dump(true), "utf-8")
     own.write_text(yaml.safe_dump({**true, "effects": [{"name": name, **FAULTS[name]}]}), "utf-8")
     noise = ["--noise", faulty.noise.white_mps2, "--step", faulty.noise.step_mps2]
-    before, after = (told(capsys, "estimate", tmp_path / "run1", "--vehicle", one, *noise)["comparison"]
+    before, after = (printed_json(capsys, "estimate", tmp_path / "run1", "--vehicle", one, *noise)["comparison"]
                      for one in (plain, own))
     (dump, line), = write_field(faulty, sensor, plain, tmp_path)
-    exact = told(capsys, "iri", line)["iri_m_per_km"]
+    exact = printed_json(capsys, "iri", line)["iri_m_per_km"]
     logged = [float(np.mean(replayed(capsys, dump, one, tmp_path / one.stem))) / exact - 1 for one in (plain, own)]
     with capsys.disabled():
         print(f"\n{name}, {sensor}: estimate R2 {before['r2']:.3f} -> {after['r2']:.3f}, bias {before['bias']:+.1%} -> "

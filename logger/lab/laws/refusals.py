@@ -3,9 +3,9 @@
 Problem: what no known effect explains, some law always explains a little better than others. The evidence counts its
 numbers; it does not ask whether they mean anything. Solution: a law that was fitted in full is refused where its
 strengths are within two standard errors of doing nothing (A. Wald's test, of all of them together: of two that cannot
-be told apart the sum may be well known), where its frequency is outside of the band that is compared or a number at an
-end of its range, where it is the straight line that is a number of the car already, and where a known effect explains
-more in its place.
+be distinguished the sum may be well known), where its frequency is outside of the band that is compared or a number at
+an end of its range, where it is the straight line that is a number of the car already, and where a known effect
+explains more in its place.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.uncertain import NumberErrors
 
 SIGMA = 2.0
-"""A number is told from another by more standard errors than this (one of twenty right ones is not)."""
+"""A number differs from another where more standard errors than this lie between (by chance, one time in 22)."""
 
 
 @dataclass(frozen=True, eq=False)
