@@ -5,7 +5,8 @@ it could be, and what these runs could not have shown anyway. Solution: a search
 names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor
 has where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
 with their priors. Where the car's numbers then lie beyond their tolerance on the whole, its file is a rough one: all of
-it is done again with a wider tolerance. Noise that has a colour is told from physics by what it does not depend on.
+it is done again with a wider tolerance. Noise that has a colour is distinguished from physics by what it does not
+depend on.
 """
 
 from __future__ import annotations
@@ -212,7 +213,7 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
-    effects_found, _ = standard_errors(after)
+    effects_found = standard_errors(after).effects
     progress("what these runs could not show")
     excess = excess_over_noise(fine, state, FALSE_ALARM)
     baseline = fine.start(present)
@@ -271,7 +272,7 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         after = fit_model(fine, start, selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
-            found = standard_errors(after)[0][search.present:]
+            found = standard_errors(after).effects[search.present:]
             weakest = min(found, key=deviations_from_null, default=None)
             if weakest is None or deviations_from_null(weakest) > UNUSUAL_SIGMA:
                 return selection, after

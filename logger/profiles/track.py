@@ -89,7 +89,7 @@ class Profiled(WheelTracks, Protocol):
 
 
 def under_surface(track: WheelTracks, surface: Surface) -> WheelTracks:
-    """What moves the wheels where a road differs from its profile. A rig does what it was told to."""
+    """What moves the wheels where a road differs from its profile. A rig does what it was commanded."""
     return track.resurfaced(surface) if surface and isinstance(track, Profiled) else track
 
 

@@ -153,9 +153,9 @@ def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: py
     assert not (tmp_path / "not" / "law.py").exists()
     out = tmp_path / "out"
     assert lab(runs, out, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["law"] == str(out / "law.py") and told["added"] == ["learned_force_by_rate"]
-    assert told["error_after"] < 1.1 * told["noise_floor_error"] and not told["unexplained"]
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["law"] == str(out / "law.py") and printed["added"] == ["learned_force_by_rate"]
+    assert printed["error_after"] < 1.1 * printed["noise_floor_error"] and not printed["unexplained"]
     assert [one.effect.name for one in read_model(out / "vehicle-1.yaml").effects] == ["learned_force_by_rate"]
     html = (out / "story.html").read_text("utf-8")
     for words in ("A law out of the data", "The law", "power_ratio", "with learned_force_by_rate"):

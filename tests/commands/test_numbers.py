@@ -41,6 +41,6 @@ def test_what_is_no_number_is_said_with_the_unit(parser: argparse.ArgumentParser
         parser.parse_args(["--tries", "1.5"])
 
 
-def test_an_equals_sign_in_place_of_the_colon_is_told() -> None:
+def test_an_equals_sign_in_place_of_the_colon_is_named() -> None:
     with pytest.raises(BadInput, match="--effect dry_friction=3: expected NAME:PARAM=VALUE"):
         named_numbers("dry_friction=3", "--effect")

@@ -44,14 +44,14 @@ def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "fig-4-25", "--quick", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["study", "where", "title", "covers", "words", "items", "how", "source", "failure", "tables",
-                          "verdict", "figures"]
-    assert told["failure"] is None
-    table = told["tables"][1]
+    printed = json.loads(capsys.readouterr().out)
+    assert list(printed) == ["study", "where", "title", "covers", "words", "items", "how", "source", "failure",
+                             "tables", "verdict", "figures"]
+    assert printed["failure"] is None
+    table = printed["tables"][1]
     assert all(len(row) == len(table["columns"]) for row in table["rows"])
-    assert told["figures"][0]["lines"][0]["name"] == "102 mm"
-    assert told["figures"][0]["printed"].startswith("peaks for heights of 101.6 to 203.2 mm")
+    assert printed["figures"][0]["lines"][0]["name"] == "102 mm"
+    assert printed["figures"][0]["printed"].startswith("peaks for heights of 101.6 to 203.2 mm")
 
 
 def test_all_with_one_that_fails(

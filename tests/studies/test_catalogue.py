@@ -132,10 +132,10 @@ def test_an_item_whose_checks_come_to_another_word_says_so() -> None:
     assert study.words == "agrees, not reproducible"
     assert [names for names, _ in study.groups] == [("Fig 1", "Fig 2"), ("Fig 3",)]
     assert not study.differs(Result((), "", values=about(("Fig 1", "Fig 2"), [check])))
-    told = study.differs(Result((), "", values=about(("Fig 1", "Fig 3"), [check])))
-    assert "Fig 2 (by its checks: not reproducible, expected: agrees)" in told
-    assert "Fig 3 (by its checks: agrees, expected: not reproducible)" in told
-    assert "Fig 1" not in told
+    message = study.differs(Result((), "", values=about(("Fig 1", "Fig 3"), [check])))
+    assert "Fig 2 (by its checks: not reproducible, expected: agrees)" in message
+    assert "Fig 3 (by its checks: agrees, expected: not reproducible)" in message
+    assert "Fig 1" not in message
 
 
 def test_effort() -> None:

@@ -54,7 +54,7 @@ def test_the_wheels_meet_the_road_and_not_its_profile(tracks: int) -> None:
     np.testing.assert_array_equal(recorded(compose(CAR), passages[0]), plain)  # nothing of it stays
 
 
-def test_a_rig_does_what_it_was_told() -> None:
+def test_a_rig_does_what_it_was_commanded() -> None:
     rig = Passage(Excitation(100.0, 0.01 * np.sin(np.arange(400) / 7)), 100.0, np.zeros(400))
     np.testing.assert_array_equal(recorded(compose(CAR, [chosen(Raises(), {"size": 2.0})]), rig),
                                   recorded(compose(CAR), rig))

@@ -5,8 +5,8 @@ Solution: first the known effects are searched, as in a diagnosis. Where nothing
 families of laws are screened on top of the model without effects, the promising ones are fitted, and the same evidence
 that chooses among effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no
 law alone explains what is missing, laws are tried together with the known effects that were found. Where these explain
-everything, a law replaces them only by decisive evidence. A law whose numbers mean nothing is refused, and so is one
-in whose place a known effect explains more.
+everything, a law replaces them only by decisive evidence. A law whose numbers mean nothing is refused, and the next
+one is tried; one in whose place a known effect explains more is refused for that effect.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ class Effort:
     fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
                                     their own
     fit_share, refine_share         of what the best one promises, and gains
+    in_full                         laws that are fitted to the end, where those before are refused as saying nothing
     """
 
     listed: int = 2
@@ -58,6 +59,7 @@ class Effort:
     refined: int = 2
     fit_share: float = 0.2
     refine_share: float = 0.5
+    in_full: int = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +173,7 @@ class _LawChoice:
 
     kept     models, with the laws that were fitted on top of each
     ended    laws that were fitted to the end, with their models and gains
-    refused  laws that say nothing, or less than a known effect
+    refused  laws that say nothing, or less than a known effect; the last one is reported
     """
 
     search: Search
@@ -209,7 +211,7 @@ class _LawChoice:
         choice = self
         if now is before and not exceeds_noise(now):
             lines = {name: one for name, one in self.families.items() if one.stands_out}
-            choice = replace(self, families=lines)
+            choice = replace(self, families=lines, kept=[])
         least = 0.0 if exceeds_noise(now) else DECISIVE
         return choice._best(choice._fits_to(before), now.score - least, explains_all=True)
 
@@ -226,27 +228,37 @@ class _LawChoice:
         return self._best([one for base in bases for one in self._fits_to(base)], now.score)
 
     def _best(self, fits: Sequence[LawFit], least: float, explains_all: bool = False) -> Law | None:
-        """The law with the most evidence; None where none scores less than ``least``, it leaves something though it is
-        to explain all, or it is refused."""
+        """The law with the most evidence, of those that say something; None where none scores less than ``least``, it
+        leaves something though it is to explain all, or a known effect explains more in its place."""
         accepted = sorted((one for one in fits if one.score < least and self._is_accepted(one)),
                           key=lambda one: one.score)
-        if not accepted:
-            return None
-        best = self._simplest(accepted)
-        if best not in self.ended:
-            self.ended[best] = self._fit_in_full(best)
-        model, gains = self.ended[best]
-        if best.draft.name not in gains or model.score > least or (explains_all and exceeds_noise(model)):
-            return None
-        gain = gains[best.draft.name]
-        why = refusal(best.family, best.draft, model)
-        nearest = None if why else self._nearest(model, best, gain)
-        if why := why or known_instead(best.draft, nearest):
-            self.refused.append(why)
-            return None
+        for _ in range(self.effort.in_full):
+            if not accepted:
+                break
+            best = self._simplest(accepted)
+            accepted.remove(best)
+            if best not in self.ended:
+                self.ended[best] = self._fit_in_full(best)
+            model, gains = self.ended[best]
+            if best.draft.name not in gains or model.score > least or (explains_all and exceeds_noise(model)):
+                break
+            if why := refusal(best.family, best.draft, model):
+                self.refused.append(why)
+                continue
+            gain = gains[best.draft.name]
+            nearest = self._nearest(model, best, gain)
+            if why := known_instead(best.draft, nearest):
+                self.refused.append(why)
+                break
+            return self._law(best, model, gain, nearest, accepted)
+        return None
+
+    def _law(self, best: LawFit, model: Baseline, gain: float, nearest: Nearest | None, others: Sequence[LawFit]
+             ) -> Law:
+        """The law that was chosen, in the model that was fitted to the end."""
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
         effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
-        rivals = tuple(_best_of_each(other for other in accepted if other.family is not best.family
+        rivals = tuple(_best_of_each(other for other in others if other.family is not best.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
         return Law(best.family, best.draft, one, effects, model.state, gain, before - now, before - model.score, rivals,

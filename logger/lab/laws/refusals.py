@@ -18,7 +18,7 @@ from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.signals import JointBands
-from logger.lab.likelihood.standard_errors import deviations_from_null, number_errors, standard_errors
+from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.stepwise import is_outside_data
@@ -70,9 +70,9 @@ class Refusal:
 
 def refusal(family: Family, draft: Draft, model: Baseline) -> Refusal | None:
     """Why a law in a model that was fitted with it says nothing; None where it says something."""
-    effects, _ = standard_errors(model.linear)
-    one = next(each for each in effects if each.effect.name == draft.name)
-    if does_nothing(one, number_errors(model.linear)):
+    errors = standard_errors(model.linear)
+    one = next(each for each in errors.effects if each.effect.name == draft.name)
+    if does_nothing(one, errors.numbers):
         return Refusal(draft.title, f"its strength is within {SIGMA:g} standard errors of doing nothing")
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)

@@ -37,9 +37,9 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     linear, state = base.linear, base.state
     effects = (*state.effects, chosen(draft.effect, values))
     last = len(effects) - 1
-    moves = [FreeParameter(last, place) for place, one in enumerate(draft.effect.parameters)
-             if one.name in draft.strengths]
-    slopes = effect_slopes(linear, effects, state.logs, moves, state.record, base.rough)
+    strengths = [FreeParameter(last, place) for place, one in enumerate(draft.effect.parameters)
+                 if one.name in draft.strengths]
+    slopes = effect_slopes(linear, effects, state.logs, strengths, state.record, base.rough)
     white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(state.logs, white)
     p = linear.count
@@ -48,6 +48,6 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     scale = np.where(size > 0, size, 1.0)
     step = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-8, hermitian=True) @ (gradient / scale) / scale
     without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
-    there = with_coordinates(effects, moves, coordinates_of(effects, moves) + step[p:])
+    there = with_coordinates(effects, strengths, coordinates_of(effects, strengths) + step[p:])
     change = [step[p:] @ one for one in slopes]
     return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p], change)

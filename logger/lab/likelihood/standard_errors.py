@@ -7,7 +7,7 @@ to a diagonal of ones before it is inverted.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,33 +23,30 @@ from logger.vehicle.uncertain import NumberErrors
 Array = npt.NDArray[np.float64]
 
 
-def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
-    """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
+@dataclass(frozen=True, eq=False)
+class StandardErrors:
+    """Standard errors of a fitted model.
 
-    Both include the priors: a number of the car that the runs say nothing of is as uncertain as before. An error that
-    is larger than the whole range of an effect's number is infinite.
+    effects    its effects, with those of their numbers; larger than the whole range of a number: infinite
+    logs       of the logarithms of the car's numbers (p,)
+    numbers    of all numbers of car and effects, in their own units, with their correlations
     """
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    numbers: NumberErrors
+
+
+def standard_errors(found: LinearModel) -> StandardErrors:
+    """Standard errors of a fitted model, with the priors: a number of the car that the runs say nothing of is as
+    uncertain as before."""
     linear, state = found.without_soft_bounds(), found.state
-    deviations = np.sqrt(np.maximum(np.diag(_covariance(linear)), 0.0))
+    covariance = _covariance(linear)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     own, free_parameters = deviations[linear.count:], free_parameters_of(state.effects)
     ranges = [range_of(state.effects[free.effect].effect.parameters[free.parameter]) for free in free_parameters]
-    return (with_standard_errors(state.effects, free_parameters, np.where(own < ranges, own, np.inf)),
-            deviations[: linear.count])
-
-
-def number_errors(found: LinearModel) -> NumberErrors:
-    """Standard errors and correlations of the numbers of the car and of its effects, in their own units; as
-    ``standard_errors``."""
-    linear, state = found.without_soft_bounds(), found.state
-    prior, free_parameters = linear.posterior.prior, free_parameters_of(state.effects)
-    vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
-    names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
-    for free in free_parameters:
-        one = state.effects[free.effect]
-        parameter = one.effect.parameters[free.parameter]
-        names.append(f"{one.effect.name}.{parameter.name}")
-        units.append(1 / slope_of(parameter, one.values[parameter.name]))
-    return NumberErrors.of_covariance(names, _covariance(linear) * np.outer(units, units))
+    effects = with_standard_errors(state.effects, free_parameters, np.where(own < ranges, own, np.inf))
+    return StandardErrors(effects, deviations[: linear.count], _number_errors(linear, covariance))
 
 
 def deviations_from_null(one: Chosen) -> float:
@@ -62,6 +59,19 @@ def deviations_from_null(one: Chosen) -> float:
             null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
             found.append(abs((parameter.coordinate(value) - null) / (error * slope_of(parameter, value))))
     return max(found, default=float("inf"))
+
+
+def _number_errors(linear: LinearModel, covariance: Array) -> NumberErrors:
+    """Standard errors and correlations in the numbers' own units, by their covariance on the scales of the fit."""
+    prior, state = linear.posterior.prior, linear.state
+    vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
+    names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
+    for free in free_parameters_of(state.effects):
+        one = state.effects[free.effect]
+        parameter = one.effect.parameters[free.parameter]
+        names.append(f"{one.effect.name}.{parameter.name}")
+        units.append(1 / slope_of(parameter, one.values[parameter.name]))
+    return NumberErrors.of_covariance(names, covariance * np.outer(units, units))
 
 
 def _covariance(linear: LinearModel) -> Array:

@@ -23,7 +23,7 @@ from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.standard_errors import number_errors, standard_errors
+from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
@@ -180,15 +180,15 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
                read(found, name) * float(now), read(vehicle, name))
         for name, was, now in zip(prior.names, errors_before, errors_after, strict=True)
     )
-    effects, _ = standard_errors(after)
+    errors = standard_errors(after)
     start, state = posterior.start(present), after.state
     return AddedEffects(
-        vehicle, effects, tuple(one.effect.name for one in added), numbers,
+        vehicle, errors.effects, tuple(one.effect.name for one in added), numbers,
         error_before=posterior.error(start), error_refitted=posterior.error(before.state),
         error_after=posterior.error(state),
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-        p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
+        p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=errors.numbers,
         unseen_before=cross_validate(before, own_slopes(before)), unseen_after=cross_validate(after, own_slopes(after)),
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
         tolerance=posterior.tolerance.share)
@@ -210,4 +210,4 @@ def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel, fitted: C
     """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
     if found.posterior.prior.at_soft_bounds(found.state.logs):
         found = fitted(LinearModel(unbounded, found.state), found.numbers)
-    return found, standard_errors(found)[1]
+    return found, standard_errors(found).logs

@@ -23,7 +23,7 @@ def is_file_rough(before: LinearModel, after: LinearModel, effects_found: bool) 
     posterior = after.posterior
     if not posterior.may_be_rough:
         return False
-    if posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after)[1]):
+    if posterior.prior.off_on_the_whole(after.state.logs, standard_errors(after).logs):
         return True
     return effects_found and _do_numbers_explain_all(before, after)
 

@@ -4,7 +4,7 @@ Problem: a receiver's speeds put a drive on the road to a tenth of a metre withi
 minute, each drive differently. At the frequency of the wheels' bounce that is a wave of the road, and effects that damp
 it or delay the record imitate the blur. Solution: the record of each drive is compared, window by window, with what the
 others make a model of the car expect there (``lab.likelihood.lag``), and its distances are moved by the lags, again and
-again until these are small. A delay of the record moves with them: of such drives it cannot be told from the
+again until these are small. A delay of the record moves with them: of such drives it cannot be distinguished from the
 receiver's.
 """
 

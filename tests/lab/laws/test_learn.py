@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.families.family import Family, FormatNumber, LawContext
 from logger.lab.laws.learn import Learning, learn
 from logger.plugins import catalogue
 from logger.store.formats.effect_file import own_effect, shipped_effects
@@ -78,6 +78,34 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
     true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
     assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)
+
+
+class Straight(Family):
+    """A family whose laws are another's, and are refused."""
+
+    name, title = "straight", "a straight line"
+
+    def __init__(self, family: Family) -> None:
+        self.family, self.shown_by = family, family.shown_by
+
+    def drafts(self, context: LawContext) -> list[Draft]:
+        return self.family.drafts(context)
+
+    def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
+        return True
+
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
+        return self.title
+
+
+@pytest.mark.slow
+def test_the_law_after_one_that_is_refused_is_learned() -> None:
+    right, progress = FAMILIES["force_by_rate"], list[str]()
+    posterior = posterior_of(secret_runs([chosen(QuadraticDamping(), {})], rougher=2.0))
+    few = {name: EFFECTS[name] for name in FEW[:2]}
+    law = learn(posterior, few, {one.name: one for one in (Straight(right), right)}, EFFECTS, (), progress.append).law
+    assert f"{Straight.title}: fitting the car with it" in progress
+    assert law is not None and law.family is right
 
 
 class Hum(RecordEffect):

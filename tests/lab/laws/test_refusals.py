@@ -51,7 +51,7 @@ def errors_of(one: Chosen, correlation: float) -> NumberErrors:
 
 
 @pytest.mark.parametrize(("deviations", "nothing"), [(1.9, True), (2.1, False), (np.inf, True)])
-def test_a_strength_is_told_from_nothing_by_two_standard_errors(deviations: float, nothing: bool) -> None:
+def test_a_strength_is_distinguished_from_nothing_by_two_standard_errors(deviations: float, nothing: bool) -> None:
     draft = drafts(FACTOR)["pole"]
     error = np.inf if np.isinf(deviations) else 0.1
     one = found(draft, [0.1 * min(deviations, 9.0), 5.0], [error, 1.0])
@@ -59,7 +59,7 @@ def test_a_strength_is_told_from_nothing_by_two_standard_errors(deviations: floa
 
 
 @pytest.mark.parametrize("correlation", [-0.999, 0.0, 0.9])
-def test_two_strengths_are_told_from_nothing_together(correlation: float) -> None:
+def test_two_strengths_are_distinguished_from_nothing_together(correlation: float) -> None:
     """By the distribution that their squares have, in the coordinates in which they do not hang together."""
     draft, off = drafts(FACTOR)[TWO], np.array([1.2, 1.4])
     one = found(draft, [*(0.1 * off), 5.0, 0.2], [0.1, 0.1, 1.0, 0.1])

@@ -15,7 +15,7 @@ from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors, with_standard_errors
-from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.effect import Chosen, Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.effect_sizes import grows_with_mass
 
@@ -33,6 +33,12 @@ def found() -> LinearModel:
     return fit(align(posterior, posterior.start([tire_damping(200.0)])))
 
 
+def errors_of(model: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
+    """The effects with their errors, and those of the logarithms of the car's numbers (p,)."""
+    errors = standard_errors(model)
+    return errors.effects, errors.logs
+
+
 @pytest.mark.parametrize(("name", "values", "errors", "far"), [
     ("sensor_offset", {"offset_m": -0.06}, {"offset_m": 0.02}, 3.0),
     ("damper_asymmetry", {"rebound_to_bump_ratio": 2.0}, {"rebound_to_bump_ratio": 0.1}, 20 * np.log(2.0)),
@@ -41,7 +47,7 @@ def found() -> LinearModel:
     ("wheel_lift", {}, {}, np.inf),
     ("sensor_offset", {"offset_m": 0.1}, {"offset_m": np.inf}, np.inf),
 ])
-def test_how_far_an_effect_is_from_doing_nothing_is_told_on_the_scale_of_its_strength(
+def test_how_far_an_effect_is_from_doing_nothing_is_measured_on_the_scale_of_its_strength(
         name: str, values: dict[str, float], errors: dict[str, float], far: float) -> None:
     assert deviations_from_null(replace(hidden(name, **values), standard_errors=errors)) == pytest.approx(far)
 
@@ -53,7 +59,7 @@ def test_numbers_are_off_by_as_much_as_their_errors_say(size: ErrorSize) -> None
     for seed in range(SEEDS):
         case = drawn([tire_damping(300.0)], seed, size)
         one = fit(align(case.posterior, case.posterior.start([tire_damping(200.0)])))
-        (tires,), deviations = standard_errors(one)
+        (tires,), deviations = errors_of(one)
         cars.append((one.state.logs - case.logs) / deviations)
         effects.append((tires.values[NAME] - 300.0) / tires.standard_errors[NAME])
     # Of 312 numbers of cars the r.m.s. scatters by 0.06, as those of one car err together; of 24 effects by 0.15.
@@ -63,7 +69,7 @@ def test_numbers_are_off_by_as_much_as_their_errors_say(size: ErrorSize) -> None
 
 
 def test_no_number_is_less_certain_than_its_prior_and_what_the_runs_do_not_show_as_uncertain() -> None:
-    _, deviations = standard_errors(found())
+    _, deviations = errors_of(found())
     prior = found().posterior.prior
     share = dict(zip(prior.names, deviations / prior.deviations, strict=True))
     assert max(share.values()) <= 1.0 + 1e-9
@@ -73,13 +79,13 @@ def test_no_number_is_less_certain_than_its_prior_and_what_the_runs_do_not_show_
 def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
     loud = posterior_of(noisy_runs([tire_damping(300.0)], noise_mps2=0.2))
     there = fit(align(loud, loud.start([tire_damping(200.0)])))
-    quiet, noisy = (standard_errors(one)[0][0].standard_errors[NAME] for one in (found(), there))
+    quiet, noisy = (standard_errors(one).effects[0].standard_errors[NAME] for one in (found(), there))
     assert 1.5 < noisy / quiet < 4.5  # of four times the noise: the priors of the car's numbers hold part of it
 
 
 def test_errors_are_the_roots_of_the_inverse_information_whatever_the_units() -> None:
     """A cubic stiffness of 1e6 beside a ratio of 1: the plain inverse is right too, where it is well enough scaled."""
-    (tires,), deviations = standard_errors(found())
+    (tires,), deviations = errors_of(found())
     linear, state = found().without_soft_bounds(), found().state
     information = linear.information(state.logs)
     alone = np.sqrt(np.diag(np.linalg.inv(information)))
@@ -99,8 +105,8 @@ def test_a_number_that_changes_nothing_is_wholly_uncertain_and_leaves_the_others
     posterior, state = found().posterior, found().state
     more = posterior.state_at([*state.effects, chosen(Nothing(), {"gain": 1.0})], state.logs, state.record, state.size)
     one = fit(LinearModel(posterior, more), found().numbers, rounds=1)
-    (tires, nothing), deviations = standard_errors(one)
-    (before,), alone = standard_errors(found())
+    (tires, nothing), deviations = errors_of(one)
+    (before,), alone = errors_of(found())
     assert nothing.standard_errors["gain"] == np.inf
     assert tires.standard_errors[NAME] == pytest.approx(before.standard_errors[NAME], rel=0.1)
     assert deviations == pytest.approx(alone, rel=0.1)
@@ -129,7 +135,7 @@ def test_how_heavy_a_car_that_rubs_is_only_its_prior_tells() -> None:
     posterior = posterior_of(noisy_runs([friction]))
     state = posterior.start([friction])
     found = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
-    effects, deviations = standard_errors(found)
+    effects, deviations = errors_of(found)
     masses = [grows_with_mass(name) for name in posterior.prior.names]
     least = posterior.prior.deviations[masses][0] / np.sqrt(np.count_nonzero(masses))
     assert (deviations[masses] > 0.99 * least).all()

@@ -1,4 +1,4 @@
-"""Noise that falls or rises with frequency is told from what grows with the motion, on records made by chance."""
+"""Noise that falls or rises with frequency is no motion of the car: on records made by chance."""
 
 from __future__ import annotations
 

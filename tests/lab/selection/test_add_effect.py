@@ -164,7 +164,7 @@ def test_standard_errors_are_as_large_as_numbers_are_off() -> None:
         rng = np.random.default_rng(seed)
         posterior = posterior_of(SimulatedRuns([
             measuring(run, run.measured_mps2 + rng.normal(0, 0.2, run.count)) for run in clean], 500.0))
-        (one,), _ = standard_errors(fit_to_the_end(align(posterior, posterior.start([there]))))
+        (one,) = standard_errors(fit_to_the_end(align(posterior, posterior.start([there])))).effects
         if seed == 0:  # what ``add`` reports is just that
             (added,) = add(posterior, [], [there]).effects
             assert (added.values, added.standard_errors) == (pytest.approx(one.values, rel=0.02),
