@@ -41,7 +41,8 @@ GUARD_WEIGHT = 0.05  # keeps the magnitude sane between the end of the fit and h
 # beside the right one.
 LOW_PASS_ZEROS = (-0.5, 0.0)
 POINTS = 150
-EVALUATIONS = 2000
+# A fit in a valley goes on for thousands and gains nothing: all of the folder's weightings are within 0.002 dB by then.
+EVALUATIONS = 300
 
 
 @dataclass(frozen=True)
@@ -142,9 +143,10 @@ class _Fit:
             start[:count],
             jac=lambda x: weighted(self.slopes(np.append(x, delay))[:, :count]),
             x_scale="jac",
+            method="lm",
             max_nfev=EVALUATIONS,
-            ftol=1e-11,
-            xtol=1e-11,
+            ftol=1e-8,
+            xtol=1e-8,
             gtol=1e-14,
         )
         return np.append(found.x, delay)

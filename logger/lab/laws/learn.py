@@ -160,11 +160,14 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis, refused)
 
 
+def is_above_noise(model: Baseline) -> bool:
+    """Whether the residual of a model is above the sensor's noise."""
+    return excess_over_noise(model.posterior, model.state, FALSE_ALARM) > UNEXPLAINED
+
+
 def exceeds_noise(model: Baseline) -> bool:
     """Whether the residual of a model is above the sensor's noise, or a number of the car is beyond its soft bounds."""
-    posterior, state = model.posterior, model.state
-    return (excess_over_noise(posterior, state, FALSE_ALARM) > UNEXPLAINED
-            or posterior.prior.at_soft_bounds(state.logs))
+    return is_above_noise(model) or model.posterior.prior.at_soft_bounds(model.state.logs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +243,9 @@ class _LawChoice:
             if best not in self.ended:
                 self.ended[best] = self._fit_in_full(best)
             model, gains = self.ended[best]
-            if best.draft.name not in gains or model.score > least or (explains_all and exceeds_noise(model)):
+            if explains_all and exceeds_noise(model) and best.draft.name in gains and model.score < least:
+                model, gains = self.ended[best] = self._with_known_on_top(model)
+            if best.draft.name not in gains or model.score > least or (explains_all and is_above_noise(model)):
                 break
             if why := refusal(best.family, best.draft, model):
                 self.refused.append(why)
@@ -271,6 +276,11 @@ class _LawChoice:
         found = best.fit.found
         fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
         return self.search.eliminate_backward(self.selection.before, fitted)
+
+    def _with_known_on_top(self, model: Baseline) -> tuple[Baseline, dict[str, float]]:
+        """A model with a law, and with known effects that it lacks besides; and the gains of all of them."""
+        found = self.search.with_more_given(1, self.effort.listed).run(model)
+        return self.search.eliminate_backward(self.selection.before, found.now)
 
     def _fits_to(self, base: Baseline) -> list[LawFit]:
         """Laws fitted on top of a model, kept from earlier calls."""

@@ -110,6 +110,11 @@ class Search:
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[Baseline, dict[str, Baseline]] | None = None
 
+    def with_more_given(self, more: int, effects: int) -> Search:
+        """A search of its own for up to so many effects, on models in which so many more are given."""
+        return Search(self.effects, self.present + more, self.misalignment, self.progress, self.workers,
+                      replace(self.effort, effects=effects))
+
     def run(self, before: Baseline) -> Selection:
         """Search on top of a fitted model."""
         return self.go_on(Selection(before, before, {}, {}, Round((), ()), ()))

@@ -18,7 +18,7 @@ from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.5  # of the suspension's own stiffness, and of the mass of a wheel where there is no spring
-_HZ = (4.0, 8.0, 16.0)
+_HZ = (4.0, 8.0, 16.0, 32.0)  # octaves, up to the end of the band that is compared
 
 _FUNCTIONS = """
 def force(p, seen):
