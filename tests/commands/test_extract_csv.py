@@ -87,7 +87,7 @@ def test_every_layout_at_any_angle_gives_what_the_car_did(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("layout", ["phyphox", "own_names"])
+@pytest.mark.parametrize("layout", ["phyphox", pytest.param("own_names", marks=pytest.mark.release)])
 def test_the_lab_finds_the_same_error_as_on_the_true_drive(
         layout: str, drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
     done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs",

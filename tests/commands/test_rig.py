@@ -255,7 +255,7 @@ def test_two_more_signals_name_and_measure_the_friction(bench: Path, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["random", "sweep"])
+@pytest.mark.parametrize("kind", [pytest.param("random", marks=pytest.mark.release), "sweep"])
 def test_dry_friction_in_a_bench_rig_is_named_and_measured(
         bench: Path, tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """0.5 N in a rig of 25 N. The force is known to the tolerance of the masses at best, as forces over masses move."""

@@ -7,6 +7,7 @@ import csv
 import json
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -80,8 +81,9 @@ def replayed(capsys: pytest.CaptureFixture[str], dump: Path, vehicle: Path, out:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sensor", ["serial", "bma220"])
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize(("name", "sensor"), [
+    pytest.param(name, sensor, marks=[pytest.mark.release] if number % 2 else [])
+    for number, (sensor, name) in enumerate(product(("serial", "bma220"), FAULTS))])
 def test_a_fault_in_the_file_is_put_right(
     name: str, sensor: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,13 +27,14 @@ from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, screen
 from logger.lab.selection.stepwise import Effort as Usual
 from logger.lab.selection.stepwise import Search, Selection
 from logger.vehicle.effect import Chosen, Effect
 
 Progress = Callable[[str], None]
+_ScreenedLaw = tuple[Family, Draft, Screened]
 
 DECISIVE = 2 * INDISTINGUISHABLE
 """What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
@@ -47,7 +48,7 @@ class Effort:
                                     where no law alone explains what is left
     worth_narrowing                 families of which one axle alone is tried
     fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
-                                    their own
+                                    their own; as many as ``of_a_family`` of the best one's where that leaves much
     fit_share, refine_share         of what the best one promises, and gains
     in_full                         laws that are fitted to the end, where those before are refused as saying nothing
     """
@@ -292,33 +293,50 @@ class _LawChoice:
         return fits
 
     def _fit_laws(self, base: Baseline) -> list[LawFit]:
-        """Screen and fit the laws of all families on top of a model."""
-        search, effort = self.search, self.effort
+        """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, the
+        other laws of its family are refined as well: screening, one step from nothing, says little of strong ones."""
+        effort = self.effort
+        with ThreadPoolExecutor(self.search.workers) as pool:
+            screened = self._screen_families(pool, base)
+            enough = effort.fit_share * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
+            worth = [each for each in screened if self._screened_gain(base, each[2]) > enough]
+            first = _most_of_each(worth, effort.of_a_family)[: effort.fitted]
+            fits = self._fit_screened(pool, base, first, effort.refined, effort.refine_share,
+                                      self.search.effort.round_share * base.explanation)
+            best = min(fits, key=lambda one: one.score, default=None)
+            if best is not None and best.fit.gain < (1 - IMITATION) * base.explanation:
+                more = [each for each in worth if each[0] is best.family and each[1] is not best.draft]
+                fits += self._fit_screened(pool, base, more[: effort.of_a_family], effort.of_a_family)
+        return sorted(fits, key=lambda one: one.score)
+
+    def _screen_families(self, pool: ThreadPoolExecutor, base: Baseline) -> list[_ScreenedLaw]:
+        """Screenings of the laws of all families on top of a model, the largest gain first. The law with the largest
+        gain of a family is varied."""
         context = LawContext(base.posterior, base.state)
         drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(context)]
-        with ThreadPoolExecutor(search.workers) as pool:
-            screened = self._screen_all(pool, base, drafted)
-            # The law with the largest gain of a family is varied.
-            best = list(_best_of_families(screened))[: effort.worth_narrowing]
-            narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
-            screened = sorted([*screened, *self._screen_all(pool, base, narrower)],
-                              key=lambda each: -self._screened_gain(base, each[2]))
-            enough = effort.fit_share * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
-            worth = [each for each in _most_of_each(screened, effort.of_a_family)[: effort.fitted]
-                     if self._screened_gain(base, each[2]) > enough]
-            search.progress(f"fitting {len(worth)} laws")
-            rough = list(pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], worth))
-            found = sorted(zip(worth, rough, strict=True), key=lambda pair: -pair[1].gain)
-            near = [fit for _, fit in found[: effort.refined] if fit.gain > effort.refine_share * found[0][1].gain]
-            search.progress(f"refining {len(near)} laws")
-            fine = list(pool.map(lambda fit: refine(
-                base.score, fit, search.effort.round_share * base.explanation), near))
+        screened = self._screen_all(pool, base, drafted)
+        best = list(_best_of_families(screened))[: self.effort.worth_narrowing]
+        narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
+        return sorted([*screened, *self._screen_all(pool, base, narrower)],
+                      key=lambda each: -self._screened_gain(base, each[2]))
+
+    def _fit_screened(self, pool: ThreadPoolExecutor, base: Baseline, screened: Sequence[_ScreenedLaw],
+                      most: int, share: float = 0.0, worth: float = 0.0) -> list[LawFit]:
+        """Fits of screened laws, best first; at most so many that gain more than a share of the best one's gain are
+        refined, in rounds that gain more than ``worth``."""
+        progress = self.search.progress
+        progress(f"fitting {len(screened)} laws")
+        rough = list(pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], screened))
+        found = sorted(zip(screened, rough, strict=True), key=lambda pair: -pair[1].gain)
+        near = [fit for _, fit in found[:most] if fit.gain > share * found[0][1].gain]
+        progress(f"refining {len(near)} laws")
+        fine = list(pool.map(lambda fit: refine(base.score, fit, worth), near))
         fits = [*fine, *(fit for _, fit in found[len(near):])]
         return [LawFit(family, draft, base, fit)
                 for ((family, draft, _), _), fit in zip(found, fits, strict=True)]
 
     def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
-                  ) -> list[tuple[Family, Draft, Screened]]:
+                  ) -> list[_ScreenedLaw]:
         """Screenings of laws on top of a model, the largest gain first."""
         found = []
         for done, ((family, draft), one) in enumerate(zip(drafted, pool.map(
@@ -358,16 +376,16 @@ class _LawChoice:
         return Nearest(nearest.chosen, nearest.gain, law_gain)
 
 
-def _best_of_families(screened: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
+def _best_of_families(screened: Sequence[_ScreenedLaw]) -> list[_ScreenedLaw]:
     """The first law of each family, of laws in order."""
-    found: dict[str, tuple[Family, Draft, Screened]] = {}
+    found: dict[str, _ScreenedLaw] = {}
     for each in screened:
         found.setdefault(each[0].name, each)
     return list(found.values())
 
 
-def _most_of_each(screened: Sequence[tuple[Family, Draft, Screened]], most: int
-                  ) -> list[tuple[Family, Draft, Screened]]:
+def _most_of_each(screened: Sequence[_ScreenedLaw], most: int
+                  ) -> list[_ScreenedLaw]:
     """The first laws of each family, at most so many."""
     counts: Counter[str] = Counter()
     found = []

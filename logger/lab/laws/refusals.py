@@ -92,10 +92,13 @@ def known_instead(draft: Draft, nearest: Nearest | None) -> Refusal | None:
 
 def does_nothing(one: Chosen, errors: NumberErrors) -> bool:
     """Whether the strengths of a fitted law are together no farther from doing nothing than chance takes one number by
-    ``SIGMA`` standard errors; or none of them is known."""
+    ``SIGMA`` standard errors; or none of them is known. A law without a strength (its number is a length, on a scale
+    that has no zero) always does something."""
     from scipy.special import gammaincc
 
     strengths = [each for each in one.effect.parameters if each.is_free and each.null is not None]
+    if not strengths:
+        return False
     strengths = [each for each in strengths if np.isfinite(one.standard_errors.get(each.name, np.inf))]
     if not strengths:
         return True

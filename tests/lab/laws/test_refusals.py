@@ -20,6 +20,7 @@ from logger.lab.likelihood.map_fit import fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.screening import Baseline
+from logger.plugins import catalogue
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.uncertain import NumberErrors
@@ -30,6 +31,7 @@ from ...support.lab.secret_runs import EFFECTS, FINE_HZ, hidden, posterior_of, s
 from ..likelihood.test_signals import with_signals
 
 TWO = "pair_5"
+FAMILIES = catalogue("logger.lab.laws.families", "FAMILY")
 
 
 def drafts(family: Family) -> dict[str, Draft]:
@@ -56,6 +58,14 @@ def test_a_strength_is_distinguished_from_nothing_by_two_standard_errors(deviati
     error = np.inf if np.isinf(deviations) else 0.1
     one = found(draft, [0.1 * min(deviations, 9.0), 5.0], [error, 1.0])
     assert does_nothing(one, errors_of(one, 0.0)) is nothing
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_law_whose_numbers_are_well_known_does_something(family: str) -> None:
+    for draft in drafts(FAMILIES[family]).values():
+        values = draft.effect.trials()[0].values()
+        one = found(draft, list(values), [1e-3 * abs(value) for value in values])
+        assert not does_nothing(one, errors_of(one, 0.0))
 
 
 @pytest.mark.parametrize("correlation", [-0.999, 0.0, 0.9])

@@ -204,7 +204,7 @@ def test_a_bracket_and_a_bending_body_are_distinguished_though_one_can_take_the_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scale", "delay_s"), [(1.01, 0.05), (1.02, 0.08)])
+@pytest.mark.parametrize(("scale", "delay_s"), [(1.01, 0.05), pytest.param(1.02, 0.08, marks=pytest.mark.release)])
 def test_a_wrong_speed_and_a_late_clock_are_both_found_though_either_alone_gains_little(
         scale: float, delay_s: float) -> None:
     both = [hidden("speed_scale", scale=scale), hidden("time_offset", delay_s=delay_s)]

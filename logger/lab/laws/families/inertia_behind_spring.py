@@ -19,6 +19,7 @@ from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.5  # of the suspension's own stiffness, and of the mass of a wheel where there is no spring
 _HZ = (4.0, 8.0, 16.0, 32.0)  # octaves, up to the end of the band that is compared
+_RATIOS = (0.05, 0.2)  # an inerter's bearings hardly damp it, a mount's channel does
 
 _FUNCTIONS = """
 def force(p, seen):
@@ -53,7 +54,7 @@ class InertiaBehindSpring(Family):
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
                       "of the spring, where the inertia behind it stands still"),
             Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"),
-            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, (0.2,), "of its motion", step=0.01),
+            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, _RATIOS, "of its motion", step=0.01),
             Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
                       "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
         common: dict[str, Any] = {
