@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.outputs import check_out
-from logger.commands.lab_model import add_bench_arguments, bench, progress, tell_slow
+from logger.commands.lab_model import add_bench_arguments, bench, progress, warn_of_slow_effects
 from logger.commands.numbers import named_numbers
 from logger.errors import EXIT_DONE
 
@@ -63,5 +63,5 @@ def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, fl
     ``Bench.asked_for``."""
     name, values = named_numbers(text, "add-effect")
     effect, file = given.asked_for(name, values, text)
-    tell_slow([effect])
+    warn_of_slow_effects([effect])
     return effect, file, values

@@ -53,10 +53,10 @@ def run(args: argparse.Namespace) -> int:
         return board.unmounted(args.unmounted)
     if args.mounted and not args.to.is_mount():
         reason = f"{args.to}: no stick could be mounted there; expected one with FAT or exFAT"
-        board.tell("unmounting", False, reason)
+        board.report("unmounting", False, reason)
         print(printable(reason))
         return EXIT_CHECK_FAILED
-    board.tell("copying", True, "copying")
+    board.report("copying", True, "copying")
     try:
         config = _settings(args.config, args.logs)
         logs = args.logs if args.logs is not None else config.log.directory
@@ -64,10 +64,10 @@ def run(args: argparse.Namespace) -> int:
             raise BadInput(f"{logs}: expected a folder with the logs; --from LOGDIR names another")
         result = export(logs, args.to, args.dumps, board.progress, config.pairing, by_hand=not args.mounted)
     except RidelogError as error:
-        board.tell("unmounting", False, str(error))
+        board.report("unmounting", False, str(error))
         raise
     is_well = result.complete and result.unmarked is None
-    board.tell("unmounting", is_well, summary(result))
+    board.report("unmounting", is_well, summary(result))
     if args.json:
         print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
     else:
@@ -144,7 +144,7 @@ class _Board:
         self._note = note
         self._led = led
 
-    def tell(self, state: StickState, ok: bool, text: str) -> None:
+    def report(self, state: StickState, ok: bool, text: str) -> None:
         if self._note is not None:
             before = read_note(self._note)
             try:
@@ -157,18 +157,18 @@ class _Board:
                 self._show()
 
     def progress(self, progress: Progress) -> None:
-        self.tell("copying", True, f"copying, {progress.done} of {progress.total} files")
+        self.report("copying", True, f"copying, {progress.done} of {progress.total} files")
 
     def unmounted(self, place: Path) -> int:
         """After the unmounting: only now may the stick be pulled."""
         before = read_note(self._note) if self._note is not None else None
         if place.is_mount():
-            self.tell("unmounting", False, f"{place} is still mounted; shut down before pulling it")
+            self.report("unmounting", False, f"{place} is still mounted; shut down before pulling it")
             return EXIT_CHECK_FAILED
         if before is None or before.state in ("waiting", "copying"):
-            self.tell("ready", False, f"copying did not end as it should; {_PULL}")
+            self.report("ready", False, f"copying did not end as it should; {_PULL}")
         else:
-            self.tell("ready", before.ok, f"{before.text}; {_PULL}")
+            self.report("ready", before.ok, f"{before.text}; {_PULL}")
         return EXIT_DONE
 
     def removed(self) -> int:

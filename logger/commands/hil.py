@@ -162,7 +162,7 @@ def _play(args: argparse.Namespace, config: Config) -> Sent:
             stack.callback(ports[source].close)
             print(f"{source} to {name} at {bauds[source]} baud", file=sys.stderr)
         try:
-            return send(recording.events, ports, _now_us, time.sleep, _tell)
+            return send(recording.events, ports, _now_us, time.sleep, _show)
         finally:
             print(file=sys.stderr)
 
@@ -171,7 +171,7 @@ def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
     return wired(reader.header, reader, args.seconds, f"{args.dump}:1")
 
 
-def _tell(played_s: float) -> None:
+def _show(played_s: float) -> None:
     print(f"\rplaying: {played_s:.0f} s", end="", file=sys.stderr, flush=True)
 
 

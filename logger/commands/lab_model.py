@@ -99,7 +99,7 @@ def warned(words: str) -> None:
     print(words, file=sys.stderr, flush=True)
 
 
-def tell_slow(effects: Iterable[Effect]) -> None:
+def warn_of_slow_effects(effects: Iterable[Effect]) -> None:
     """Say so where simulations with these effects take long."""
     from logger.api.bench import slow_words
 
@@ -118,7 +118,7 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 def on_screen() -> Callable[[str], None]:
     """Progress on one line of the terminal, on stderr; said to nobody where that is no terminal."""
-    return _tell if sys.stderr.isatty() else _say_nothing
+    return _show if sys.stderr.isatty() else _show_nothing
 
 
 def wipe() -> None:
@@ -127,9 +127,9 @@ def wipe() -> None:
         print("\r" + " " * (WIDTH - 1) + "\r", end="", file=sys.stderr, flush=True)
 
 
-def _tell(words: str) -> None:
+def _show(words: str) -> None:
     print(f"\r{words[:WIDTH - 1]:{WIDTH - 1}}", end="", file=sys.stderr, flush=True)
 
 
-def _say_nothing(_words: str) -> None:
+def _show_nothing(_words: str) -> None:
     pass

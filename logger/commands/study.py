@@ -78,8 +78,8 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
     if args.out is not None and not args.out.parent.is_dir():
         raise BadInput(f"--out {args.out}: expected a folder {args.out.parent}, found none")
-    tell = show_progress if sys.stderr.isatty() else _say_nothing
-    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell, args.folder, args.vehicle))
+    show = show_progress if sys.stderr.isatty() else _show_nothing
+    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, show, args.folder, args.vehicle))
     if args.out is not None:
         from logger.report.study_page import page
 
@@ -131,7 +131,7 @@ def show_progress(done: int, of: int) -> None:
           flush=True)
 
 
-def _say_nothing(_done: int, _of: int) -> None:
+def _show_nothing(_done: int, _of: int) -> None:
     pass
 
 

@@ -26,7 +26,7 @@ from logger.lab.laws.screening import free_count, screen_law
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
+from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine, refine_to_the_end
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, screen
 from logger.lab.selection.stepwise import Effort as Usual
@@ -48,7 +48,7 @@ class Effort:
                                     where no law alone explains what is left
     worth_narrowing                 families of which one axle alone is tried
     fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
-                                    their own; as many as ``of_a_family`` of the best one's where that leaves much
+                                    their own
     fit_share, refine_share         of what the best one promises, and gains
     in_full                         laws that are fitted to the end, where those before are refused as saying nothing
     """
@@ -293,20 +293,22 @@ class _LawChoice:
         return fits
 
     def _fit_laws(self, base: Baseline) -> list[LawFit]:
-        """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, the
-        other laws of its family are refined as well: screening, one step from nothing, says little of strong ones."""
-        effort = self.effort
+        """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, laws
+        of its family are fitted to the end: screening, one step from nothing, says little of which is right."""
+        effort, round_gain = self.effort, self.search.effort.round_share * base.explanation
         with ThreadPoolExecutor(self.search.workers) as pool:
             screened = self._screen_families(pool, base)
             enough = effort.fit_share * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
             worth = [each for each in screened if self._screened_gain(base, each[2]) > enough]
-            first = _most_of_each(worth, effort.of_a_family)[: effort.fitted]
-            fits = self._fit_screened(pool, base, first, effort.refined, effort.refine_share,
-                                      self.search.effort.round_share * base.explanation)
+            fits = self._fit_roughly(pool, base, _most_of_each(worth, effort.of_a_family)[: effort.fitted])
+            least = effort.refine_share * fits[0].fit.gain if fits else 0.0
+            near = [one for one in fits[: effort.refined] if one.fit.gain > least]
+            fits[: len(near)] = self._refine(pool, near, lambda fit: refine(base.score, fit, round_gain))
             best = min(fits, key=lambda one: one.score, default=None)
             if best is not None and best.fit.gain < (1 - IMITATION) * base.explanation:
-                more = [each for each in worth if each[0] is best.family and each[1] is not best.draft]
-                fits += self._fit_screened(pool, base, more[: effort.of_a_family], effort.of_a_family)
+                alike = [each for each in worth if each[0] is best.family][: effort.of_a_family]
+                fits = [one for one in fits if one.family is not best.family] + self._refine(
+                    pool, self._fit_roughly(pool, base, alike), lambda fit: refine_to_the_end(base.score, fit))
         return sorted(fits, key=lambda one: one.score)
 
     def _screen_families(self, pool: ThreadPoolExecutor, base: Baseline) -> list[_ScreenedLaw]:
@@ -320,20 +322,18 @@ class _LawChoice:
         return sorted([*screened, *self._screen_all(pool, base, narrower)],
                       key=lambda each: -self._screened_gain(base, each[2]))
 
-    def _fit_screened(self, pool: ThreadPoolExecutor, base: Baseline, screened: Sequence[_ScreenedLaw],
-                      most: int, share: float = 0.0, worth: float = 0.0) -> list[LawFit]:
-        """Fits of screened laws, best first; at most so many that gain more than a share of the best one's gain are
-        refined, in rounds that gain more than ``worth``."""
-        progress = self.search.progress
-        progress(f"fitting {len(screened)} laws")
-        rough = list(pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], screened))
-        found = sorted(zip(screened, rough, strict=True), key=lambda pair: -pair[1].gain)
-        near = [fit for _, fit in found[:most] if fit.gain > share * found[0][1].gain]
-        progress(f"refining {len(near)} laws")
-        fine = list(pool.map(lambda fit: refine(base.score, fit, worth), near))
-        fits = [*fine, *(fit for _, fit in found[len(near):])]
-        return [LawFit(family, draft, base, fit)
-                for ((family, draft, _), _), fit in zip(found, fits, strict=True)]
+    def _fit_roughly(self, pool: ThreadPoolExecutor, base: Baseline, screened: Sequence[_ScreenedLaw]) -> list[LawFit]:
+        """Rough fits of screened laws, best first."""
+        self.search.progress(f"fitting {len(screened)} laws")
+        fits = pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], screened)
+        laws = [LawFit(family, draft, base, fit) for (family, draft, _), fit in zip(screened, fits, strict=True)]
+        return sorted(laws, key=lambda one: one.score)
+
+    def _refine(self, pool: ThreadPoolExecutor, fits: Sequence[LawFit], how: Callable[[CandidateFit], CandidateFit]
+                ) -> list[LawFit]:
+        """Fits of laws, refined."""
+        self.search.progress(f"refining {len(fits)} laws")
+        return [replace(one, fit=fit) for one, fit in zip(fits, pool.map(lambda one: how(one.fit), fits), strict=True)]
 
     def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
                   ) -> list[_ScreenedLaw]:

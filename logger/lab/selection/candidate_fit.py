@@ -9,7 +9,7 @@ from math import prod
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, fit, optimise_numbers, own_slopes, relinearise
+from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, own_slopes, relinearise
 from logger.lab.likelihood.posterior import State
 from logger.lab.selection.evidence import probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
@@ -74,6 +74,12 @@ def fit_roughly(score: float, base: Baseline, screen: Screened) -> list[Candidat
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """Fit a candidate again with derivatives of its own."""
     found = MapFit.of(fit(one.found.linearise(), one.found.numbers, rounds, worth))
+    return CandidateFit(found, score - found.score)
+
+
+def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:
+    """Refine a candidate until nothing is gained."""
+    found = MapFit.of(fit_to_the_end(one.found.linearise(), one.found.numbers))
     return CandidateFit(found, score - found.score)
 
 

@@ -101,11 +101,11 @@ class _CardFault(Exception):
     """The card did not give a file."""
 
 
-def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
+def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
            by_hand: bool = False) -> ExportResult:
     """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
 
-    ``tell`` is called before the first file and after each. What the stick or the card refuses is in the result.
+    ``report`` is called before the first file and after each. What the stick or the card refuses is in the result.
     Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them, and
     CheckFailed for a stick that ``pairing`` refuses. Who copies ``by_hand`` gets a copy anywhere, which counts as an
     export where the stick is paired.
@@ -130,7 +130,7 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
                 if not by_hand:
                     name = pair_first(pairing, card, own, name)
                 trusted = trusted_sticks(pairing, card)
-                return _Export(card, own, identity, tell, name, trusted is None or name in trusted).run(names)
+                return _Export(card, own, identity, report, name, trusted is None or name in trusted).run(names)
         except OSError as error:
             reason = f"{manifest.FOLDER}/{identity} on the stick: {_reason(error)}"
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
@@ -153,12 +153,12 @@ class _Export:
     """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. What is copied is
     only marked where it ``counts``."""
 
-    def __init__(self, card: DirectoryHandle, stick: DirectoryHandle, identity: str, tell: Callable[[Progress], None],
+    def __init__(self, card: DirectoryHandle, stick: DirectoryHandle, identity: str, report: Callable[[Progress], None],
                  name: str, counts: bool) -> None:
         self._card = card
         self._stick = stick
         self._identity = identity
-        self._tell = tell
+        self._report = report
         self._name = name
         self._counts = counts
         self._marks = read_marks(card)
@@ -182,7 +182,7 @@ class _Export:
         fitting, short = self._fitting(missing) if missing else ([], 0)
         for number, name in enumerate(fitting, start=1):
             fault = self._copy_one(name)
-            self._tell(Progress(len(self._there) + number, len(names)))
+            self._report(Progress(len(self._there) + number, len(names)))
             if fault is not None:
                 self._failures += [Failure(rest, fault) for rest in fitting[number:]]
                 break
@@ -201,10 +201,10 @@ class _Export:
         """Those of the files that are not on the stick."""
         missing: list[str] = []
         for number, name in enumerate(names):
-            self._tell(Progress(number - len(missing), len(names)))
+            self._report(Progress(number - len(missing), len(names)))
             if not self._is_there(name):
                 missing.append(name)
-        self._tell(Progress(len(names) - len(missing), len(names)))
+        self._report(Progress(len(names) - len(missing), len(names)))
         return missing
 
     def _is_there(self, name: str) -> bool:
