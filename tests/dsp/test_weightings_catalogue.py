@@ -144,9 +144,10 @@ def test_gravity_and_the_end_of_a_record_leave_its_beginning_alone() -> None:
     ("name", "rate_hz"),
     [
         ("wd", 80.0),
+        ("wb", 84.0),
         ("wb", 500.0),
-        pytest.param("wb", 1000.0, marks=pytest.mark.slow),
-        pytest.param("wb", 1250.0, marks=pytest.mark.slow),
+        ("wb", 1000.0),
+        ("wb", 1250.0),
         ("wc", 256.0),
         ("we", 2000.0),
         ("wj", 1000.0),

@@ -4,9 +4,10 @@ Problem: something is missing that is none of the known effects, and a diagnosis
 Solution: first the known effects are searched, as in a diagnosis. Where nothing is missing, nothing is learned. Else
 families of laws are screened on top of the model without effects, the promising ones are fitted, and the same evidence
 that chooses among effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no
-law alone explains what is missing, laws are tried together with the known effects that were found. Where these explain
-everything, a law replaces them only by decisive evidence. A law whose numbers mean nothing is refused, and the next
-one is tried; one in whose place a known effect explains more is refused for that effect.
+law alone explains what is missing, and known effects do not either, the two are tried together: laws on top of the
+known effects, and known effects on top of the best law. Where known effects explain everything, a law replaces them
+only by decisive evidence. A law whose numbers mean nothing is refused, and the next one is tried; one in whose place a
+known effect explains more is refused for that effect.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ DECISIVE = 2 * INDISTINGUISHABLE
 class Effort:
     """How much work the choice of a law takes.
 
-    listed                          how many known effects are sought first, unless a law outdoes them; all as usual
-                                    where no law alone explains what is left
+    listed                          how many known effects are sought first, unless a law outdoes them, and on top of a
+                                    law; all as usual where no law alone explains what is left
     worth_narrowing                 families of which one axle alone is tried
     fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
                                     their own
-    fit_share, refine_share         of what the best one promises, and gains
-    in_full                         laws that are fitted to the end, where those before are refused as saying nothing
+    fit_share, refine_share         of what the best one is predicted to gain, and gains
+    in_full                         how many laws are tried, one after the other, where those before say nothing
     """
 
     listed: int = 2
@@ -74,6 +75,11 @@ class LawFit:
     draft: Draft
     base: Baseline
     fit: CandidateFit
+
+    @property
+    def name(self) -> str:
+        """Name of its law among all that are drafted, on whatever model it was fitted."""
+        return f"{self.draft.name} {self.draft.variant}"
 
     @property
     def score(self) -> float:
@@ -154,7 +160,7 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
     verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
     left = exceeds_noise(selection.now) if diagnosis is None else diagnosis.unexplained
-    refused = choice.refused[-1] if law is None and choice.refused else None
+    refused = choice.refusal_to_report() if law is None else None
     if refused is not None and refused.known is not None:
         better = refused.known.one.effect.name
         verdict = (better, *(name for name in verdict if name != better))
@@ -177,7 +183,7 @@ class _LawChoice:
 
     kept     models, with the laws that were fitted on top of each
     ended    laws that were fitted to the end, with their models and gains
-    refused  laws that say nothing, or less than a known effect; the last one is reported
+    refused  laws that say nothing, or less than a known effect, in the order in which they were tried
     """
 
     search: Search
@@ -187,7 +193,7 @@ class _LawChoice:
     effort: Effort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
     ended: dict[LawFit, tuple[Baseline, dict[str, float]]] = field(default_factory=dict)
-    refused: list[Refusal] = field(default_factory=list)
+    refused: dict[str, Refusal] = field(default_factory=dict)
 
     def outdoes_two(self) -> bool:
         """Whether a law gains more than twice what the first known effect does. Two of them that explained as much
@@ -207,10 +213,14 @@ class _LawChoice:
         search.effort = replace(search.effort, effects=most)
         return replace(self, selection=search.go_on(selection))
 
+    def refusal_to_report(self) -> Refusal | None:
+        """The first refusal for a known effect, which is the better answer, else the first one."""
+        return next((one for one in self.refused.values() if one.known), next(iter(self.refused.values()), None))
+
     def explaining_all(self) -> Law | None:
-        """The law that explains everything by itself, better than the known effects; None where none does. Where the
-        residual is no louder than the noise nothing is missing, but what is loud at one frequency alone: only laws of
-        that kind are tried."""
+        """The law that by itself leaves no more than noise, better than the known effects; None where none does. Where
+        the residual is no louder than the noise nothing is missing, but what is loud at one frequency alone: only laws
+        of that kind are tried."""
         now, before = self.selection.now, self.selection.before
         choice = self
         if now is before and not exceeds_noise(now):
@@ -225,39 +235,66 @@ class _LawChoice:
         now, before = self.selection.now, self.selection.before
         if not exceeds_noise(now):
             return None
-        names = now.state.names[self.search.present:]
-        bases = [before, now] if names else [before]
-        if len(names) == 2:  # one of them may only imitate the law
-            bases += [self.search.without(now, name) for name in names]
-        return self._best([one for base in bases for one in self._fits_to(base)], now.score)
+        alone = self._fits_to(before)
+        if (first := self._first(alone, np.inf)) is not None:
+            self._add_known(first)
+        return self._best(alone if now is before else [*alone, *self._fits_to(now)], now.score)
 
     def _best(self, fits: Sequence[LawFit], least: float, explains_all: bool = False) -> Law | None:
-        """The law with the most evidence, of those that say something; None where none scores less than ``least``, it
-        leaves something though it is to explain all, or a known effect explains more in its place."""
-        accepted = sorted((one for one in fits if one.score < least and self._is_accepted(one)),
-                          key=lambda one: one.score)
-        for _ in range(self.effort.in_full):
+        """The law with the most evidence, of those that say something; None where none scores less than ``least``, the
+        best one is above the noise though it is to explain all, or a known effect explains more in its place."""
+        best = self._first(fits, least)
+        if best is None:
+            return None
+        model, gains = self.ended[best]
+        if explains_all and is_above_noise(model):
+            return None
+        gain = gains[best.draft.name]
+        nearest = self._nearest(model, best, gain)
+        if why := known_instead(best.draft, nearest):
+            self.refused[best.name] = why
+            return None
+        return self._law(best, model, gain, nearest, self._accepted(fits, least))
+
+    def _first(self, fits: Sequence[LawFit], least: float) -> LawFit | None:
+        """The first law that says something once it is fitted to the end, of those that score less than ``least``, as
+        many as are tried; it is in ``ended`` then."""
+        tried: list[LawFit] = []
+        while len(tried) < self.effort.in_full:
+            accepted = [one for one in self._accepted(fits, least) if one not in tried]
             if not accepted:
                 break
             best = self._simplest(accepted)
-            accepted.remove(best)
+            tried.append(best)
             if best not in self.ended:
                 self.ended[best] = self._fit_in_full(best)
             model, gains = self.ended[best]
-            if explains_all and exceeds_noise(model) and best.draft.name in gains and model.score < least:
-                model, gains = self.ended[best] = self._with_known_on_top(model)
-            if best.draft.name not in gains or model.score > least or (explains_all and is_above_noise(model)):
-                break
-            if why := refusal(best.family, best.draft, model):
-                self.refused.append(why)
+            if best.draft.name not in gains or model.score > least:
                 continue
-            gain = gains[best.draft.name]
-            nearest = self._nearest(model, best, gain)
-            if why := known_instead(best.draft, nearest):
-                self.refused.append(why)
-                break
-            return self._law(best, model, gain, nearest, accepted)
+            if why := refusal(best.family, best.draft, model):
+                self.refused[best.name] = why
+                continue
+            return best
         return None
+
+    def _accepted(self, fits: Sequence[LawFit], least: float) -> list[LawFit]:
+        """Laws that are accepted, were not refused, and score less than ``least``, best first."""
+        return sorted((one for one in fits
+                       if self._score(one) < least and one.name not in self.refused and self._is_accepted(one)),
+                      key=self._score)
+
+    def _score(self, one: LawFit) -> float:
+        """Minus twice the log of the evidence of a law's model, as far as it was fitted."""
+        return self.ended[one][0].score if one in self.ended else one.score
+
+    def _add_known(self, one: LawFit) -> None:
+        """Seek known effects on top of a law that was fitted to the end; kept where they help and it is still needed
+        beside them."""
+        model, _ = self.ended[one]
+        on_top = self.search.with_more_given(1, self.effort.listed).run(model).now
+        found, gains = self.search.eliminate_backward(self.selection.before, on_top)
+        if one.draft.name in gains and found.score < model.score:
+            self.ended[one] = found, gains
 
     def _law(self, best: LawFit, model: Baseline, gain: float, nearest: Nearest | None, others: Sequence[LawFit]
              ) -> Law:
@@ -278,11 +315,6 @@ class _LawChoice:
         fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
         return self.search.eliminate_backward(self.selection.before, fitted)
 
-    def _with_known_on_top(self, model: Baseline) -> tuple[Baseline, dict[str, float]]:
-        """A model with a law, and with known effects that it lacks besides; and the gains of all of them."""
-        found = self.search.with_more_given(1, self.effort.listed).run(model)
-        return self.search.eliminate_backward(self.selection.before, found.now)
-
     def _fits_to(self, base: Baseline) -> list[LawFit]:
         """Laws fitted on top of a model, kept from earlier calls."""
         for known, fits in self.kept:
@@ -293,8 +325,8 @@ class _LawChoice:
         return fits
 
     def _fit_laws(self, base: Baseline) -> list[LawFit]:
-        """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, laws
-        of its family are fitted to the end: screening, one step from nothing, says little of which is right."""
+        """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, up to
+        ``of_a_family`` laws of its family are fitted to the end: a rough fit says little of which of them is right."""
         effort, round_gain = self.effort, self.search.effort.round_share * base.explanation
         with ThreadPoolExecutor(self.search.workers) as pool:
             screened = self._screen_families(pool, base)
@@ -305,10 +337,13 @@ class _LawChoice:
             near = [one for one in fits[: effort.refined] if one.fit.gain > least]
             fits[: len(near)] = self._refine(pool, near, lambda fit: refine(base.score, fit, round_gain))
             best = min(fits, key=lambda one: one.score, default=None)
-            if best is not None and best.fit.gain < (1 - IMITATION) * base.explanation:
-                alike = [each for each in worth if each[0] is best.family][: effort.of_a_family]
+            if best is not None and 0 < best.fit.gain < (1 - IMITATION) * base.explanation:
+                alike = [one for one in fits if one.family is best.family]
+                more = [each for each in worth if each[0] is best.family
+                        and all(each[1] is not one.draft for one in alike)]
+                alike += self._fit_roughly(pool, base, more[: effort.of_a_family - len(alike)])
                 fits = [one for one in fits if one.family is not best.family] + self._refine(
-                    pool, self._fit_roughly(pool, base, alike), lambda fit: refine_to_the_end(base.score, fit))
+                    pool, alike, lambda fit: refine_to_the_end(base.score, fit))
         return sorted(fits, key=lambda one: one.score)
 
     def _screen_families(self, pool: ThreadPoolExecutor, base: Baseline) -> list[_ScreenedLaw]:
@@ -357,8 +392,8 @@ class _LawChoice:
     def _simplest(self, fits: Sequence[LawFit]) -> LawFit:
         """The law with the fewest effects besides it, and then the fewest numbers, of those that cannot be
         distinguished from the first."""
-        near = [one for one in fits if one.score < fits[0].score + INDISTINGUISHABLE]
-        return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
+        near = [one for one in fits if self._score(one) < self._score(fits[0]) + INDISTINGUISHABLE]
+        return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), self._score(one)))
 
     def _nearest(self, model: Baseline, best: LawFit, law_gain: float) -> Nearest | None:
         """The known effect that gains most in the place of the law, of those related to its family."""

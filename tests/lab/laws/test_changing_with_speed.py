@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,17 +18,36 @@ from logger.vehicle.vehicle import Axle, Vehicle
 
 from ...support.lab.secret_runs import CAR, SPEEDS_MPS, posterior_of, secret_runs
 
-NUMBERS = {"dampers": ("suspension_damping_n_s_per_m", 300.0), "springs": ("suspension_stiffness_n_per_m", 5000.0),
-           "tires": ("tire_stiffness_n_per_m", 40000.0)}
+SHARE = 0.3
+MEAN_MPS = float(np.mean(SPEEDS_MPS))
 
 
-def car_with_more(number: str, more: float) -> Vehicle:
-    """The car, with so much more at both axles."""
+def car_with_more(number: str, more: float = 0.0, share: float = 0.0) -> Vehicle:
+    """The car, with so much more at both axles, or with so large a share more of what each has."""
     def changed(axle: Axle) -> Axle:
-        return replace(axle, **{number: getattr(axle, number) + more})
+        return replace(axle, **{number: (1 + share) * getattr(axle, number) + more})
 
     assert CAR.rear is not None
     return replace(CAR, front=changed(CAR.front), rear=changed(CAR.rear))
+
+
+def stiffer(number: str, more: float) -> Callable[[float], Vehicle]:
+    return lambda speed_mps: car_with_more(number, more * (speed_mps / MEAN_MPS - 1))
+
+
+def firmer(speed_mps: float) -> Vehicle:
+    return car_with_more("suspension_damping_n_s_per_m", share=SHARE * (speed_mps / MEAN_MPS - 1))
+
+
+def bent(speed_mps: float) -> Vehicle:
+    return car_with_more("suspension_damping_n_s_per_m", share=SHARE if speed_mps > MEAN_MPS else -0.5 * SHARE)
+
+
+CARS: dict[str, tuple[tuple[float, ...], Callable[[float], Vehicle]]] = {
+    "dampers": ((SHARE,), firmer), "bent dampers": ((-0.5 * SHARE, SHARE), bent),
+    "springs": ((5000.0,), stiffer("suspension_stiffness_n_per_m", 5000.0)),
+    "tires": ((40000.0,), stiffer("tire_stiffness_n_per_m", 40000.0)),
+}
 
 
 def steady_runs() -> list[Run]:
@@ -37,18 +57,17 @@ def steady_runs() -> list[Run]:
             for run, speed_mps in zip(secret_runs().runs, SPEEDS_MPS, strict=True)]
 
 
-@pytest.mark.parametrize("of", NUMBERS)
+@pytest.mark.parametrize("of", CARS)
 def test_at_one_speed_it_is_a_car_with_another_number(of: str) -> None:
     runs = steady_runs()
     posterior = posterior_of(SimulatedRuns(runs))
     draft, = (one for one in FAMILY.drafts(LawContext(posterior, posterior.start())) if one.variant == of)
-    number, changed = NUMBERS[of]
-    mean_mps = float(np.mean(SPEEDS_MPS))
-    law = chosen(draft.effect, {draft.strengths[0]: changed})
+    values, car_at = CARS[of]
+    law = chosen(draft.effect, dict(zip(draft.strengths, values, strict=True)))
     for run, speed_mps in zip(runs, SPEEDS_MPS, strict=True):
         one = SimulatedRuns([run])
         (with_law,), (there,), (before,) = (one.predict(compose(car, effects)) for car, effects in (
-            (CAR, [law]), (car_with_more(number, changed * (speed_mps / mean_mps - 1)), []), (CAR, [])))
+            (CAR, [law]), (car_at(speed_mps), []), (CAR, [])))
         assert np.std(with_law - there) < 0.001 * np.std(before - there)
 
 

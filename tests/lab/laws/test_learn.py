@@ -61,6 +61,11 @@ def test_the_file_of_a_law_is_an_effect_of_ones_own(draft: Draft, tmp_path: Path
     assert max(map(len, path.read_text("utf-8").splitlines())) <= 120
 
 
+def test_each_law_has_a_name_of_its_own() -> None:
+    names = [f"{draft.name} {draft.variant}" for draft in drafts()]
+    assert len(set(names)) == len(names)
+
+
 def test_a_law_of_one_axle_leaves_the_other_alone() -> None:
     one = next(one for one in drafts() if one.axle == "rear")
     assert isinstance(one.effect, ForceEffect)

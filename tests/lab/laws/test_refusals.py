@@ -32,6 +32,8 @@ from ..likelihood.test_signals import with_signals
 
 TWO = "pair_5"
 FAMILIES = catalogue("logger.lab.laws.families", "FAMILY")
+DRAFTED = sorted(FAMILIES.keys() - {"flat_spot", "hum", "loose_sensor", "wheel_turns"})
+"""Families that draft laws whatever the runs are; the others do where a residual shows their marks."""
 
 
 def drafts(family: Family) -> dict[str, Draft]:
@@ -60,9 +62,11 @@ def test_a_strength_is_distinguished_from_nothing_by_two_standard_errors(deviati
     assert does_nothing(one, errors_of(one, 0.0)) is nothing
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", DRAFTED)
 def test_a_law_whose_numbers_are_well_known_does_something(family: str) -> None:
-    for draft in drafts(FAMILIES[family]).values():
+    laws = drafts(FAMILIES[family])
+    assert laws
+    for draft in laws.values():
         values = draft.effect.trials()[0].values()
         one = found(draft, list(values), [1e-3 * abs(value) for value in values])
         assert not does_nothing(one, errors_of(one, 0.0))

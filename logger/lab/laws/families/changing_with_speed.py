@@ -1,10 +1,11 @@
 """Dampers, springs or tires that change with the driving speed: adaptive dampers that grow firm, air springs that
 stiffen as they are lowered, tires that spin.
 
-A damping or a stiffness k that was taken for fixed is k + d (v / v0 - 1) at the speed v, with v0 the mean speed of the
-runs. Beyond the speeds that these had it stays what it was at their ends, for nothing is known there. Adaptive dampers:
-S. M. Savaresi et al., Semi-Active Suspension Control Design for Vehicles (2010), chapter 2; a tire that spins: H. B.
-Pacejka, Tire and Vehicle Dynamics (2012), chapter 9.
+A stiffness k that was taken for fixed is k + d (v / v0 - 1) at the speed v, with v0 the mean speed of the runs. Dampers
+change by a share of what each axle has, as a controller sets all of them alike: in a straight line, or in one that
+bends at v0, because few controllers go on at the same pace. Beyond the speeds that the runs had it stays what it was at
+their ends, for nothing is known there. Adaptive dampers: S. M. Savaresi et al., Semi-Active Suspension Control Design
+for Vehicles (2010), chapter 2; a tire that spins: H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9.
 """
 
 from __future__ import annotations
@@ -15,21 +16,31 @@ from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_FUNCTIONS = """
+_STIFFNESS = """
 def changed(p, seen):
     speed_mps = np.minimum(np.maximum(seen.speed_mps, {slowest!r}), {fastest!r})
-    return p.changed_{unit} * (speed_mps / {mean!r} - 1.0) * seen.{motion}
+    return p.changed_n_per_m * (speed_mps / {mean!r} - 1.0) * seen.{motion}
 """
-_METHOD = """def laws(self, p, laws):
+_STIFFNESS_METHOD = """def laws(self, p, laws):
     return laws.with_law(Between.{between}, changed, p)
 """
-_TRIED = 0.2  # of the damping or stiffness, at twice the mean speed
+_DAMPING = """
+def changed(p, seen):
+    below = np.minimum(np.maximum(({mean!r} - seen.speed_mps) / {below_mps!r}, 0.0), 1.0)
+    above = np.minimum(np.maximum((seen.speed_mps - {mean!r}) / {above_mps!r}, 0.0), 1.0)
+    return (p.slowest_n_s_per_m * below + p.fastest_n_s_per_m * above) * seen.rate_mps
+"""
+_DAMPING_METHOD = """def laws(self, p, laws):
+    own = SimpleNamespace(slowest_n_s_per_m={slowest} * laws.damping_n_s_per_m,
+                          fastest_n_s_per_m={fastest} * laws.damping_n_s_per_m)
+    return laws.with_law(Between.BODY_AND_WHEEL, changed, own)
+"""
+_TRIED = 0.2  # of the damping or stiffness, at twice the mean speed or at an end of the speeds
 _MOST_LOST = 0.9  # of it, at either end of the speeds
-_OF = {
-    "dampers": ("suspension_damping_n_s_per_m", "n_s_per_m", "rate_mps", "BODY_AND_WHEEL", "damping"),
-    "springs": ("suspension_stiffness_n_per_m", "n_per_m", "travel_m", "BODY_AND_WHEEL", "stiffness"),
-    "tires": ("tire_stiffness_n_per_m", "n_per_m", "deflection_m", "WHEEL_AND_GROUND", "stiffness"),
-}
+_MOST_GAINED = 9.0  # of it; nine tenths are lost at the other end where its mean is 1
+_OF = {"springs": ("suspension_stiffness_n_per_m", "travel_m", "BODY_AND_WHEEL"),
+       "tires": ("tire_stiffness_n_per_m", "deflection_m", "WHEEL_AND_GROUND")}
+_DAMPERS = "dampers whose damping changes with the driving speed"
 
 
 class ChangingWithSpeed(Family):
@@ -46,29 +57,74 @@ class ChangingWithSpeed(Family):
         if not slowest < mean < fastest:
             return []
         axles = [one for one in (context.vehicle.front, context.vehicle.rear) if one is not None]
-        return [self._draft(of, min(getattr(axle, _OF[of][0]) for axle in axles), (slowest, mean, fastest))
-                for of in _OF]
+        stiffnesses = [self._stiffness(of, min(getattr(axle, _OF[of][0]) for axle in axles), (slowest, mean, fastest))
+                       for of in _OF]
+        return [self._dampers((slowest, mean, fastest)), self._bent_dampers((slowest, mean, fastest)), *stiffnesses]
 
-    def _draft(self, of: str, softer: float, speeds_mps: tuple[float, float, float]) -> Draft:
+    def _dampers(self, speeds_mps: tuple[float, float, float]) -> Draft:
+        slowest, mean, fastest = speeds_mps
+        low, high = _ends(speeds_mps)
+        share = Parameter("changed_ratio", _TRIED, rounded(low), rounded(high), 0.0, Scale.LINEAR, (_TRIED, -_TRIED),
+                          f"share by which the damping is larger at {2 * mean:g} m/s than at {mean:g} m/s", step=0.02)
+        ends = (f"p.changed_ratio * {rounded(one / mean - 1, 4)!r}" for one in (slowest, fastest))
+        return self._draft(_DAMPERS, "dampers", (share,), _DAMPING.format(**_ways(speeds_mps)),
+                           _DAMPING_METHOD.format(**dict(zip(("slowest", "fastest"), ends, strict=True))))
+
+    def _bent_dampers(self, speeds_mps: tuple[float, float, float]) -> Draft:
+        slowest, mean, fastest = speeds_mps
+        shares = tuple(
+            Parameter(name, _TRIED, -_MOST_LOST, _MOST_GAINED, 0.0, Scale.LINEAR, (_TRIED,),
+                      f"share by which the damping is larger at {there:g} m/s than at {mean:g} m/s", step=0.02)
+            for name, there in (("slowest_ratio", slowest), ("fastest_ratio", fastest)))
+        return self._draft(_DAMPERS, "bent dampers", shares, _DAMPING.format(**_ways(speeds_mps)),
+                           _DAMPING_METHOD.format(slowest="p.slowest_ratio", fastest="p.fastest_ratio"),
+                           places=(slowest, fastest))
+
+    def _stiffness(self, of: str, softer: float, speeds_mps: tuple[float, float, float]) -> Draft:
         """Of what the softer axle has: no axle may be left without it at any speed."""
-        _, unit, motion, between, what = _OF[of]
+        _, motion, between = _OF[of]
         slowest, mean, fastest = speeds_mps
         size = rounded(_TRIED * softer)
-        low, high = -_MOST_LOST * softer / (fastest / mean - 1), _MOST_LOST * softer / (1 - slowest / mean)
+        low, high = (softer * one for one in _ends(speeds_mps))
+        parameter = Parameter("changed_n_per_m", size, rounded(low), rounded(high), 0.0, Scale.LINEAR, (size, -size),
+                              f"by which the stiffness of the {of} is larger at {2 * mean:g} m/s than at {mean:g} m/s",
+                              step=rounded(0.1 * size))
+        return self._draft(f"{of} whose stiffness changes with the driving speed", of, (parameter,),
+                           _STIFFNESS.format(slowest=slowest, mean=mean, fastest=fastest, motion=motion),
+                           _STIFFNESS_METHOD.format(between=between))
+
+    def _draft(self, title: str, variant: str, parameters: tuple[Parameter, ...], functions: str, method: str,
+               places: tuple[float, ...] = ()) -> Draft:
+        damps = title is _DAMPERS
         return Draft(
-            family=self.name, kind="ForceEffect", title=f"{of} whose {what} changes with the driving speed",
-            parameters=(Parameter(f"changed_{unit}", size, rounded(low), rounded(high), 0.0, Scale.LINEAR,
-                                  (size, -size), f"by which the {what} of the {of} is larger at {2 * mean:g} m/s "
-                                  f"than at {mean:g} m/s", step=rounded(0.1 * size)),),
+            family=self.name, kind="ForceEffect", title=title, parameters=parameters,
             source="S. M. Savaresi et al., Semi-Active Suspension Control Design for Vehicles (2010), chapter 2"
-            if of == "dampers" else "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9",
+            if damps else "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9",
             signature="runs at different speeds ask for different numbers of one car", shown_by=self.shown_by,
-            method=_METHOD.format(between=between), variant=of,
-            functions=_FUNCTIONS.format(slowest=slowest, mean=mean, fastest=fastest, unit=unit, motion=motion),
-            imports=("from logger.vehicle.laws import Between",), words=("needs_road = True",))
+            method=method, variant=variant, functions=functions, places=places, words=("needs_road = True",),
+            imports=(*(("from types import SimpleNamespace",) if damps else ()),
+                     "from logger.vehicle.laws import Between"))
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return f"{draft.title}, by {say(draft.strengths[0])} from the mean speed to twice that"
+        if draft.places:
+            shares = " and ".join(f"{say(name, 100.0, '%')} at {there:g} m/s" for name, there in zip(
+                draft.strengths, draft.places, strict=True))
+            return f"{draft.title}, by {shares}"
+        if draft.title is _DAMPERS:
+            return f"{draft.title}, by {say('changed_ratio', 100.0, '%')} from the mean speed to twice that"
+        return f"{draft.title}, by {say('changed_n_per_m')} from the mean speed to twice that"
+
+
+def _ends(speeds_mps: tuple[float, float, float]) -> tuple[float, float]:
+    """The shares, from the mean speed to twice that, with which most of it is lost at the fastest and at the slowest
+    speed."""
+    slowest, mean, fastest = speeds_mps
+    return -_MOST_LOST / (fastest / mean - 1), _MOST_LOST / (1 - slowest / mean)
+
+
+def _ways(speeds_mps: tuple[float, float, float]) -> dict[str, float]:
+    slowest, mean, fastest = speeds_mps
+    return {"mean": mean, "below_mps": rounded(mean - slowest, 4), "above_mps": rounded(fastest - mean, 4)}
 
 
 FAMILY = ChangingWithSpeed()
