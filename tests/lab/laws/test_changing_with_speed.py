@@ -39,12 +39,12 @@ def firmer(speed_mps: float) -> Vehicle:
     return car_with_more("suspension_damping_n_s_per_m", share=SHARE * (speed_mps / MEAN_MPS - 1))
 
 
-def bent(speed_mps: float) -> Vehicle:
+def firm_at_one_end(speed_mps: float) -> Vehicle:
     return car_with_more("suspension_damping_n_s_per_m", share=SHARE if speed_mps > MEAN_MPS else -0.5 * SHARE)
 
 
 CARS: dict[str, tuple[tuple[float, ...], Callable[[float], Vehicle]]] = {
-    "dampers": ((SHARE,), firmer), "bent dampers": ((-0.5 * SHARE, SHARE), bent),
+    "dampers": ((SHARE,), firmer), "dampers at both ends": ((-0.5 * SHARE, SHARE), firm_at_one_end),
     "springs": ((5000.0,), stiffer("suspension_stiffness_n_per_m", 5000.0)),
     "tires": ((40000.0,), stiffer("tire_stiffness_n_per_m", 40000.0)),
 }

@@ -2,8 +2,8 @@
 stiffen as they are lowered, tires that spin.
 
 A stiffness k that was taken for fixed is k + d (v / v0 - 1) at the speed v, with v0 the mean speed of the runs. Dampers
-change by a share of what each axle has, as a controller sets all of them alike: in a straight line, or in one that
-bends at v0, because few controllers go on at the same pace. Beyond the speeds that the runs had it stays what it was at
+change by a share of what each axle has, as a controller sets all of them alike: so that they have what the vehicle's
+file says at v0, or at whatever speed that was measured. Beyond the speeds that the runs had it stays what it was at
 their ends, for nothing is known there. Adaptive dampers: S. M. Savaresi et al., Semi-Active Suspension Control Design
 for Vehicles (2010), chapter 2; a tire that spins: H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9.
 """
@@ -26,9 +26,8 @@ _STIFFNESS_METHOD = """def laws(self, p, laws):
 """
 _DAMPING = """
 def changed(p, seen):
-    below = np.minimum(np.maximum(({mean!r} - seen.speed_mps) / {below_mps!r}, 0.0), 1.0)
-    above = np.minimum(np.maximum((seen.speed_mps - {mean!r}) / {above_mps!r}, 0.0), 1.0)
-    return (p.slowest_n_s_per_m * below + p.fastest_n_s_per_m * above) * seen.rate_mps
+    faster = np.minimum(np.maximum((seen.speed_mps - {slowest!r}) / ({fastest!r} - {slowest!r}), 0.0), 1.0)
+    return (p.slowest_n_s_per_m * (1.0 - faster) + p.fastest_n_s_per_m * faster) * seen.rate_mps
 """
 _DAMPING_METHOD = """def laws(self, p, laws):
     own = SimpleNamespace(slowest_n_s_per_m={slowest} * laws.damping_n_s_per_m,
@@ -37,7 +36,7 @@ _DAMPING_METHOD = """def laws(self, p, laws):
 """
 _TRIED = 0.2  # of the damping or stiffness, at twice the mean speed or at an end of the speeds
 _MOST_LOST = 0.9  # of it, at either end of the speeds
-_MOST_GAINED = 9.0  # of it; nine tenths are lost at the other end where its mean is 1
+_MOST_GAINED = 9.0  # of it: by as large a factor as most may be lost by
 _OF = {"springs": ("suspension_stiffness_n_per_m", "travel_m", "BODY_AND_WHEEL"),
        "tires": ("tire_stiffness_n_per_m", "deflection_m", "WHEEL_AND_GROUND")}
 _DAMPERS = "dampers whose damping changes with the driving speed"
@@ -59,7 +58,7 @@ class ChangingWithSpeed(Family):
         axles = [one for one in (context.vehicle.front, context.vehicle.rear) if one is not None]
         stiffnesses = [self._stiffness(of, min(getattr(axle, _OF[of][0]) for axle in axles), (slowest, mean, fastest))
                        for of in _OF]
-        return [self._dampers((slowest, mean, fastest)), self._bent_dampers((slowest, mean, fastest)), *stiffnesses]
+        return [self._dampers((slowest, mean, fastest)), self._dampers_at_ends((slowest, mean, fastest)), *stiffnesses]
 
     def _dampers(self, speeds_mps: tuple[float, float, float]) -> Draft:
         slowest, mean, fastest = speeds_mps
@@ -67,16 +66,17 @@ class ChangingWithSpeed(Family):
         share = Parameter("changed_ratio", _TRIED, rounded(low), rounded(high), 0.0, Scale.LINEAR, (_TRIED, -_TRIED),
                           f"share by which the damping is larger at {2 * mean:g} m/s than at {mean:g} m/s", step=0.02)
         ends = (f"p.changed_ratio * {rounded(one / mean - 1, 4)!r}" for one in (slowest, fastest))
-        return self._draft(_DAMPERS, "dampers", (share,), _DAMPING.format(**_ways(speeds_mps)),
+        return self._draft(_DAMPERS, "dampers", (share,), _DAMPING.format(slowest=slowest, fastest=fastest),
                            _DAMPING_METHOD.format(**dict(zip(("slowest", "fastest"), ends, strict=True))))
 
-    def _bent_dampers(self, speeds_mps: tuple[float, float, float]) -> Draft:
-        slowest, mean, fastest = speeds_mps
+    def _dampers_at_ends(self, speeds_mps: tuple[float, float, float]) -> Draft:
+        """Dampers that have what the file says at a speed that nobody knows."""
+        slowest, _, fastest = speeds_mps
         shares = tuple(
             Parameter(name, _TRIED, -_MOST_LOST, _MOST_GAINED, 0.0, Scale.LINEAR, (_TRIED,),
-                      f"share by which the damping is larger at {there:g} m/s than at {mean:g} m/s", step=0.02)
+                      f"share by which the damping is larger at {there:g} m/s than the vehicle's file says", step=0.02)
             for name, there in (("slowest_ratio", slowest), ("fastest_ratio", fastest)))
-        return self._draft(_DAMPERS, "bent dampers", shares, _DAMPING.format(**_ways(speeds_mps)),
+        return self._draft(_DAMPERS, "dampers at both ends", shares, _DAMPING.format(slowest=slowest, fastest=fastest),
                            _DAMPING_METHOD.format(slowest="p.slowest_ratio", fastest="p.fastest_ratio"),
                            places=(slowest, fastest))
 
@@ -120,11 +120,6 @@ def _ends(speeds_mps: tuple[float, float, float]) -> tuple[float, float]:
     speed."""
     slowest, mean, fastest = speeds_mps
     return -_MOST_LOST / (fastest / mean - 1), _MOST_LOST / (1 - slowest / mean)
-
-
-def _ways(speeds_mps: tuple[float, float, float]) -> dict[str, float]:
-    slowest, mean, fastest = speeds_mps
-    return {"mean": mean, "below_mps": rounded(mean - slowest, 4), "above_mps": rounded(fastest - mean, 4)}
 
 
 FAMILY = ChangingWithSpeed()
