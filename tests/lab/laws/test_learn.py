@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -86,7 +87,7 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
 
 
 class Straight(Family):
-    """A family whose laws are another's, and are refused."""
+    """A family whose laws are another's under its own name, and are refused."""
 
     name, title = "straight", "a straight line"
 
@@ -94,7 +95,7 @@ class Straight(Family):
         self.family, self.shown_by = family, family.shown_by
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        return self.family.drafts(context)
+        return [replace(draft, family=self.name) for draft in self.family.drafts(context)]
 
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         return True
