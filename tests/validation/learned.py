@@ -115,15 +115,17 @@ def learned(given: KeptBack) -> tuple[Record, dict[str, float]]:
 
 
 def judged(given: KeptBack, said: Record) -> Record:
-    """Errors on what was kept back: of the model before, and with the law where there is one, as it stands and with its
-    numbers and distances refitted. What is said to be missing beside the law is added first."""
+    """Errors on what was kept back: of the model before, and with the law where there is one, or the known effect that
+    is named in its place, as it stands and with its numbers and distances refitted. What is said to be missing beside
+    the law is added first."""
     before = compared(given.vehicle, given.kept)
     found: Record = {"before": before["error"], "before_refitted": before["refitted"]["error"],
                      "without_drift": before["error_without_drift"]}
-    if said["family"] is None:
+    if said["family"] is None and instead_of_law(said) is None:
         return found
     vehicle = given.vehicle
-    for number, name in enumerate([*said["verdict"], str(law_of(given))]):
+    laws = [] if said["family"] is None else [str(law_of(given))]
+    for number, name in enumerate([*said["verdict"], *laws]):
         out = given.vehicle.with_name(f"with-{number}.yaml")
         asked(["add-effect", name, "--json", "--vehicle", str(vehicle), "--out", str(out), *map(str, given.runs)],
               in_process=False)
@@ -145,9 +147,17 @@ def family(record: Record) -> str | None:
     return record["said"]["family"] if record["said"] else None
 
 
+def instead_of_law(said: Record) -> str | None:
+    """The known effect that ``learn`` names in the place of a law, as one to be added; None: none."""
+    named_instead = said["family"] is None and said.get("refused") and said.get("nearest")
+    return said["nearest"]["effect"] if named_instead else None
+
+
 def meaning(record: Record) -> str | None:
-    """The family of the law; where none was learned and a drifting sensor is what was hidden, the drift that was
-    said to be removed. None: nothing was said."""
+    """The family of the law; where none was learned, the known effect that is named in its place, or, where a drifting
+    sensor is what was hidden, the drift that was said to be removed. None: nothing was said."""
+    if record["said"] and (instead := instead_of_law(record["said"])):
+        return instead
     if record["said"] and family(record) is None and RIGHT[record["kind"]].meanings == (DRIFT,):
         return REMOVED_DRIFT if record["said"]["removed"]["drift"]["error_power_share"] > 0 else None
     return family(record)
@@ -209,7 +219,8 @@ def reported(record: Record) -> str:
     kept, took = record["kept"], f"{record['learning']['wall_s']:.0f} s"
     if family(record) is None:
         mark = "WRONG" if record["kind"] in RIGHT and not right_family(record) else "right"
-        return f"{head} -> {mark}: {record['said']['words']}; {took}"
+        times = f"; {above(record):.2f}" if "after" in kept else ""
+        return f"{head} -> {mark}: {record['said']['words']}{times}; {took}"
     mark = "right" if record["kind"] in RIGHT and right_family(record) else "WRONG"
     return (f"{head} -> {mark}: {family(record)} ({record['said']['words']}); error {kept['before']:.3f}, with the "
             f"law {kept['after']:.3f}, refitted {kept['after_refitted']:.3f}; the truth {kept['attainable']:.3f}, the "

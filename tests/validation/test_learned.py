@@ -51,6 +51,17 @@ def test_a_sensor_that_drifts_is_said_and_needs_no_law() -> None:
     assert not right_family(answer("warming_sensor", "changing_gain"))
 
 
+def test_a_known_effect_that_is_named_in_the_place_of_a_law_is_the_answer() -> None:
+    instead = answer("bushing_hysteresis", None)
+    instead["kept"] |= {"after": 0.11, "after_refitted": 0.1}
+    instead["said"] |= {"refused": {"law": "friction", "why": "less"}, "nearest": {"effect": "hysteresis"}}
+    assert right_family(instead) and above(instead) == pytest.approx(1.1)
+    instead["said"]["nearest"]["effect"] = "sensor_gain"
+    assert not right_family(instead)
+    instead["said"]["nearest"] = None
+    assert not right_family(instead)
+
+
 def test_a_right_family_and_a_wrong_one() -> None:
     right, wrong = sorted(NAMES[RIGHT["gas_spring"].meanings[0]])[0], sorted(NAMES[RIGHT["trailer"].meanings[0]])[0]
     assert named("gas_spring", right)

@@ -41,6 +41,9 @@ NAMES: dict[str, frozenset[str]] = {
 }
 """What ``ridelog learn`` calls the families of each meaning."""
 
+KNOWN: dict[str, frozenset[str]] = {FRICTION: frozenset({"hysteresis"})}
+"""Known effects of each meaning that no search tries unasked: ``learn`` names them in the place of a law."""
+
 
 @dataclass(frozen=True)
 class Right:
@@ -87,5 +90,6 @@ PHASES_OF_THEIR_OWN = frozenset({"wheel_imbalance", "engine_vibration", "flat_sp
 
 
 def named(kind: str, family: str | None) -> bool:
-    """Whether a family is right for a hidden effect. KeyError: not an effect off the list."""
-    return any(family in NAMES[meaning] for meaning in RIGHT[kind].meanings)
+    """Whether a family, or a known effect in its place, is right for a hidden effect. KeyError: not an effect off the
+    list."""
+    return any(family in NAMES[meaning] | KNOWN.get(meaning, frozenset()) for meaning in RIGHT[kind].meanings)
