@@ -43,7 +43,7 @@ LOW_PASS_ZEROS = (-0.5, 0.0)
 POINTS = 150
 # A fit in a valley goes on for thousands and gains little: the folder's weightings are within 0.01 dB by then.
 EVALUATIONS = 300
-MOST_TURN, MOST_DAMPING = 30.0, math.log(20.0)  # radians in a sample, and log of a damping ratio, that a fit may reach
+MOST_TURN_RAD, MOST_DAMPING_RATIO = 30.0, 20.0  # of a resonance in a sample, and its damping, that a fit may reach
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,11 @@ def _unit_gain(u: float, v: float) -> Floats:
 def _resonance(period_s: float) -> Callable[[float, float], Floats]:
     """The matched-z image of s^2 + 2 d w s + w^2, in log w and log d."""
 
-    most_omega = math.log(MOST_TURN / period_s)
+    most_omega, most_damping = math.log(MOST_TURN_RAD / period_s), math.log(MOST_DAMPING_RATIO)
 
     def encode(log_omega: float, log_damping: float) -> Floats:
         # Beyond these the factor is 1 at all frequencies; farther on its parts overflow.
-        omega, damping = math.exp(min(log_omega, most_omega)), math.exp(min(log_damping, MOST_DAMPING))
+        omega, damping = math.exp(min(log_omega, most_omega)), math.exp(min(log_damping, most_damping))
         turn = omega * period_s * np.sqrt(complex(1.0 - damping**2))
         radius = math.exp(-damping * omega * period_s)
         return np.array([1.0, -2.0 * radius * np.cos(turn).real, radius**2])

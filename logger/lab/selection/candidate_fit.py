@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 
 import numpy as np
@@ -28,6 +29,12 @@ class CandidateFit:
     found: MapFit
     gain: float
 
+    @staticmethod
+    def of(score: float, fitted: LinearModel) -> CandidateFit:
+        """A fitted model, over one with this score."""
+        found = MapFit.of(fitted)
+        return CandidateFit(found, score - found.score)
+
     @property
     def effect(self) -> Effect:
         """The effect that was added."""
@@ -38,7 +45,7 @@ class CandidateFit:
         """The effect that was added, with its values."""
         return self.found.state.effects[-1]
 
-    @property
+    @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
         linear = self.found.linearise(keep_size=True)
@@ -73,14 +80,12 @@ def fit_roughly(score: float, base: Baseline, screen: Screened) -> list[Candidat
 
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """Fit a candidate again with derivatives of its own."""
-    found = MapFit.of(fit(one.found.linearise(), one.found.numbers, rounds, worth))
-    return CandidateFit(found, score - found.score)
+    return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:
     """Refine a candidate until nothing is gained."""
-    found = MapFit.of(fit_to_the_end(one.found.linearise(), one.found.numbers))
-    return CandidateFit(found, score - found.score)
+    return CandidateFit.of(score, fit_to_the_end(one.found.linearise(), one.found.numbers))
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
@@ -92,6 +97,4 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         state = State((*base.state.effects, trial.one), posterior.prior.clip_to_soft_bounds(trial.logs),
                       linear.state.record, linear.size, [])
     state = optimise_numbers(linear, state, free_parameters_of(state.effects))
-    there = relinearise(posterior, state, linear.numbers, score)
-    found = MapFit.of(there)
-    return CandidateFit(found, score - found.score)
+    return CandidateFit.of(score, relinearise(posterior, state, linear.numbers, score))

@@ -65,9 +65,9 @@ class ChangingWithSpeed(Family):
         low, high = _ends(speeds_mps)
         share = Parameter("changed_ratio", _TRIED, rounded(low), rounded(high), 0.0, Scale.LINEAR, (_TRIED, -_TRIED),
                           f"share by which the damping is larger at {2 * mean:g} m/s than at {mean:g} m/s", step=0.02)
-        ends = (f"p.changed_ratio * {rounded(one / mean - 1, 4)!r}" for one in (slowest, fastest))
+        at_slowest, at_fastest = (f"p.changed_ratio * {rounded(one / mean - 1, 4)!r}" for one in (slowest, fastest))
         return self._draft(_DAMPERS, "dampers", (share,), _DAMPING.format(slowest=slowest, fastest=fastest),
-                           _DAMPING_METHOD.format(**dict(zip(("slowest", "fastest"), ends, strict=True))))
+                           _DAMPING_METHOD.format(slowest=at_slowest, fastest=at_fastest))
 
     def _dampers_at_ends(self, speeds_mps: tuple[float, float, float]) -> Draft:
         """Dampers that have what the file says at a speed that nobody knows."""
