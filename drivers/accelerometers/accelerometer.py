@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from drivers.machine import Machine
 from drivers.readings import AccelerationBlock
+from drivers.recorded_words import RecordedWords
 from drivers.settings import Kind
 from drivers.sources import SerialSource, Source, serial_advice
 
@@ -116,9 +117,10 @@ class Accelerometer(ABC, Generic[Settings]):
         """What a recording's first line says about it, beside driver and vertical axis."""
         return {}
 
-    def recorded(self, header: Mapping[str, Any], settings: Settings, is_given: bool) -> Settings:
-        """Settings for the replay of a recording. What is in the bytes is always the header's; the rest is that of
-        ``settings``: those given for this replay, or the defaults. SettingsError for what cannot be."""
+    def recorded(self, said: RecordedWords, settings: Settings, is_given: bool) -> Settings:
+        """Settings for the replay of a recording, by what its header ``said``. What is in the bytes is always the
+        header's; the rest is that of ``settings``: those given for this replay, or the defaults. SettingsError for
+        what cannot be."""
         return settings
 
     def simulated(self, settings: Settings, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:

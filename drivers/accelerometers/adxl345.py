@@ -34,6 +34,7 @@ from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2
+from drivers.recorded_words import RecordedWords
 from drivers.registers import Field, Register
 from drivers.settings import Kind, OneOf, Whole
 from drivers.sources import Source
@@ -189,12 +190,9 @@ class _Adxl345(Accelerometer[Adxl345Config]):
         """The nominal rate."""
         return {"rate_hz": settings.rate_hz}
 
-    def recorded(self, header: Mapping[str, Any], settings: Adxl345Config, is_given: bool) -> Adxl345Config:
+    def recorded(self, said: RecordedWords, settings: Adxl345Config, is_given: bool) -> Adxl345Config:
         """The rate is the recording's."""
-        rate_hz = header.get("rate_hz", settings.rate_hz)
-        if type(rate_hz) is not int:
-            raise SettingsError("expected a whole number for 'rate_hz'")
-        return replace(settings, rate_hz=rate_hz)
+        return replace(settings, rate_hz=said.whole("rate_hz", settings.rate_hz))
 
     def advice(self, state: str) -> str:
         """What to look at."""

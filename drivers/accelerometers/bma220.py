@@ -50,6 +50,7 @@ from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.recorded_words import RecordedWords
 from drivers.registers import ToggleRegister
 from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
 from drivers.sources import US_PER_S, ChipSource, Deadlines, Source
@@ -340,12 +341,10 @@ class _Bma220(Accelerometer[Bma220Config]):
         """Range and rate."""
         return {"range_g": settings.range_g, "oversample": settings.reads}
 
-    def recorded(self, header: Mapping[str, Any], settings: Bma220Config, is_given: bool) -> Bma220Config:
+    def recorded(self, said: RecordedWords, settings: Bma220Config, is_given: bool) -> Bma220Config:
         """Range and rate are the recording's; one that says nothing of the rate was read 100 times a second."""
-        range_g, oversample = header.get("range_g", settings.range_g), header.get("oversample", 1)
-        if type(range_g) is not int or type(oversample) is not int:
-            raise SettingsError("expected whole numbers for 'range_g' and 'oversample'")
-        return replace(settings, range_g=range_g, oversample=oversample)
+        return replace(settings, range_g=said.whole("range_g", settings.range_g),
+                       oversample=said.whole("oversample", 1))
 
     def simulated(self, settings: Bma220Config, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
         """Three register bytes per reading: six bits in two's complement, to the left."""

@@ -28,10 +28,11 @@ from drivers.accelerometers._iio_device import AUTO, POLLED_HZ, IioDevice, ScanP
 from drivers.accelerometers._iio_layout import Integers, Layout, read_description, understood
 from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, Readings
 from drivers.dated_samples import DatedSamples, Samples
-from drivers.errors import BadReply, NotPresent, SettingsError, SettingsLost
+from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.events import Event
 from drivers.machine import Machine
 from drivers.readings import AccelerationBlock
+from drivers.recorded_words import RecordedWords
 from drivers.settings import Decimal, Kind, OrNone, Text, Whole
 from drivers.sources import US_PER_S, Deadlines, SerialSource, Source
 
@@ -41,6 +42,10 @@ LONGEST_QUEUED_US = 10 * US_PER_S  # more than a buffer of BUFFER_S holds
 NOISE_MPS2 = 0.05  # r.m.s. on the 100 Hz grid where the settings do not say it: as of a serial sensor
 RATE_TOLERANCE = 0.02  # drivers name nominal rates
 SCANS, VALUES, DESCRIPTION = b"s", b"p", b"{"
+
+
+_STEP_MPS2, _NOISE_MPS2 = (1e-6, 10.0), (1e-4, 1.0)
+"""From and to: what a step and a noise may be."""
 
 
 @dataclass(frozen=True)
@@ -297,8 +302,8 @@ class _Iio(Accelerometer[IioConfig]):
     keys: ClassVar[Mapping[str, Kind]] = {
         "device": Text(),
         "rate_hz": Whole(100, 1000),
-        "scale_mps2": OrNone("auto", Decimal(1e-6, 10)),
-        "noise_mps2": Decimal(1e-4, 1),
+        "scale_mps2": OrNone("auto", Decimal(*_STEP_MPS2)),
+        "noise_mps2": Decimal(*_NOISE_MPS2),
     }
 
     def place(self, settings: IioConfig) -> str:
@@ -330,17 +335,12 @@ class _Iio(Accelerometer[IioConfig]):
         """What is not in the events."""
         return {"rate_hz": settings.rate_hz, "scale_mps2": settings.scale_mps2, "noise_mps2": settings.noise_mps2}
 
-    def recorded(self, header: Mapping[str, Any], settings: IioConfig, is_given: bool) -> IioConfig:
+    def recorded(self, said: RecordedWords, settings: IioConfig, is_given: bool) -> IioConfig:
         """Rate and step are the recording's, the noise that of the settings where they are given."""
-        rate_hz = header.get("rate_hz", settings.rate_hz)
-        if type(rate_hz) is not int or rate_hz < 1:
-            raise SettingsError("expected a whole number above 0 for 'rate_hz'")
-        said = {key: header.get(key, getattr(settings, key)) for key in ("scale_mps2", "noise_mps2")}
-        for key, value in said.items():
-            if not ((type(value) in (int, float) and 0 < value <= 10) or (value is None and key == "scale_mps2")):
-                raise SettingsError(f"expected a number above 0, of at most 10, for {key!r}")
-        return replace(settings, rate_hz=rate_hz, scale_mps2=said["scale_mps2"],
-                       noise_mps2=settings.noise_mps2 if is_given else said["noise_mps2"])
+        noise_mps2 = said.number("noise_mps2", settings.noise_mps2, *_NOISE_MPS2)
+        return replace(settings, rate_hz=said.whole("rate_hz", settings.rate_hz, 1),
+                       scale_mps2=said.number_or_none("scale_mps2", settings.scale_mps2, *_STEP_MPS2),
+                       noise_mps2=settings.noise_mps2 if is_given else noise_mps2)
 
     def advice(self, state: str) -> str:
         """What to look at."""

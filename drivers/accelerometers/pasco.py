@@ -25,8 +25,9 @@ from drivers.dated_samples import WORTH_TELLING, DatedSamples, Samples
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.recorded_words import RecordedWords
 from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
-from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile
+from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile, shipped_profiles
 
 NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
 
@@ -295,16 +296,14 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
         """Lines ``x,y,z`` in g, as the profile ``lines`` reads them."""
         return [b"%.4f,%.4f,%.4f\n" % tuple(row) for row in (accel_mps2 / STANDARD_GRAVITY_MPS2).tolist()]
 
-    def recorded(self, header: Mapping[str, Any], settings: PascoConfig, is_given: bool) -> PascoConfig:
-        """The settings' own profile, or that of the recording where none are given."""
+    def recorded(self, said: RecordedWords, settings: PascoConfig, is_given: bool) -> PascoConfig:
+        """The settings' own profile, or that of the recording where none are given, if it comes with the driver."""
         if is_given:
             return settings
-        if header.get("calibrated"):
+        if said.flag("calibrated"):
             raise SettingsError("recorded with a calibration of its own; expected its settings, --config FILE")
-        profile = header.get("profile", settings.profile)
-        if not isinstance(profile, str):
-            raise SettingsError("expected 'profile' as a name")
-        return replace(settings, profile=profile)
+        return replace(settings, profile=said.name("profile", settings.profile, shipped_profiles(),
+                                                   "the settings of the recording, --config FILE, or "))
 
 
 def _mounted(profile: Profile, upright_axis: int) -> Profile:

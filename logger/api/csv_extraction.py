@@ -19,7 +19,17 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.csv_fixes import check_speed, fixes_of, receiver_of
-from logger.api.extracted_runs import RATE_HZ, Extracted, Fixes, MeasuredProfile, Recorded, Tell, apart, write_runs
+from logger.api.extracted_runs import (
+    RATE_HZ,
+    Extracted,
+    Fixes,
+    MeasuredProfile,
+    Recorded,
+    Tell,
+    apart,
+    folder_of,
+    write_runs,
+)
 from logger.errors import BadInput
 from logger.runs import RecordFacts
 from logger.service.config import Config
@@ -65,7 +75,7 @@ class Asked:
 
 def run_name(source: Path) -> str:
     """What the first run of a recording is called."""
-    return source.resolve().name if source.is_dir() else source.stem
+    return folder_of(source, source.resolve().name if source.is_dir() else source.stem)
 
 
 def extract_csv(source: Path, out: Path, asked: Asked, given: Config | None = None,
@@ -134,7 +144,8 @@ class _Tables:
 
 
 def _tables(source: Path, asked: Asked) -> _Tables:
-    files = sorted(one for one in source.iterdir() if one.suffix.lower() == ".csv") if source.is_dir() else [source]
+    files = sorted(one for one in source.iterdir() if one.suffix.lower() == ".csv" and not one.is_symlink()
+                   ) if source.is_dir() else [source]
     if not files:
         raise BadInput(f"{source}: expected a folder with CSV files, found none")
     known = [(header, found) for header in map(read_header, files)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from drivers.errors import SettingsError
+from drivers.recorded_words import folder_name
 from logger.errors import BadInput
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
@@ -164,6 +166,14 @@ def apart(time_s: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(time_s > before)
 
 
+def folder_of(source: Path, word: str) -> str:
+    """What a recording is called, as the name of its run's folder. BadInput where it can be none."""
+    try:
+        return folder_name(word)
+    except SettingsError as error:
+        raise BadInput(f"{source}: {error}") from None
+
+
 def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured: MeasuredProfile | None, tell: Tell
                ) -> Extracted:
     """Write the runs of a recording into ``out/NAME``, ``out/NAME-2``, ... in place of those that were made of it.
@@ -189,8 +199,12 @@ def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured:
 
 def _make_room(folders: list[Path], source: Path, out: Path) -> None:
     """Take away the runs that were made of a recording of this name; BadInput where a folder holds anything else."""
-    earlier = [one.parent for one in out.glob(f"*/{RUN}") if read_run_facts(one.parent).source == source.name]
+    earlier = [one.parent for one in out.glob(f"*/{RUN}")
+               if not one.parent.is_symlink() and read_run_facts(one.parent).source == source.name]
     for folder in folders:
+        if folder.is_symlink():
+            raise BadInput(f"{folder}: expected a folder for a run of {source}, found a link to another place: remove "
+                           "the link")
         if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found the run of something else")
     for folder in earlier:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drivers.dump import open_dump
-from logger.api.extracted_runs import Extracted, Fixes, MeasuredProfile, Recorded, Tell, apart, write_runs
+from logger.api.extracted_runs import Extracted, Fixes, MeasuredProfile, Recorded, Tell, apart, folder_of, write_runs
 from logger.errors import BadInput
 from logger.runs import RecordFacts
 from logger.service.config import Config
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def name_of(dump: Path) -> str:
     """What the first run of a dump is called."""
-    return dump.name.removesuffix(".gz").removesuffix(".dump")
+    return folder_of(dump, dump.name.removesuffix(".gz").removesuffix(".dump"))
 
 
 def extract_dump(dump: Path, out: Path, given: Config | None, measured: MeasuredProfile | None = None,

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -37,6 +38,8 @@ _MANIFEST = "manifest.json"
 _MAX_BYTES = 512 << 20
 _FORMAT = 1
 _EPOCH_MONTH = 1970 * 12
+_ROWS_PATH = re.compile(r"month=[0-9]{4}-[0-9]{2}/cell=-?[0-9]{1,20}/[0-9]{6,12}-[0-9]{1,9}\.parquet")
+_LEDGER_PATH = re.compile(r"ledger/[0-9]{6,12}\.parquet")
 
 ROW_TYPES = {
     "road": "int64", "car": "int64", "session": "int32", "segment": "int32", "crc32": "int64", "drive": "int32",
@@ -194,12 +197,20 @@ class Dataset:
             content = json.loads(read_bounded(path, _MAX_BYTES))
             if content["ridelog_fleet"] != _FORMAT:
                 raise ValueError
-            commits = tuple(Commit(one["name"], one["ledger"], int(one["rows"]), tuple(
-                DataFile(file["path"], int(file["rows"]), int(file["first_day"]), int(file["last_day"]))
+            commits = tuple(Commit(one["name"], _inside(one["ledger"], _LEDGER_PATH), int(one["rows"]), tuple(
+                DataFile(_inside(file["path"], _ROWS_PATH), int(file["rows"]), int(file["first_day"]),
+                         int(file["last_day"]))
                 for file in one["files"])) for one in content["commits"])
             return Manifest(str(content["roads"]), float(content["trim_m"]), commits)
         except (ValueError, KeyError, TypeError):
             raise BadInput(f"{path}: expected the manifest of a fleet's dataset, format {_FORMAT}") from None
+
+
+def _inside(path: str, own: re.Pattern[str]) -> str:
+    """A path that a dataset has given itself: a manifest cannot point anywhere else. ValueError for another."""
+    if not own.fullmatch(path):
+        raise ValueError
+    return path
 
 
 def existing(folder: Path) -> Dataset:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from math import sqrt
@@ -14,8 +13,9 @@ import numpy as np
 from drivers.accelerometers import accelerometers
 from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import DumpHeader
-from drivers.errors import SettingsError, shortened
+from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
+from drivers.recorded_words import RecordedWords
 from logger.comfort.noise_floor import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
@@ -34,7 +34,7 @@ from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.service.receiver_learning import at_start, from_fields, header_fields
 from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
-from logger.shipped import vehicle_file, vehicle_names, version
+from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
 from logger.store.formats.vehicle_file import Model
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.linearise import known_car
@@ -220,24 +220,22 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
 
     Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """
-    says = header.accelerometer
+    said = RecordedWords({**header.accelerometer, "vehicle": header.vehicle})
     config = given or Config()
-    kind = accelerometers()[says["driver"]]
     axis, noise_mps2 = config.accelerometer.vertical_axis, config.accelerometer.noise_mps2
-    if given is None:
-        axis, noise_mps2 = says.get("vertical_axis", axis), _noise_setting(says, place)
-    if axis not in AXES:
-        raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {shortened(str(axis))}")
-    sections = config.accelerometer.sections
     try:
-        settings = kind.recorded(says, sections[kind.name], is_given=given is not None)
+        kind = accelerometers()[said.name("driver", "", tuple(accelerometers()))]
+        if given is None:
+            axis, noise_mps2 = said.name("vertical_axis", axis, AXES), _noise_setting(said)
+        sections = config.accelerometer.sections
+        settings = kind.recorded(said, sections[kind.name], is_given=given is not None)
         sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings}, noise_mps2)
         instrument(sensor)
+        if given is None and vehicle is None:
+            vehicle = said.name("vehicle", "", vehicle_names(), "--vehicle FILE.yaml or ")
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
-    if given is None or vehicle is not None:
-        config = replace(config, vehicle=_vehicle_file(vehicle or header.vehicle, place))
-    return replace(config, accelerometer=sensor)
+    return replace(config, accelerometer=sensor, vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
 
 
 def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> Belief:
@@ -263,35 +261,12 @@ def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") ->
         raise BadInput(f"{place}: {error}") from None
 
 
-def _noise_setting(says: Mapping[str, Any], place: str) -> float | str | None:
-    """The setting that a recording was made with, by its header."""
-    said = says.get("noise", {})
-    if not isinstance(said, Mapping):
-        raise BadInput(f"{place}: expected 'noise' as an object, found {shortened(str(said))}")
-    value = said.get("noise_mps2")
-    if value is None:
-        return None
-    if "noise_std_mps2" in said or value == AUTO:
+def _noise_setting(said: RecordedWords) -> float | str | None:
+    """The setting that a recording was made with, by its header. SettingsError for what cannot be."""
+    noise = said.group("noise")
+    if noise.says("noise_std_mps2") or noise.says("noise_mps2", AUTO):
         return AUTO
-    least, most = LEAST_NOISE_MPS2, MOST_NOISE_MPS2
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise BadInput(f"{place}: expected 'noise_mps2' from {least:g} to {most:g}, or {AUTO}, found "
-                       f"{shortened(str(value))}")
-    return float(value)
-
-
-def _vehicle_file(name: str, place: str) -> Path:
-    path = vehicle_file(name) if name in vehicle_names() else Path(name)
-    try:
-        known = path.is_file()
-    except OSError:  # a name that can be none
-        known = False
-    if not known:
-        raise BadInput(
-            f"{place}: the recording's vehicle {shortened(name)} is not known here; expected --vehicle FILE.yaml or "
-            f"one of: {', '.join(vehicle_names())}"
-        )
-    return path
+    return noise.number_or_none("noise_mps2", None, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
 
 
 def _as_written(config: Config) -> dict[str, Any]:

@@ -27,11 +27,12 @@ from drivers.dump import LATEST_US, DumpHeader, Event
 from drivers.errors import BadReply, SettingsError
 from drivers.ports import BytePort
 from drivers.readings import AccelerationBlock
+from drivers.recorded_words import RecordedWords
 from logger.errors import BadInput
 from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
 from logger.service import wiring
-from logger.service.config import Config
+from logger.service.config import AXES, Config
 from logger.service.event_core import EventCore
 from logger.service.event_merger import EventMerger
 from logger.service.noise_learning import KnownNoise
@@ -82,7 +83,9 @@ def wired(header: DumpHeader, events: Iterable[Event], seconds: float | None, pl
     if isinstance(kind, SerialAccelerometer):
         return Wired(header, iter(events), bridged="")
     try:
-        settings = kind.recorded(sensor, kind.settings(), is_given=False)
+        said = RecordedWords(sensor)
+        settings = kind.recorded(said, kind.settings(), is_given=False)
+        axis = said.name("vertical_axis", "+z", AXES)
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
     oversample = kind.readings(settings).oversample
@@ -91,8 +94,8 @@ def wired(header: DumpHeader, events: Iterable[Event], seconds: float | None, pl
     bridge = line_reader()
     lines: dict[str, Any] = {"driver": bridge.name, **(bridge.lines or {})}
     if "vertical_axis" in sensor:
-        lines["vertical_axis"] = sensor["vertical_axis"]
-    decoder = kind.decoder(settings, Axis.from_word(sensor.get("vertical_axis", "+z")).column)
+        lines["vertical_axis"] = axis
+    decoder = kind.decoder(settings, Axis.from_word(axis).column)
     return Wired(replace(header, accelerometer=lines), _as_lines(events, decoder), bridged=kind.title)
 
 

@@ -50,9 +50,12 @@ class Sidecar:
 
 def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is damaged,
-    nested too deep or larger than ``SIDECAR_BYTES``, and ``OSError``."""
+    a link, nested too deep or larger than ``SIDECAR_BYTES``, and ``OSError``."""
+    path = sidecar_path(log)
+    if path.is_symlink():
+        raise ValueError("expected a file of its own, found a link to another")
     try:
-        with (files or FileSystem()).open(sidecar_path(log)) as file:
+        with (files or FileSystem()).open(path) as file:
             text = file.read(SIDECAR_BYTES + 1)
     except FileNotFoundError:
         return None
