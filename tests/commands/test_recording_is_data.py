@@ -90,7 +90,7 @@ def dump_of(short_dump: Path, tmp_path: Path) -> Callable[..., Path]:
 
 
 def test_the_trap_is_one(trap: Trap) -> None:
-    with pytest.raises(Exception, match="trap.py"):
+    with pytest.raises(Exception, match=r"trap\.py"):
         read_model(trap.car)
     assert trap.mark.exists()
     assert str(trap.car) in trap.opened
@@ -108,8 +108,8 @@ def test_a_dump_that_names_files_of_this_machine(verb: str, trap: Trap, dump_of:
         if verb in ("replay", "extract"):
             assert done.returncode == 2
             assert done.stderr.count("\n") == 1 and "expected --vehicle FILE.yaml or one of" in done.stderr
-    for said in ({"driver": "pasco", "profile": str(trap.profile)}, {"driver": "bma220", "vertical_axis": str(trap.car)},
-                 {"driver": "bma220", "noise": {"noise_mps2": str(trap.car)}},
+    for said in ({"driver": "pasco", "profile": str(trap.profile)},
+                 {"driver": "bma220", "vertical_axis": str(trap.car)}, {"driver": "bma220", "noise": {"noise_mps2": str(trap.car)}},
                  {"driver": "pasco", "calibrated": str(trap.car)}, {"driver": "iio", "scale_mps2": str(trap.car)}):
         done = called(verb, dump_of(accelerometer=said, gps={"baud": str(trap.car), "latency_s": str(trap.car)}),
                       *READERS[verb])
@@ -145,9 +145,9 @@ def test_logs_whose_words_and_links_name_files_of_this_machine(verb: str, trap: 
         "log": {"session": word, "rows": 60}}))
     (trap.folder / "other.json").write_text(json.dumps({"vehicle": {"name": "other"}}))
     (trap.folder / "00003-001.csv").write_text(rows, "ascii")
-    os.symlink(trap.folder / "other.json", logs / "00002-001.json")
-    os.symlink(trap.folder / "00003-001.csv", logs / "00003-001.csv")
-    os.symlink(trap.folder, logs / "more")
+    (logs / "00002-001.json").symlink_to(trap.folder / "other.json")
+    (logs / "00003-001.csv").symlink_to(trap.folder / "00003-001.csv")
+    (logs / "more").symlink_to(trap.folder)
     for learnt in ("receiver-delay", "sensor-noise"):
         (logs / learnt).write_text(json.dumps({"delay_s": word, "noise_mps2": word, "of": word}))
     places = ("--from", logs, "--to", "out") if verb == "export" else (logs,)
@@ -177,7 +177,7 @@ def test_a_run_that_names_files_of_this_machine(words: tuple[str, ...], trap: Tr
 
 def test_a_folder_of_a_phone_s_files_with_links(trap: Trap) -> None:
     Path("ride").mkdir()
-    os.symlink(trap.folder / "table.csv", "ride/Accelerometer.csv")
+    Path("ride/Accelerometer.csv").symlink_to(trap.folder / "table.csv")
     assert called("extract", "--csv", "ride", "--out", "out").returncode == 2
     trap.check()
 
@@ -197,7 +197,7 @@ def test_a_dump_s_name_leads_to_no_other_folder(name: str, trap: Trap, dump_of: 
 
 def test_a_run_is_not_written_through_a_link(trap: Trap, dump_of: Callable[..., Path]) -> None:
     Path("out").mkdir()
-    os.symlink(trap.folder, "out/drive")
+    Path("out/drive").symlink_to(trap.folder)
     before = sorted(trap.folder.iterdir())
     done = called("extract", dump_of(), "--out", "out")
     assert done.returncode == 2
