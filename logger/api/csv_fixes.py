@@ -29,7 +29,7 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
 
     Raises BadInput with the line for what cannot be, and for a speed of a unit that is not known.
     """
-    from logger.extraction.held_fixes import new_rows, speeds_of_places
+    from logger.extraction.held_fixes import hidden_m, new_rows, speeds_of_places
 
     has_places = set(PLACE) <= set(table.columns)
     has_speed = "speed" in table.columns
@@ -52,8 +52,9 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
         row = int(np.argmax(fast))
         raise table.wrong(int(order[row]), f"expected a speed within {MAX_SPEED_MPS:g} m/s, found {speed[row]:.4g}: is "
                           "its unit right?")
-    rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)),
-                    np.nan_to_num(speed), standing_mps if has_speed else 0.0)
+    said_mps = np.where(speed >= standing_mps, speed, 0.0) if has_speed else np.full(len(order), np.inf)
+    rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)), said_mps,
+                    hidden_m(lat, lon) if has_places and len(order) else np.inf)
     found = Fixes(time_s, speed, lat, lon).part(rows)
     if len(rows) > 1 and has_places and not np.isfinite(found.speed_mps).all():
         by_places = speeds_of_places(found.time_s, found.lat_deg, found.lon_deg)
