@@ -115,11 +115,11 @@ def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
         names = (*drive_file.COLUMNS, *drive_file.PLACE, drive_file.USABLE)
         arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg, run.usable)
         columns = {name: one for name, one in zip(names, arrays, strict=True) if one is not None}
-        place, profile = run.path, run.profile
+        place, profile, file = run.path, run.profile, str(_file_of(run.path))
     else:
         place = Path(run)
-        columns, profile = drive_file.read_columns(_file_of(place)), _profile_beside(place)
-    found = even_columns(columns, str(_file_of(place)), asked)
+        (file, columns), profile = drive_file.read_columns(_file_of(place)), _profile_beside(place)
+    found = even_columns(columns, file, asked)
     if found.resampled is None and asked.unit is None and isinstance(run, Run):
         return run, found
     even = {drive_file.TIME: np.array([found.start_s]), **found.accel_mps2, **found.others}

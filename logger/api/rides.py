@@ -159,8 +159,8 @@ def _even(record: Record | Run | Path | str, name: str, asked: Asked) -> EvenRec
     if isinstance(record, Run):
         return even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
     if not isinstance(record, Record):
-        t_s, accel = record_file.read_columns(record)
-        return even_record(t_s, accel, {}, name, asked)
+        file, t_s, accel = record_file.read_columns(record)
+        return even_record(t_s, accel, {}, file, asked)
     t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz
     accel = {f"accel_{axis}_mps2": one for axis, one in record.by_axis.items() if one is not None}
     return even_record(t_s, accel, {}, name, asked)

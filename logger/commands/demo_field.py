@@ -184,7 +184,7 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
     measured = [Way(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
     driven = []
     for name in (*DRIVES, FOURTH):
-        columns = read_columns(out / RUNS / name / DRIVE)
+        _, columns = read_columns(out / RUNS / name / DRIVE)
         lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
         driven.append(Way(name, lat_deg, lon_deg))
     write_text(file, page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story, before,

@@ -32,9 +32,11 @@ from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.files import read_bounded
 from logger.roads.agreement import best_shift_m, matching_cells, mean_between
 from logger.shipped import vehicle_path
-from logger.store.formats.semicolon_table import read_semicolons
+from logger.store.formats.csv_table import columns_of
+from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import read_model
 from logger.studies.checks import Word
 from logger.studies.study import Effort, Item, Picture, Result, Study, Table
@@ -147,15 +149,20 @@ def profiled_road(folder: Path, cars: Path) -> ProfiledRoad:
     route, side = (one.lower() for one in named.groups())
     iri, places = (expected_files(folder, f"{route}_{what}_{side}.csv", f"the profiler's {what} of {cars.name}")[0]
                    for what in ("iri_mpd_rut", "zp"))
-    begin_m, left, right = read_semicolons(iri, ("Distance [m]", "IRI (5) [m/km]", "IRI (21) [m/km]"))
+    begin_m, left, right = _columns(iri, "Distance [m]", "IRI (5) [m/km]", "IRI (21) [m/km]")
     begin_m, first = np.unique(begin_m, return_index=True)
     edges_m = np.append(begin_m, begin_m[-1] + _CELL_M)
     holes = np.diff(edges_m) > 1.5 * _CELL_M  # a cell is 10 m long, also before a hole
     left, right = (np.where(holes, np.nan, one[first]) for one in (left, right))
-    line = _line(places, *read_semicolons(places, ("Distance [m]", "Lat", "Lon")))
+    line = _line(places, *_columns(places, "Distance [m]", "Lat", "Lon"))
     found = sorted(folder.rglob(f"{route}_aran_{side}.csv"))
     aran = _aran(found[0], line) if found else (None, None)
     return ProfiledRoad(f"{route.upper()} {side.upper()}", edges_m, left, right, line, *aran)
+
+
+def _columns(path: Path, *names: str) -> list[Array]:
+    """Of a table between semicolons, with cells that may be empty."""
+    return columns_of(read_bounded(path, MAX_BYTES), str(path), names)
 
 
 def _line(path: Path, at_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLine:
@@ -171,7 +178,7 @@ def _line(path: Path, at_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLi
 
 def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
     """ARAN's IRI, the mean of both tracks, and where on P79's line each of its rows begins."""
-    lat_deg, lon_deg, left, right = read_semicolons(path, ("Lat", "Lon", "Venstre IRI (m/km)", "Højre IRI (m/km)"))
+    lat_deg, lon_deg, left, right = _columns(path, "Lat", "Lon", "Venstre IRI (m/km)", "Højre IRI (m/km)")
     known = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg)
     at_m, aside_m = line.passed(lat_deg[known], lon_deg[known])
     on = aside_m <= ASIDE_M

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from logger.dsp.repeated_samples import find_repeats
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.csv_table import parse_columns, place
 from logger.store.formats.drive_file import DISTANCE, PLACE, SPEED, USABLE, header_of
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
@@ -52,17 +52,17 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
         return (TIME, *wanted) if good and len(wanted) <= MAX_CHANNELS else None
 
     header = f"a header with {TIME},{wished}, each once, at most {MAX_CHANNELS}"
-    wanted, table = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
+    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
     if len(table) < 2:
-        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     samples = table[:, 1:].copy()
     if (wild := np.abs(samples) > MAX_VALUE).any():
         row, column = (int(place[0]) for place in np.nonzero(wild))
-        raise BadInput(f"{file}:{row + 2}: expected {wanted[column + 1]} within {MAX_VALUE:g}, found "
+        raise BadInput(f"{place(file, row)}: expected {wanted[column + 1]} within {MAX_VALUE:g}, found "
                        f"{samples[row, column]:g}")
     for column, name in enumerate(wanted[1:]):
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
-            raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
+            raise BadInput(f"{place(file, 0)}: expected {name} to move, found {samples[0, column]:g} all along; "
                            "leave its column out")
     if repeats := find_repeats(samples):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
@@ -74,7 +74,8 @@ def is_drive(path: Path | str) -> bool:
     how = tuple(name for name in header_of(Path(path)) if name in (SPEED, DISTANCE))
     if not how:
         return False
-    _, table = parse_columns(read_bounded(path, MAX_BYTES), str(path), lambda _: how, ",".join(how))
+    table = parse_columns(read_bounded(path, MAX_BYTES), str(path),
+                          lambda there: how if set(how) <= set(there) else None, ",".join(how))[1]
     return any(float(np.ptp(one) if name == DISTANCE else one.max()) > _STANDING_M
                for name, one in zip(how, table.T, strict=True))
 

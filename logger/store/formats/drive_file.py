@@ -20,7 +20,7 @@ from logger.files import naming, read_bounded
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
-from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.csv_table import find_table, parse_columns, place
 from logger.store.formats.excitation_file import COLUMNS as EXCITATION_COLUMNS
 from logger.store.formats.excitation_file import read_excitation
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
@@ -110,8 +110,7 @@ def drive_in(folder: Path, timed: bool) -> Drive:
 
 def header_of(path: Path) -> tuple[str, ...]:
     """The names of a table's columns. BadInput for a file that cannot be read."""
-    first = read_bounded(path, MAX_BYTES).removeprefix(b"\xef\xbb\xbf").split(b"\n", 1)[0]
-    return tuple(name.strip() for name in first.decode("utf-8", "replace").split(","))
+    return find_table(read_bounded(path, MAX_BYTES), str(path), lambda names: TIME in names and len(names) > 1).names
 
 
 def driven_by_time(folder: Path) -> bool:
@@ -138,8 +137,8 @@ def excitation_beside(drive: Drive) -> Excitation:
 def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> Drive:
     """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns. Times
     and errors as in ``read_run``."""
-    columns = read_columns(path, timed, more)
-    return replace(drive_of(path, even_rate_hz(columns[TIME], str(path)), columns),
+    file, columns = read_columns(path, timed, more)
+    return replace(drive_of(path, even_rate_hz(columns[TIME], file), columns),
                    more={name: columns[name] for name in more})
 
 
@@ -151,18 +150,18 @@ def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> 
                  usable=columns.get(USABLE))
 
 
-def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> dict[str, Array]:
-    """The columns (n,) of a ``drive.csv`` by name, as they are written: their times may be uneven. Errors as in
-    ``read_run``.
+def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> tuple[str, dict[str, Array]]:
+    """The file's name for ``place``, and the columns (n,) of a ``drive.csv`` by name, as they are written: their times
+    may be uneven. Errors as in ``read_run``.
 
     timed    it is a rig's: speed and distance are 0, whatever it says of them
     more     columns that are read as well
     """
-    file, needed = str(path), (COLUMNS[:2] if timed else COLUMNS) + tuple(more)
-    names, table = parse_columns(read_bounded(file, MAX_BYTES), file, partial(_choose, needed=needed),
-                                 _HEADER.format(",".join(needed)))
+    needed = (COLUMNS[:2] if timed else COLUMNS) + tuple(more)
+    names, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), partial(_choose, needed=needed),
+                                       _HEADER.format(",".join(needed)))
     if len(table) < 2:
-        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     columns = dict(zip(names, table.T.copy(), strict=True))
     columns |= {name: np.zeros(len(table)) for name in COLUMNS if name not in columns}
     check_times(columns[TIME], file)
@@ -170,8 +169,8 @@ def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()
     _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
     if USABLE in columns and not (known := np.isin(columns[USABLE], (NO_READING, READING, CLIPPED))).all():
         row = int(np.argmin(known))
-        raise BadInput(f"{file}:{row + 2}: expected {USABLE} 0, 1 or 2, found {columns[USABLE][row]:g}")
-    return columns
+        raise BadInput(f"{place(file, row)}: expected {USABLE} 0, 1 or 2, found {columns[USABLE][row]:g}")
+    return file, columns
 
 
 def read_speeds(path: Path | str) -> tuple[Array, Array]:
@@ -180,22 +179,22 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for a speed below 0, and for times beyond
     1e5 s.
     """
-    header, file = (TIME, SPEED), str(path)
-    _, table = parse_columns(
-        read_bounded(path, MAX_BYTES), file,
+    header = (TIME, SPEED)
+    _, table, file = parse_columns(
+        read_bounded(path, MAX_BYTES), str(path),
         lambda names: header if all(names.count(name) == 1 for name in header) else None,
         f"a header with {','.join(header)}, each once",
     )
     if len(table) < 2:
-        raise BadInput(f"{file}:3: expected at least two times, found the end of the file")
+        raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
     time_s, speed_mps = table.T.copy()
     _check_size(time_s, TIME, _MAX_TIME_S, "s", file)
     if (back := np.diff(time_s) <= 0).any():
         row = int(np.argmax(back)) + 1
-        raise BadInput(f"{file}:{row + 2}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")
+        raise BadInput(f"{place(file, row)}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")
     if (speed_mps < 0).any():
         row = int(np.argmax(speed_mps < 0))
-        raise BadInput(f"{file}:{row + 2}: expected a speed of 0 or more, found {speed_mps[row]:g}")
+        raise BadInput(f"{place(file, row)}: expected a speed of 0 or more, found {speed_mps[row]:g}")
     _check_size(speed_mps, SPEED, MAX_SPEED_MPS, "m/s", file)
     return time_s, speed_mps
 
@@ -247,4 +246,4 @@ def _choose(names: tuple[str, ...], needed: tuple[str, ...]) -> tuple[str, ...] 
 def _check_size(values: Array, name: str, largest: float, unit: str, file: str) -> None:
     if (wild := np.abs(values) > largest).any():
         row = int(np.argmax(wild))
-        raise BadInput(f"{file}:{row + 2}: expected {name} within {largest:g} {unit}, found {values[row]:g}")
+        raise BadInput(f"{place(file, row)}: expected {name} within {largest:g} {unit}, found {values[row]:g}")

@@ -9,7 +9,7 @@ import numpy as np
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.profiles.excitation import Excitation
-from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.csv_table import parse_columns, place
 from logger.store.formats.erd_file import HIGHEST_M
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
@@ -23,15 +23,14 @@ def read_excitation(path: Path | str) -> Excitation:
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even and for
     elevations that no rig has.
     """
-    file = str(path)
-    names, table = parse_columns(
-        read_bounded(path, MAX_BYTES), file, lambda names: names if names in (COLUMNS[:2], COLUMNS) else None,
+    names, table, file = parse_columns(
+        read_bounded(path, MAX_BYTES), str(path), lambda names: names if names in (COLUMNS[:2], COLUMNS) else None,
         f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")
     if len(table) < _FEWEST:
-        raise BadInput(f"{file}:{len(table) + 2}: expected at least {_FEWEST} samples, found the end of the file")
+        raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
     for name, column in zip(names[1:], table.T[1:], strict=True):
         if (wild := np.abs(column) > HIGHEST_M).any():
             row = int(np.argmax(wild))
-            raise BadInput(f"{file}:{row + 2}: expected {name} within {HIGHEST_M:g} m, found {column[row]:g}")
+            raise BadInput(f"{place(file, row)}: expected {name} within {HIGHEST_M:g} m, found {column[row]:g}")
     heights = table[:, 1:] if len(names) > 2 else table[:, 1]
     return Excitation(even_rate_hz(table[:, 0], file), np.ascontiguousarray(heights), float(table[0, 0]))

@@ -96,6 +96,12 @@ def _unit(word: str) -> str:
     return SPELLINGS.get(word, word)
 
 
+def unit_of_cell(text: str) -> str | None:
+    """The unit that a cell below a column's name says, in brackets or without; None: it is none."""
+    unit = _unit(text.strip().strip("[]()"))
+    return unit if unit and any(unit in units_of(role) for role in ROLES) else None
+
+
 def unit_in(header: str, role: str) -> str | None:
     """The unit at the end of a column's name, if it is one of the role's."""
     found = _AT_THE_END.search(header)
@@ -104,11 +110,17 @@ def unit_in(header: str, role: str) -> str | None:
 
 
 def recognise(names: Sequence[str], stem: str, named: Named | None) -> Recognised | None:
-    """What is in a file with this header and name: the columns that are named, if they are enough for something, else
-    those of a known layout; None: nothing that is known. BadInput for a column that is there twice or named twice."""
+    """What is in a file with this header and name: the columns that are named and, where these are not enough for
+    anything, those of a known layout in the roles that nobody named; None: nothing that is enough. BadInput for a
+    column that is there twice or named twice."""
     there = [plain(one) for one in names]
-    by_name = _by_name(there, named or {})
-    return by_name if by_name is not None and by_name.is_enough else _by_layout(there, stem)
+    by_name, by_layout = _by_name(there, named or {}), _by_layout(there, stem)
+    if by_name is None or by_name.is_enough or by_layout is None:
+        return by_layout if by_name is None else by_name if by_name.is_enough else None
+    others = {role: column for role, column in by_layout.columns.items() if role not in (named or {})}
+    both = Recognised(f"{by_layout.name} and columns as named", others | dict(by_name.columns),
+                      by_layout.is_linear or by_name.is_linear)
+    return both if both.is_enough else None
 
 
 def _by_layout(there: list[str], stem: str) -> Recognised | None:
@@ -142,7 +154,8 @@ def _by_name(there: list[str], named: Named) -> Recognised | None:
         if found:
             unit = found[0].unit or unit_in(found[0].header, role)
             columns[role] = Column(found[0].header, unit)
-    return Recognised("columns as named", columns) if columns else None
+    linear = any("linear" in plain(columns[axis].header) for axis in AXES if axis in columns)
+    return Recognised("columns as named", columns, linear) if columns else None
 
 
 def advice(names: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ when ``resample_m`` asks for it, and the profile says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows
 from logger.store.formats.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
 
 Array = npt.NDArray[np.float64]
@@ -34,7 +34,6 @@ WIDEST_BRIDGED_M = 1.0
 # is taken for rounding.
 _ROUNDING_M = 0.0006
 _ROUNDING_STEPS = 0.05
-_SHOWN = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +62,18 @@ def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     data = read_bounded(path, MAX_BYTES)
     if is_erd(data):
         return _from_erd(parse_erd(data, path), str(path), resample_m)
-    return _from_table(parse_table(data, str(path)), str(path), resample_m)
+    return _from_table(*parse_table(data, str(path)), resample_m)
 
 
-def parse_table(data: bytes, file: str) -> Array:
-    """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]."""
+def parse_table(data: bytes, file: str) -> tuple[Array, str]:
+    """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]; and the file's name for
+    ``place``."""
 
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
         numbers = names[: -len(PLACE)] if names[-len(PLACE) :] == PLACE else names
         return numbers if numbers in (COLUMNS[:2], COLUMNS) else None
 
-    return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1]
+    return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1:]
 
 
 def read_places(path: Path | str) -> tuple[Array, Array, Array]:
@@ -83,69 +83,60 @@ def read_places(path: Path | str) -> tuple[Array, Array, Array]:
     cannot be.
     """
     file = str(path)
-    lines = read_bounded(path, MAX_BYTES).removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").splitlines()
-    names = [name.strip() for name in lines[0].split(",")] if lines else []
-    if not all(name in names for name in (COLUMNS[0], *PLACE)):
-        raise BadInput(f"{file}:1: expected a header with {COLUMNS[0]},{','.join(PLACE)}: a drive is found on the line "
-                       "by its places")
-    columns = [names.index(name) for name in (COLUMNS[0], *PLACE)]
-    found = []
-    for number, line in enumerate(lines[1:], 2):
-        fields = line.split(",")
-        texts = [fields[column].strip() if column < len(fields) else "" for column in columns]
-        if all(texts[1:]):
-            found.append(_place(texts, f"{file}:{number}"))
-        elif any(texts[1:]):
-            raise BadInput(f"{file}:{number}: expected both of {','.join(PLACE)} or neither")
-    if len(found) < 2:
-        raise BadInput(f"{file}: expected two rows or more with {','.join(PLACE)}, found {len(found)}")
-    distance_m, lat_deg, lon_deg = np.array(found).T
+    wanted = (COLUMNS[0], *PLACE)
+    table = find_table(read_bounded(path, MAX_BYTES), file, lambda names: set(wanted) <= set(names))
+    if not set(wanted) <= set(table.names):
+        raise BadInput(f"{file}:{table.line or 1}: expected a header with {','.join(wanted)}: a drive is found on the "
+                       "line by its places")
+    rows = read_rows(table, [table.names.index(name) for name in wanted], wanted, gaps=True)
+    known = np.isfinite(rows.values)
+    for row in np.flatnonzero(known[:, 1:].any(axis=1)):
+        _check_place(rows.values[row], f"{file}:{rows.lines[int(row)]}")
+    distance_m, lat_deg, lon_deg = rows.values[known[:, 1:].all(axis=1)].T.copy()
+    if len(distance_m) < 2:
+        raise BadInput(f"{file}: expected two rows or more with {','.join(PLACE)}, found {len(distance_m)}")
     return distance_m, lat_deg, lon_deg
 
 
-def _place(texts: Sequence[str], place: str) -> tuple[float, float, float]:
-    try:
-        distance_m, lat_deg, lon_deg = map(float, texts)
-    except ValueError:
-        raise BadInput(f"{place}: expected numbers, found {','.join(texts)[:_SHOWN]}") from None
+def _check_place(row: Array, where: str) -> None:
+    distance_m, lat_deg, lon_deg = row
+    if not np.isfinite(row[1:]).all():
+        raise BadInput(f"{where}: expected both of {','.join(PLACE)} or neither")
     if not abs(distance_m) <= FARTHEST_M:
-        raise BadInput(f"{place}: expected distances within {FARTHEST_M:g} m, found {texts[0][:_SHOWN]}")
+        raise BadInput(f"{where}: expected distances within {FARTHEST_M:g} m, found {distance_m:g}")
     if not (abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
-        raise BadInput(f"{place}: expected degrees within 90 north and south and 180 east and west, found "
-                       f"{','.join(texts)[:_SHOWN]}")
-    return distance_m, lat_deg, lon_deg
+        raise BadInput(f"{where}: expected degrees within 90 north and south and 180 east and west, found "
+                       f"{lat_deg:g},{lon_deg:g}")
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
     distance, tracks = table[:, 0], [np.ascontiguousarray(track) for track in table.T[1:]]
 
-    def place(sample: int) -> str:
-        return f"{file}:{sample + 2}"
-
     for track in tracks:
         if (wild := np.abs(track) > HIGHEST_M).any():
             sample = int(np.argmax(wild))
-            raise BadInput(f"{place(sample)}: expected elevations within {HIGHEST_M:g} m, found {track[sample]:g}")
+            raise BadInput(f"{place(file, sample)}: expected elevations within {HIGHEST_M:g} m, found "
+                           f"{track[sample]:g}")
     if (far := np.abs(distance) > FARTHEST_M).any():
         sample = int(np.argmax(far))
-        raise BadInput(f"{place(sample)}: expected distances within {FARTHEST_M:g} m, found {distance[sample]:g}")
+        raise BadInput(f"{place(file, sample)}: expected distances within {FARTHEST_M:g} m, found {distance[sample]:g}")
     if len(distance) < 2:
-        raise BadInput(f"{place(1)}: expected at least two samples, found the end of the file")
+        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     steps = np.diff(distance)
     if (steps <= 0).any():
         sample = int(np.argmax(steps <= 0)) + 1
-        raise BadInput(f"{place(sample)}: expected a distance above {distance[sample - 1]:.10g} m, "
+        raise BadInput(f"{place(file, sample)}: expected a distance above {distance[sample - 1]:.10g} m, "
                        f"found {distance[sample]:.10g}")
     if resample_m is not None:
         if steps.max() > WIDEST_BRIDGED_M:
             sample = int(np.argmax(steps)) + 1
-            raise BadInput(f"{place(sample)}: expected no gap above {WIDEST_BRIDGED_M:g} m, found one of "
+            raise BadInput(f"{place(file, sample)}: expected no gap above {WIDEST_BRIDGED_M:g} m, found one of "
                            f"{steps[sample - 1]:.6g} m: cut the profile there")
         return _resampled(distance, tracks, resample_m, file)
-    return Profile(float(distance[0]), _even_spacing(distance, steps, place), *_pair(tracks))
+    return Profile(float(distance[0]), _even_spacing(distance, steps, file), *_pair(tracks))
 
 
-def _even_spacing(distance: Array, steps: Array, place: Callable[[int], str]) -> float:
+def _even_spacing(distance: Array, steps: Array, file: str) -> float:
     """Spacing of the even grid nearest to the distances [m]; BadInput when they are off it by more than rounding."""
     number = np.arange(len(distance), dtype=float)
     centred = number - number.mean()
@@ -161,12 +152,12 @@ def _even_spacing(distance: Array, steps: Array, place: Callable[[int], str]) ->
     if odd.any():
         step = int(np.argmax(odd))
         fault = "a gap" if steps[step] > 1.5 * usual_m else "a step"
-        raise BadInput(f"{place(step + 1)}: expected even steps of {usual_m:.6g} m, found {fault} of "
+        raise BadInput(f"{place(file, step + 1)}: expected even steps of {usual_m:.6g} m, found {fault} of "
                        f"{steps[step]:.6g} m {hint}")
     grid = distance[0] + usual_m * number
     sample = int(np.argmax(np.abs(distance - grid) > _rounding_m(usual_m)))
-    raise BadInput(f"{place(sample)}: expected even steps of {usual_m:.6g} m to reach {grid[sample]:.10g} m, found "
-                   f"{distance[sample]:.10g} m {hint}")
+    raise BadInput(f"{place(file, sample)}: expected even steps of {usual_m:.6g} m to reach {grid[sample]:.10g} m, "
+                   f"found {distance[sample]:.10g} m {hint}")
 
 
 def _rounding_m(spacing_m: float) -> float:

@@ -20,6 +20,7 @@ from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
 from logger.dsp.repeated_samples import Repeats, find_repeats, fresh_times
 from logger.errors import BadInput
+from logger.store.formats.csv_table import place
 from logger.store.formats.drive_file import SPEED
 from logger.store.formats.record_file import TIME, VERTICAL, check_grows, even_rate_hz
 
@@ -162,8 +163,8 @@ def _resampled(
     widest_s = float(steps.max()) if len(steps) else 0.0
     if widest_s > WIDEST_STEP_S:
         row = int(np.searchsorted(times_s, taken_s[int(np.argmax(steps)) + 1]))
-        raise BadInput(f"{file}:{row + 2}: expected no hole above {WIDEST_STEP_S:g} s, found one of {widest_s:.4g} s: "
-                       "cut the record there")
+        raise BadInput(f"{place(file, row)}: expected no hole above {WIDEST_STEP_S:g} s, found one of "
+                       f"{widest_s:.4g} s: cut the record there")
     if len(steps) < 2:
         raise BadInput(f"{file}: expected three samples or more, found {len(taken_s)}")
     own_hz = mean_rate_hz(taken_s)
@@ -185,7 +186,7 @@ def even_times_of(t_s: Array, file: str) -> Array:
     cannot be, or a time is before the one before it."""
     if (back := np.diff(t_s) < 0).any():
         row = int(np.argmax(back)) + 1
-        raise BadInput(f"{file}:{row + 2}: expected no time before {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
+        raise BadInput(f"{place(file, row)}: expected no time before {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
     ends = burst_ends(t_s)
     if ends is not None:
         try:

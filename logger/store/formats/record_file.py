@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.csv_table import parse_columns, place
 
 Array = npt.NDArray[np.float64]
 
@@ -64,28 +64,28 @@ def read_record(path: Path | str) -> AccelerationRecord:
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
-    t_s, accel = read_columns(path)
-    rate_hz = even_rate_hz(t_s, str(path))
+    file, t_s, accel = read_columns(path)
+    rate_hz = even_rate_hz(t_s, file)
     return AccelerationRecord(float(t_s[0]), rate_hz, accel[VERTICAL], *(accel.get(name) for name in HORIZONTAL))
 
 
-def read_columns(path: Path | str) -> tuple[Array, dict[str, Array]]:
-    """The times (n,) [s] and accelerations by column (n,) of a record, the vertical first, as they are written.
+def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array]]:
+    """The file's name for ``place``, the times (n,) [s] and accelerations by column (n,) of a record, the vertical
+    first, as they are written.
 
     Raises BadInput ("file:line: expected ..., found ...") but for times that are not even.
     """
-    file = str(path)
-    wanted, table = parse_columns(read_bounded(path, MAX_BYTES), file, _choose, _HEADER)
+    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER)
     if len(table) < 2:
-        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     t_s = table[:, 0].copy()
     check_times(t_s, file)
     accel = dict(zip(wanted[1:], table.T[1:].copy(), strict=True))
     for name, samples in accel.items():
         if (wild := np.abs(samples) > MAX_MPS2).any():
-            line = int(np.argmax(wild)) + 2
-            raise BadInput(f"{file}:{line}: expected {name} within {MAX_MPS2:g} m/s2, found {samples[line - 2]:g}")
-    return t_s, accel
+            row = int(np.argmax(wild))
+            raise BadInput(f"{place(file, row)}: expected {name} within {MAX_MPS2:g} m/s2, found {samples[row]:g}")
+    return file, t_s, accel
 
 
 def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
@@ -98,14 +98,14 @@ def check_times(t_s: Array, file: str) -> None:
     """BadInput for times that no clock has."""
     if (far := np.abs(t_s) > MAX_TIME_S).any():
         sample = int(np.argmax(far))
-        raise BadInput(f"{file}:{sample + 2}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
+        raise BadInput(f"{place(file, sample)}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
 
 
 def check_grows(t_s: Array, file: str, mend: str = "") -> None:
     """BadInput, with what would ``mend`` it, for a time that is not after the one before."""
     if (early := np.diff(t_s) < 1.0 / MAX_RATE_HZ).any():
         sample = int(np.argmax(early)) + 1
-        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found "
+        raise BadInput(f"{place(file, sample)}: expected a time after {t_s[sample - 1]:.10g} s, found "
                        f"{t_s[sample]:.10g}{mend}")
 
 
@@ -121,9 +121,9 @@ def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
         usual_s = float(np.median(steps))
         odd = np.abs(steps - usual_s) > min(_ROUNDING_S, _ROUNDING_STEPS * usual_s)
         if not odd.any():
-            raise BadInput(f"{file}:{int(np.argmax(off)) + 2}: expected samples evenly {step_s:.6g} s apart, found one "
-                           f"{off.max():.3g} s off: the clock drifts{mend}")
+            raise BadInput(f"{place(file, int(np.argmax(off)))}: expected samples evenly {step_s:.6g} s apart, found "
+                           f"one {off.max():.3g} s off: the clock drifts{mend}")
         sample = int(np.argmax(odd)) + 1
-        raise BadInput(f"{file}:{sample + 2}: expected samples evenly {usual_s:.6g} s apart, found a step of "
+        raise BadInput(f"{place(file, sample)}: expected samples evenly {usual_s:.6g} s apart, found a step of "
                        f"{steps[sample - 1]:.6g} s{mend}")
     return 1.0 / step_s

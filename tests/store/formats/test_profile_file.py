@@ -50,34 +50,30 @@ def test_two_tracks_are_read(path: Path, ending: str, mark: bytes, tail: str) ->
 @settings(max_examples=50)
 def test_numbers_survive_to_the_last_bit(pairs: list[tuple[float, float]]) -> None:
     text = "\n".join([HEADER, *(f"{a!r},{b!r}" for a, b in pairs)])
-    assert parse_table(text.encode(), "x").tolist() == [list(pair) for pair in pairs]
+    assert parse_table(text.encode(), "x")[0].tolist() == [list(pair) for pair in pairs]
 
 
 @pytest.mark.parametrize(("content", "expected"), [
     ("", ":1: expected the header distance_m,elevation_m[,elevation_right_m], found nothing"),
-    ("0,1\n0.25,1\n", ":1: expected the header distance_m,elevation_m[,elevation_right_m], found '0,1'"),
-    ("distance_m;elevation_m\n0;1", ":1: expected the header distance_m,elevation_m[,elevation_right_m], found 'dist"),
+    ("0,1\n0.25,1\n", ":1: expected the header distance_m,elevation_m[,elevation_right_m], found numbers: no line"),
+    ("distance;elevation\n0;1", ":1: expected the header distance_m,elevation_m[,elevation_right_m], found 'dist"),
     ("elevation_m,distance_m\n0,1\n", ":1: expected the header"),
     (HEADER + ",roll\n0,1,2\n", ":1: expected the header"),
-    ((HEADER + "\n0,1\n").encode("utf-16"), ":1: expected the header"),
-    (b"\x00" * 5000, ":1: expected the header"),
+    (b"\x00" * 5000, ":1: expected text"),
     (HEADER, ":2: expected numbers below the header, found nothing"),
     (HEADER + "\n\n\n", ":2: expected numbers below the header, found nothing"),
     (HEADER + "\n0,1\n", ":3: expected at least two samples, found the end of the file"),
     (HEADER + "\n0,1\n0.25;1\n0.5,1", ":3: expected 2 fields (distance_m,elevation_m), found '0.25;1'"),
     (HEADER + "\n0,1\n0.25,1,2\n0.5,1", ":3: expected 2 fields (distance_m,elevation_m), found '0.25,1,2'"),
-    (HEADER + "\n0,1\n\n0.5,1", ":3: expected 2 fields (distance_m,elevation_m), found nothing"),
     (HEADER + "\n0,1\n0.25,\n0.5,1", ":3: expected a number for elevation_m, found nothing"),
     (HEADER + "\n0,1\n0.25,nan\n0.5,1", ":3: expected a number for elevation_m, found 'nan'"),
     (HEADER + "\n0,1\ninf,2\n0.5,1", ":3: expected a number for distance_m, found 'inf'"),
     (HEADER + "\n0,1\n0.25,1e999\n", ":3: expected a number for elevation_m, found '1e999'"),
     (HEADER + "\n0,1\n0.25,1_0\n", ":3: expected a number for elevation_m, found '1_0'"),
     (HEADER + "\n0,1\n0.25,0x1\n", ":3: expected a number for elevation_m, found '0x1'"),
-    (HEADER + "\n0,1\n0.25,\"1\"\n", ":3: expected a number for elevation_m, found '\"1\"'"),
-    (HEADER + "\n0,1\n# road\n", ":3: expected 2 fields"),
+    (HEADER + "\n0,1\nroad\n", ":3: expected 2 fields"),
     (HEADER + "\n0,1\n0.25," + "9" * 100_000 + "x\n", ":3: expected a number for elevation_m, found '9999"),
-    (HEADER + "\n0,1\r0.25,1\r", ":2: expected 2 fields"),
-    (HEADER.encode() + b"\n0,1\n0.25,\xff\x00\n", ":3: expected a number for elevation_m, found"),
+    (HEADER.encode() + b"\n0,1\n0.25,\xff\x00\n", ":3: expected text"),
     (HEADER + "\n0,1\n0.25,1\n0.25,1\n", ":4: expected a distance above 0.25 m, found 0.25"),
     (HEADER + "\n0,1\n0.25,1\n0.20,1\n", ":4: expected a distance above 0.25 m, found 0.2"),
 ])

@@ -65,7 +65,6 @@ def spoilt(**lines: str | None) -> list[str]:
         (spoilt(line4="5.02,abc"), r"a\.csv:4: expected a number for accel_z_mps2, found 'abc'"),
         (spoilt(line7="5.05,nan"), r"a\.csv:7: expected a number for accel_z_mps2, found 'nan'"),
         (spoilt(line9=","), r"a\.csv:9: expected a number for t_s, found nothing"),
-        (spoilt(line9=""), r"a\.csv:9: expected 2 fields \(t_s,accel_z_mps2\), found nothing"),
         (spoilt(line31="5.2"), r"a\.csv:31: expected 2 fields \(t_s,accel_z_mps2\), found '5\.2'"),
         (spoilt(line5="5.03,1,2", line6="5.04"), r"a\.csv:5: expected 2 fields"),
         (spoilt(line12=None), r"a\.csv:12: expected samples evenly 0\.01 s apart, found a step of 0\.02 s"),
@@ -81,7 +80,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, rows: list[str], c
         read_record(written(tmp_path / "a.csv", HEADER, rows))
 
 
-@pytest.mark.parametrize("header", ["", "t_s", "time,accel", "t_s,accel_z_mps2,t_s", "t_s,accel_x_mps2"])
+@pytest.mark.parametrize("header", ["x", "t_s", "time,accel", "t_s,accel_z_mps2,t_s", "t_s,accel_x_mps2"])
 def test_headers_that_will_not_do(tmp_path: Path, header: str) -> None:
     with pytest.raises(BadInput, match=r"a\.csv:1: expected a header with t_s,accel_z_mps2\["):
         read_record(written(tmp_path / "a.csv", header, GOOD))
