@@ -34,7 +34,7 @@ from logger.errors import BadInput
 from logger.runs import RecordFacts
 from logger.service.config import Config
 from logger.service.drive_readings import GridReadings
-from logger.store.formats.logger_columns import Named, Recognised, advice
+from logger.store.formats.logger_columns import Named, Recognised, advice, plain
 from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
 from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, units_of
 from logger.store.formats.record_file import MAX_MPS2
@@ -104,8 +104,9 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
         config = replace(config, vehicle=vehicle_path(asked.vehicle))
     model = read_model(config.vehicle)
     tell(f"reading {source.name}")
-    tables = _tables(source, asked)
-    notes = [("" if one.header.path == source else f"{one.header.path.name}: ") + f"{one.known.name} ({_listed(one)})"
+    notes: list[str] = []
+    tables = _tables(source, asked, notes)
+    notes += [("" if one.header.path == source else f"{one.header.path.name}: ") + f"{one.known.name} ({_listed(one)})"
              for one in tables.all()]
     time_s, samples, has_gravity = _accelerations(tables, asked, notes)
     origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
@@ -143,40 +144,85 @@ class _Tables:
         return found + [one for one in (self.gravity, self.location) if one is not None and one not in found]
 
 
-def _tables(source: Path, asked: Asked) -> _Tables:
+def _tables(source: Path, asked: Asked, notes: list[str]) -> _Tables:
     files = sorted(one for one in source.iterdir() if one.suffix.lower() == ".csv" and not one.is_symlink()
                    ) if source.is_dir() else [source]
     if not files:
         raise BadInput(f"{source}: expected a folder with CSV files, found none")
-    known = [(header, found) for header in map(read_header, files)
-             if (found := recognised(header, asked.columns)) is not None]
-    header, felt = _acceleration(source, files, known)
+    named = asked.columns
+    headers = _headers(source, files, named, notes)
+    known = [(header, found) for header in headers if (found := recognised(header, named)) is not None]
+    beside = [] if asked.location is None else [read_header(asked.location, named)]
+    _check_named(named or {}, [*headers, *beside])
+    unknown = [one.path.name for one in headers if one not in [header for header, _ in known]]
+    if source.is_dir() and unknown:
+        notes.append(f"not used, since nothing of it is known: {', '.join(unknown)}")
+    header, felt = _acceleration(source, headers, known)
     acceleration = read_table(header, felt)
     apart = [one for one in known if one[1].has_gravity and not one[1].has_acceleration]
     gravity = read_table(*apart[0]) if len(apart) == 1 and felt.is_linear else None
-    return _Tables(acceleration, gravity, _location(asked, acceleration, known))
+    return _Tables(acceleration, gravity, _location(beside, acceleration, known, named))
 
 
-def _acceleration(source: Path, files: list[Path], known: list[tuple[Header, Recognised]]) -> tuple[Header, Recognised]:
+def _headers(source: Path, files: list[Path], named: Named | None, notes: list[str]) -> list[Header]:
+    """Of each file; of a folder, which may hold anything, those that are tables."""
+    if not source.is_dir():
+        return [read_header(files[0], named)]
+    found = []
+    for file in files:
+        try:
+            found.append(read_header(file, named))
+        except BadInput as error:
+            notes.append(f"not used: {error}")
+    if not found:
+        raise BadInput(notes[0].removeprefix("not used: "))
+    return found
+
+
+def _check_named(named: Named, headers: list[Header]) -> None:
+    """BadInput for a column that somebody named and no file has: none is taken in its place."""
+    there = {plain(name) for header in headers for name in header.names}
+    for role, choices in named.items() if there else ():
+        if not any(plain(one.header) in there for one in choices):
+            found = "; ".join(f"{','.join(header.names)[:160]} in {header.path.name}" for header in headers[:2])
+            raise BadInput(f"--columns: expected {role}={choices[0].header} to name a column, found none of that name "
+                           f"among {found}")
+
+
+def _acceleration(source: Path, headers: list[Header], known: list[tuple[Header, Recognised]]
+                  ) -> tuple[Header, Recognised]:
     able = [one for one in known if one[1].has_acceleration and "t" in one[1].columns]
     whole = [one for one in able if not one[1].is_linear] or able
     if len(whole) > 1:
         raise BadInput(f"{source}: expected one file with accelerations, found "
                        f"{' and '.join(one[0].path.name for one in whole)}: give one of them and --location FILE")
     if not whole:
-        names = read_header(files[0]).names if len(files) == 1 else ()
-        found = ",".join(names)[:160] if names else f"{len(files)} files without any that is known"
-        raise BadInput(f"{files[0] if names else source}: expected columns of a known program, or named ones, with "
+        if len(headers) == 1 and not headers[0].names:
+            raise _no_header(headers[0])
+        names = headers[0].names if len(headers) == 1 else ()
+        found = ",".join(names)[:160] if names else f"{len(headers)} files without any that is known"
+        where = f"{headers[0].path}:{headers[0].line}" if names else source
+        raise BadInput(f"{where}: expected columns of a known program, or named ones, with "
                        f"time and three axes (or up), found {found}: give {advice(names)}")
     return whole[0]
 
 
-def _location(asked: Asked, acceleration: LoggerTable, known: list[tuple[Header, Recognised]]) -> LoggerTable | None:
-    if asked.location is not None:
-        header = read_header(asked.location)
-        found = recognised(header, asked.columns)
+def _no_header(header: Header) -> BadInput:
+    """What to do with a file of which no line names the columns."""
+    count = len(header.table.found.split(header.table.delimiter))
+    names = ("time", "up") if count == 2 else ("time", "x", "y", "z", *(f"c{n}" for n in range(5, count + 1)))
+    return header.table.no_header(f"a line with names of columns, such as {','.join(names[:count])}", advice(names))
+
+
+def _location(beside: list[Header], acceleration: LoggerTable, known: list[tuple[Header, Recognised]],
+              named: Named | None) -> LoggerTable | None:
+    for header in beside:
+        if not header.names:
+            raise header.table.no_header("a line with names of columns, such as time,lat,lon,speed",
+                                         advice(("time", "lat", "lon", "speed")))
+        found = recognised(header, named)
         if found is None or not found.has_location or "t" not in found.columns:
-            raise BadInput(f"{asked.location}:{header.line}: expected columns with time and a speed, or latitude and "
+            raise BadInput(f"{header.path}:{header.line}: expected columns with time and a speed, or latitude and "
                            f"longitude, found {','.join(header.names)[:160]}: give {advice(header.names)}")
         return read_table(header, found)
     if acceleration.known.has_location:
@@ -207,8 +253,10 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
     if len(time_s) < 2:
         raise BadInput(f"{table.header.path}: expected rows with a time and an acceleration, found {len(time_s)}")
     unit = _one_unit(table, roles)
+    is_said = asked.up is not None or table.known.is_linear
     apart = tables.gravity or (table if "gx" in table.columns else None)
-    if apart is not None and (unit is None or felt(time_s, samples).unit_mps2 is None):
+    has_it = not is_said and felt(time_s, samples, unit and ACCELERATION_UNITS[unit]).unit_mps2 is not None
+    if apart is not None and not has_it and asked.up is None:
         gravity_s, gravity = _ordered(apart, seconds(apart, table), GRAVITY, [])
         gravity_unit = _one_unit(apart, GRAVITY) or unit
         if unit is None or gravity_unit is None:
@@ -216,8 +264,8 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
                            "be added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
         gravity = np.stack([np.interp(time_s, gravity_s, axis) for axis in gravity.T], axis=1)
         samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[gravity_unit] * gravity
-        unit = "m/s2"
-    return time_s, *_in_si(table, time_s, samples, unit, roles, asked, notes)
+        unit, is_said = "m/s2", False
+    return time_s, *_in_si(table, time_s, samples, unit, is_said, roles, asked, notes)
 
 
 def _one_unit(table: LoggerTable, roles: tuple[str, ...]) -> str | None:
@@ -228,37 +276,36 @@ def _one_unit(table: LoggerTable, roles: tuple[str, ...]) -> str | None:
     return units[0] if units else None
 
 
-def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, roles: tuple[str, ...], asked: Asked,
-           notes: list[str]) -> tuple[Array, bool]:
-    """Samples in m/s2, by the size of gravity where no unit is said, and whether gravity is in them."""
-    from logger.extraction.levelling import NO_GRAVITY_MPS2, felt
+def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, is_linear: bool,
+           roles: tuple[str, ...], asked: Asked, notes: list[str]) -> tuple[Array, bool]:
+    """Samples in m/s2, and whether gravity is in them. A unit that is said holds; the size of gravity shows one only
+    where none is. ``is_linear``: gravity was taken out, as the layout or --up says."""
+    from logger.extraction.levelling import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
 
-    found, path = felt(time_s, samples), table.header.path
+    path, of_g = table.header.path, ACCELERATION_UNITS["g"]
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
-    if found.unit_mps2 is not None:
-        word = next(one for one, scale in ACCELERATION_UNITS.items() if np.isclose(scale, found.unit_mps2))
-        if unit not in (None, word):
-            raise BadInput(f"{path}: expected accelerations in {unit}, found gravity of {found.size:.4g}, as it is in "
-                           f"{word}: name the unit in --columns, {named}")
-        if unit is None:
-            notes.append(f"unit by the size of gravity: {word}")
-        if asked.up is not None:
-            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {found.size:.4g} "
-                           f"{word}, which shows which way is up: leave out --up")
-        return samples * found.unit_mps2, True
-    if unit is None:
-        raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to recognise the unit, found a "
-                       f"mean of {found.size:.3g}: name the unit in --columns, {named}, one of "
+    found = felt(time_s, samples, unit and ACCELERATION_UNITS[unit])
+    if unit is None and (is_linear or found.unit_mps2 is None):
+        raise BadInput(f"{path}: expected " + ("to know the unit, which no gravity shows" if is_linear else
+                       f"gravity near 9.8 (m/s2) or 1 (g), by which to recognise the unit, found a mean of "
+                       f"{found.size:.3g}") + f": name the unit in --columns, {named}, one of "
                        f"{', '.join(units_of(roles[0]))}")
-    samples = samples * ACCELERATION_UNITS[unit]
-    size_mps2 = found.size * ACCELERATION_UNITS[unit]
-    if size_mps2 >= NO_GRAVITY_MPS2:
-        raise BadInput(f"{path}: expected a mean of 9.8 m/s2 (gravity) or near 0 (gravity taken out), found "
-                       f"{size_mps2:.3g} m/s2: is the unit {unit} right, and did the phone lie still in its mount?")
-    if roles == AXES and asked.up is None:
+    if unit is None:
+        unit = next(one for one, scale in ACCELERATION_UNITS.items() if np.isclose(scale, found.unit_mps2 or 0.0))
+        notes.append(f"unit by the size of gravity: {unit}")
+    samples, size_mps2 = samples * ACCELERATION_UNITS[unit], found.size * ACCELERATION_UNITS[unit]
+    if found.unit_mps2 is not None:
+        if asked.up is not None:
+            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {size_mps2:.3g} "
+                           "m/s2, which shows which way is up: leave out --up")
+        return samples, True
+    if (asked.up is None if roles == AXES else not is_linear and size_mps2 >= NO_GRAVITY_MPS2):
+        likely = next((one for one in ACCELERATION_UNITS if one != unit and abs(
+            found.size * ACCELERATION_UNITS[one] / of_g - 1) < GRAVITY_WITHIN), None) if not is_linear else None
+        also = f", or, if the unit {unit} is wrong, name it: {named.removesuffix('UNIT')}{likely}" if likely else ""
         raise BadInput(f"{path}: expected gravity in the accelerations, by which to level them, found a mean of "
-                       f"{size_mps2:.2g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
-                       "gravity as well, or name the axis that points up: --up z (or -z, x, ...)")
+                       f"{size_mps2:.3g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
+                       f"gravity as well, or name the axis that points up: --up z (or -z, x, ...){also}")
     return samples, False
 
 

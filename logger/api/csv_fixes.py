@@ -81,7 +81,8 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
     if ratio is not None:
         raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the places, "
                        f"found places {ratio:.2g} times as far apart: name its unit in --columns, speed="
-                       f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}")
+                       f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}; or name t and "
+                       "speed alone, to go without the places")
 
 
 def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> Belief:

@@ -47,11 +47,12 @@ class Felt:
     unit_mps2: float | None
 
 
-def felt(time_s: Array, samples: Array) -> Felt:
-    """Of samples (n, axes) at times (n,) [s]."""
+def felt(time_s: Array, samples: Array, unit_mps2: float | None = None) -> Felt:
+    """Of samples (n, axes) at times (n,) [s], in a unit of so many m/s2; None: not known, the size of gravity shows
+    it."""
     mean = steady_mean(block_means(time_s, samples, BLOCK_S)[1])
     size = float(np.linalg.norm(mean))
-    units = (1.0, STANDARD_GRAVITY_MPS2, STANDARD_GRAVITY_MPS2 / 1000.0)
+    units = (1.0, STANDARD_GRAVITY_MPS2, STANDARD_GRAVITY_MPS2 / 1000.0) if unit_mps2 is None else (unit_mps2,)
     fits = [one for one in units if abs(size * one / STANDARD_GRAVITY_MPS2 - 1.0) < GRAVITY_WITHIN]
     return Felt(mean, size, fits[0] if fits else None)
 

@@ -193,6 +193,48 @@ def test_gravity_taken_out_needs_the_axis_that_points_up(drive: Drive, phone: Ph
                                        tmp_path / "ride" / "Location.csv", "--out", tmp_path / "runs", "--up", "z")
 
 
+def near_1(folder: Path, header: str, scale: float = 1.0) -> tuple[Path, Path]:
+    """A recording without gravity of a car that gains 1 m/s each second all along, and its fixes."""
+    time_s = np.arange(0, 12, 0.01)
+    rng = np.random.default_rng(5)
+    axes = scale * (np.array([1.0, 0.0, 0.0]) + 0.4 * rng.standard_normal((len(time_s), 3)))
+    fix_s = np.arange(0.0, 13.0)
+    return (table(folder / "accel.csv", header, time_s, *axes.T),
+            table(folder / "speed.csv", "t_s,speed_mps", fix_s, 2 + fix_s))
+
+
+LINEAR = '"Time (s)",' + ",".join(f'"Linear Acceleration {axis} (m/s^2)"' for axis in "xyz")
+NAMED = "t=t:s,x=ax:{0},y=ay:{0},z=az:{0},t=t_s:s,speed=speed_mps:m/s"
+
+
+@pytest.mark.parametrize(("header", "unit", "scale"), [(LINEAR, None, 1.0), ("t,ax,ay,az", "m/s2", 1.0),
+                                                       ("t,ax,ay,az", "g", 1 / 9.80665), ("t,ax,ay,az", "mg", 101.97)])
+def test_a_unit_that_was_said_holds_though_the_mean_is_near_1(
+        header: str, unit: str | None, scale: float, tmp_path: Path) -> None:
+    """The mean is the car's own acceleration: what looks like gravity in g is none where the unit is said."""
+    accel, speeds = near_1(tmp_path, header, scale)
+    words = ("--csv", accel, "--location", speeds, "--out", tmp_path / "o", *(
+        () if unit is None else ("--columns", NAMED.format(unit))))
+    found = columns(run_of(called("extract", *words, "--up", "z", "--json")))
+    assert found["accel_z_mps2"].std() == pytest.approx(0.4, rel=0.05)
+    assert "--up z" in refused(*words)
+
+
+def test_without_a_unit_and_without_gravity_the_unit_is_asked_for(tmp_path: Path) -> None:
+    accel, speeds = near_1(tmp_path, "t,ax,ay,az")
+    words = ("--csv", accel, "--location", speeds, "--out", tmp_path / "o", "--columns", NAMED.replace(":{0}", ""))
+    assert "x=ax:UNIT" in refused(*words, "--up", "z")
+
+
+def test_a_column_that_was_named_is_not_replaced_by_a_known_one(tmp_path: Path) -> None:
+    accel, _ = near_1(tmp_path, "t_s,accel_x_mps2,accel_y_mps2,accel_z_mps2")
+    words = ("--csv", accel, "--out", tmp_path / "o", "--speed", "10", "--up", "z", "--columns")
+    assert "z=az to name a column, found none of that name" in refused(*words, "t=t_s,x=accel_x_mps2,z=az")
+    every = ",".join(f"{axis}=accel_{axis}_mps2:g" for axis in "xyz")
+    found = columns(run_of(called("extract", *words, every, "--json")))  # t as in the layout
+    assert found["accel_z_mps2"].std() == pytest.approx(0.4 * 9.80665, rel=0.05)
+
+
 def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) -> None:
     time_s = np.arange(10, 60, 0.01)
     accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
@@ -235,7 +277,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(drive: Drive, phone: Phone, 
         ((tmp_path / "odd.csv",), "give --columns"),
         ((tmp_path / "gone.csv",), "expected a readable file"),
         ((tmp_path / "sum.csv", *names), "--columns: expected x=x:UNIT"),
-        ((tmp_path / "sum.csv", "--location", places, "--columns", "t=t,x=x:g,y=y:g,z=z:g"), "as it is in m/s2"),
+        ((tmp_path / "sum.csv", "--location", places, "--columns", "t=t,x=x:g,y=y:g,z=z:g"), "name it: x=x:m/s2"),
         ((tmp_path / "sum.csv", "--columns", "when=t"), "--columns: expected ROLE=COLUMN"),
         ((tmp_path / "later",), "expected columns of a known program"),
         ((tmp_path / "line.csv", "--location", places), "give --columns"),

@@ -93,10 +93,11 @@ class Table:
     body: bytes
     body_line: int
 
-    def no_header(self, wanted: str) -> BadInput:
-        """The complaint about a file whose first line has numbers where names should stand."""
+    def no_header(self, wanted: str, option: str = "") -> BadInput:
+        """The complaint about a file whose first line has numbers where names should stand, and the ``option`` to give
+        with it when it has them."""
         return BadInput(f"{self.file}:{self.body_line}: expected {wanted}, found numbers: no line names the columns; "
-                        "put one above them")
+                        f"put one above them{option and f', and give {option}'}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +168,7 @@ def _first(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: s
     """The first line as the header, whatever it is."""
     if not head:
         return Table(file, 1, "", (), (), ",", b"", 2)
-    delimiter = max(_delimiters(head[0][2], said), key=head[0][2].count)
+    delimiter = next((one for one in _delimiters(head[0][2], said) if one != _BLANKS), ",")
     return _below(data, file, head, *head[0], _names(head[0][2], delimiter), delimiter, None)
 
 

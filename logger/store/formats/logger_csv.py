@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import Names, Table, find_table, read_rows
+from logger.store.formats.csv_table import Names, Table, find_table, read_rows, shown
 from logger.store.formats.logger_columns import Named, Recognised, plain, recognise, unit_of_cell
 from logger.store.formats.logger_layouts import TIME_UNITS, units_of
 from logger.store.formats.record_file import MAX_BYTES, MAX_TIME_S
@@ -70,7 +70,7 @@ class LoggerTable:
 
 def read_header(path: Path, named: Named | None = None) -> Header:
     """The header of a file: the first line whose names are known or ``named``, else the most likely one. Raises
-    BadInput for a file that cannot be read as text."""
+    BadInput for a file that cannot be read as text, or has no such line."""
 
     def fits(names: Names) -> bool:
         try:
@@ -78,7 +78,11 @@ def read_header(path: Path, named: Named | None = None) -> Header:
         except BadInput:
             return True  # some name is there twice, which is said when the columns are recognised
 
-    return Header(path, find_table(read_bounded(path, MAX_BYTES), str(path), fits, unit_of_cell))
+    table = find_table(read_bounded(path, MAX_BYTES), str(path), fits, unit_of_cell)
+    if len(table.names) == 1:
+        raise BadInput(f"{path}:{table.line}: expected a header with names of columns between commas, semicolons or "
+                       f"tabs, found {shown(table.found)}")
+    return Header(path, table)
 
 
 def recognised(header: Header, named: Named | None) -> Recognised | None:

@@ -68,7 +68,8 @@ def spellings(rows: list[list[str]]) -> dict[str, bytes]:
                                                                               for row in quoted[1:])]),
         "spaces around": joined(rows, " , "), "sep line": "sep=;\r\n" + joined(rows, ";", "\r\n", comma=True),
         "comments above": "# made by a program\n# 100 Hz, 12 rows\n" + plain, "header in a comment": "# " + plain,
-        "comments between": plain.replace("\n", "\n# note, 1\n", 2), "blank lines": "\n\n" + plain.replace("\n", "\n\n"),
+        "comments between": plain.replace("\n", "\n# note, 1\n", 2),
+        "blank lines": "\n\n" + plain.replace("\n", "\n\n"),
         "one line above": "accelerometer,maker,2020-02-15_19-30-56\n" + plain,
         "block above": "Recorder;X 1\nRate;100\nStart;2024-05-01 10:00:00\n\n" + joined(rows, ";", comma=True),
         "numbers above": "Serial,4711\n1,2,3,4,5,6,7\n" + plain,
@@ -118,7 +119,7 @@ def test_each_row_knows_its_line() -> None:
     for spelling, data in spellings(rows).items():
         values, file = parsed(data)
         lines = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "latin-1").replace("\0", "")
-        lines = [""] + lines.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        lines = ["", *lines.replace("\r\n", "\n").replace("\r", "\n").split("\n")]
         assert values[:, 0].tolist() == N.tolist(), spelling
         for row in (0, 5, 11):
             number = int(place(file, row).rpartition(":")[2])
