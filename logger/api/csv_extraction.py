@@ -255,7 +255,7 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
     unit = _one_unit(table, roles)
     is_said = asked.up is not None or table.known.is_linear
     apart = tables.gravity or (table if "gx" in table.columns else None)
-    has_it = not is_said and felt(time_s, samples, unit and ACCELERATION_UNITS[unit]).unit_mps2 is not None
+    has_it = not is_said and felt(time_s, samples, ACCELERATION_UNITS.get(unit or "")).unit_mps2 is not None
     if apart is not None and not has_it and asked.up is None:
         gravity_s, gravity = _ordered(apart, seconds(apart, table), GRAVITY, [])
         gravity_unit = _one_unit(apart, GRAVITY) or unit
@@ -284,7 +284,7 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
 
     path, of_g = table.header.path, ACCELERATION_UNITS["g"]
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
-    found = felt(time_s, samples, unit and ACCELERATION_UNITS[unit])
+    found = felt(time_s, samples, ACCELERATION_UNITS.get(unit or ""))
     if unit is None and (is_linear or found.unit_mps2 is None):
         raise BadInput(f"{path}: expected " + ("to know the unit, which no gravity shows" if is_linear else
                        f"gravity near 9.8 (m/s2) or 1 (g), by which to recognise the unit, found a mean of "

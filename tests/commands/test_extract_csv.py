@@ -230,9 +230,9 @@ def test_a_column_that_was_named_is_not_replaced_by_a_known_one(tmp_path: Path) 
     accel, _ = near_1(tmp_path, "t_s,accel_x_mps2,accel_y_mps2,accel_z_mps2")
     words = ("--csv", accel, "--out", tmp_path / "o", "--speed", "10", "--up", "z", "--columns")
     assert "z=az to name a column, found none of that name" in refused(*words, "t=t_s,x=accel_x_mps2,z=az")
-    every = ",".join(f"{axis}=accel_{axis}_mps2:g" for axis in "xyz")
+    every = ",".join(f"{axis}=accel_{axis}_mps2:mg" for axis in "xyz")
     found = columns(run_of(called("extract", *words, every, "--json")))  # t as in the layout
-    assert found["accel_z_mps2"].std() == pytest.approx(0.4 * 9.80665, rel=0.05)
+    assert found["accel_z_mps2"].std() == pytest.approx(0.4 * 9.80665e-3, rel=0.05)
 
 
 def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) -> None:
