@@ -4,6 +4,7 @@
     |- DeviceError        the outside world; the supervisor closes the device, waits and tries again
     |  |- NotPresent      nothing answers: cable out, wrong address, no such port
     |  |- Timeout         it was there and has gone silent, or the bus is held low
+    |  |- Unforeseen      a library's or the program's own mistake while it was asked; no driver reckoned with it
     |  '- BadReply        something answers, but not what this device would say
     |     |- WrongDevice  another chip or instrument sits at this place
     |     '- SettingsLost it no longer holds what was written to it: restart it at once
@@ -26,6 +27,10 @@ class NotPresent(DeviceError):
 
 class Timeout(DeviceError):
     """The device or its bus has gone silent."""
+
+
+class Unforeseen(DeviceError):
+    """What no driver reckoned with. Its cause is what was raised."""
 
 
 class BadReply(DeviceError):

@@ -3,23 +3,29 @@
 Problem: both libraries report a missing device, missing rights and a pulled plug in ways of their own, and pyserial's
 ``read`` waits for a full buffer; and some USB adapters cannot read several I2C registers in one transfer. Solution: two
 functions that open a wire behind the protocols of ``drivers.ports``. What cannot be opened is NotPresent with the next
-step to take; what breaks later is an ``OSError`` with an errno.
+step to take; what breaks later is an ``OSError`` with an errno, whatever the library raises; closing raises nothing.
 """
 
 from __future__ import annotations
 
 import errno
 import logging
+import os
 import select
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from drivers.errors import NotPresent, SettingsError
+from drivers.foreign_faults import as_os_error, error_number, why_forbidden, words_of
 from drivers.ports import BytePort, I2cBus
 
 if TYPE_CHECKING:
     from serial import Serial
+    from smbus2 import SMBus
 
 WRITE_TIMEOUT_S = 1.0
+_PIPES = tuple(f"pipe_abort_{use}_{end}" for use in ("read", "write") for end in "rw")
+"""What a port of pyserial holds beside its own descriptor."""
 
 log = logging.getLogger(__name__)
 
@@ -33,24 +39,49 @@ def open_i2c(number: int, register_step: int | None = 1) -> I2cBus:
     from smbus2 import I2cFunc, SMBus
 
     bus = SMBus()
+    wire = _Bus(bus)
     try:
-        bus.open(number)
+        with as_os_error():
+            bus.open(number)
     except OSError as error:
-        bus.close()
-        raise NotPresent(f"/dev/i2c-{number}: {_i2c_hint(error)}") from error
+        wire.close()
+        raise NotPresent(f"/dev/i2c-{number}: {_i2c_hint(error, number)}") from error
     registers = I2cFunc.SMBUS_READ_BYTE_DATA | I2cFunc.SMBUS_WRITE_BYTE_DATA
     if bus.funcs & registers != registers:
-        bus.close()
+        wire.close()
         raise NotPresent(f"/dev/i2c-{number}: its adapter cannot read and write registers (i2cdetect -F {number} tells "
                          "what it can); connect the sensor to the Pi's own I2C pins, or use another adapter")
     if bus.funcs & I2cFunc.SMBUS_READ_I2C_BLOCK:
-        return bus
+        return wire
     if register_step is None:
-        bus.close()
+        wire.close()
         raise NotPresent(f"/dev/i2c-{number}: its adapter reads single registers only, and this chip needs blocks; "
                          "connect the sensor to the Pi's own I2C pins, or use another adapter")
     log.info("/dev/i2c-%d: its adapter reads no blocks, each register is read by itself", number)
-    return ByteReads(bus, register_step)
+    return ByteReads(wire, register_step)
+
+
+class _Bus:
+    """A bus of smbus2."""
+
+    def __init__(self, bus: SMBus) -> None:
+        self._bus = bus
+
+    def read_byte_data(self, i2c_addr: int, register: int) -> int:
+        with as_os_error():
+            return self._bus.read_byte_data(i2c_addr, register)
+
+    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
+        with as_os_error():
+            self._bus.write_byte_data(i2c_addr, register, value)
+
+    def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
+        with as_os_error():
+            return self._bus.read_i2c_block_data(i2c_addr, register, length)
+
+    def close(self) -> None:
+        with suppress(Exception):
+            self._bus.close()
 
 
 class ByteReads:
@@ -91,16 +122,14 @@ def open_serial(path: str, baud: int) -> BytePort:
 
     NotPresent when it is not there or may not be opened; SettingsError on a baud rate it cannot have.
     """
-    from serial import Serial, SerialException
+    from serial import Serial
 
     if baud <= 0:
         raise SettingsError(f"{path}: a baud rate is a positive number, not {baud}")
     try:
         port = Serial(path, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
-    except SerialException as error:
-        raise NotPresent(f"{path}: {_serial_hint(error)}") from error
-    except ValueError as error:
-        raise SettingsError(f"{path}: {error}") from error
+    except Exception as error:
+        raise NotPresent(f"{path}: {_serial_hint(error, path)}") from error
     return _SerialPort(path, port)
 
 
@@ -111,41 +140,62 @@ class _SerialPort:
     def __init__(self, path: str, port: Serial) -> None:
         self._path = path
         self._port = port
+        self._device = os.fstat(port.fd).st_rdev
 
     def read(self, size: int, timeout_s: float) -> bytes:
-        try:
+        with as_os_error(f"{self._path} has gone: "):
             ready, _, _ = select.select([self._port], [], [], timeout_s)
             return self._port.read(size) if ready else b""
-        except OSError as error:
-            raise self._gone(error) from error
 
     def write(self, data: bytes) -> int:
-        try:
+        with as_os_error(f"{self._path} has gone: "):
             return self._port.write(data) or 0
-        except OSError as error:
-            raise self._gone(error) from error
 
     def close(self) -> None:
-        self._port.close()
+        """Let go of all that pyserial holds, also where it gives up half way: else Python would have it close the same
+        numbers once more, which may be another file's by then, and a lock that stays would keep us from opening."""
+        port, fd = self._port, self._port.fd
+        with suppress(Exception):
+            port.close()
+        if not port.is_open:
+            return
+        port.is_open = False
+        if fd is not None and self._is_still(fd):
+            with suppress(OSError):
+                os.close(fd)
+        for name in _PIPES:
+            if (end := getattr(port, name, None)) is not None:
+                with suppress(OSError):
+                    os.close(end)
 
-    def _gone(self, error: OSError) -> OSError:
-        """pyserial's errors mostly carry no errno; whatever it was, the port has to be opened again."""
-        return OSError(error.errno or errno.EIO, f"{self._path} has gone: {error}")
+    def _is_still(self, fd: int) -> bool:
+        """Whether a number is still that of the port: Linux gives a descriptor back also where closing it failed."""
+        with suppress(OSError):
+            return os.fstat(fd).st_rdev == self._device
+        return False
 
 
-def _i2c_hint(error: OSError) -> str:
+def _i2c_hint(error: OSError, number: int) -> str:
     if error.errno == errno.ENOENT:
         return "no such bus; enable I2C (dtparam=i2c_arm=on in /boot/firmware/config.txt) and restart"
     if error.errno in (errno.EACCES, errno.EPERM):
-        return "not allowed; let the user join the group i2c (sudo usermod -aG i2c USER) and log in again"
+        return why_forbidden(error.errno, f"/dev/i2c-{number}", "rw", "i2c")
     return f"cannot be opened as an I2C bus: {error.strerror}"
 
 
-def _serial_hint(error: OSError) -> str:
-    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+def _serial_hint(error: Exception, path: str = "/dev/PORT") -> str:
+    """What to do about a port that pyserial cannot open. What it raises itself is of the opening and the lock; what it
+    lets through is of the settings and the lines (DTR, RTS) of a port that is open."""
+    from serial import SerialException
+
+    number = error_number(error)
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return "no such port; is the device plugged in, and the name right (see /dev/serial/by-id)?"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return "not allowed; let the user join the group dialout (sudo usermod -aG dialout USER) and log in again"
-    if error.errno in (errno.EAGAIN, errno.EBUSY):
-        return "another program has it open (gpsd, a serial console, a second ridelog?)"
-    return f"cannot be opened as a serial port: {error}"
+    if isinstance(error, SerialException):
+        if number in (errno.EACCES, errno.EPERM):
+            return why_forbidden(number, path, "rw", "dialout")
+        if number in (errno.EAGAIN, errno.EBUSY):
+            return "another program has it open (gpsd, a serial console, a second ridelog?)"
+    reason = os.strerror(number) if number is not None else words_of(error)
+    return (f"cannot be opened as a serial port: {reason}; unplug the device and plug it in again, and try another cable "
+            "or adapter if this stays")

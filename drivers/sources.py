@@ -203,10 +203,12 @@ class ChipSource:
         """Drop what is held back, stop the chip if it still answers, and let go of the bus."""
         self._drop()
         bus, device, self._bus, self._device = self._bus, self._device, None, None
-        if device is not None:
-            device.stop()
-        if bus is not None:
-            bus.close()
+        try:
+            if device is not None:
+                device.stop()
+        finally:
+            if bus is not None:
+                bus.close()
 
     def _drop(self) -> None:
         self.dropped += len(self._held)

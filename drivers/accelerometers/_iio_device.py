@@ -18,6 +18,7 @@ from typing import Any
 
 from drivers.accelerometers._iio_layout import AXES, MONOTONIC, TIMESTAMP
 from drivers.errors import BadReply, NotPresent
+from drivers.foreign_faults import why_forbidden
 
 DEVICES = Path("sys/bus/iio/devices")
 AUTO = "auto"
@@ -193,6 +194,10 @@ class ScanPort:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         except OSError as error:
             hint = "another program reads it" if error.errno == errno.EBUSY else error.strerror
+            if error.errno == errno.EPERM:
+                hint = why_forbidden(error.errno, path, "r", "i2c")
+            elif error.errno == errno.EACCES:
+                hint = "not allowed; let the group i2c read it, by a udev rule as in docs/installation.md"
             raise NotPresent(f"{path}: {hint}") from error
         self._wait_readable = wait_readable
 

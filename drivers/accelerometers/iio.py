@@ -104,7 +104,8 @@ class IioSource:
             self._scans.open()
             return
         try:
-            self._values = [os.open(path, os.O_RDONLY | os.O_CLOEXEC) for path in self._device.raw_files()]
+            for path in self._device.raw_files():
+                self._values.append(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
         except OSError as error:
             raise NotPresent(f"{self._device.path.name}: {error.strerror}") from error
 
@@ -140,11 +141,12 @@ class IioSource:
     def close(self) -> None:
         """Stop the buffer if it was started here, and let go."""
         values, self._values = self._values, []
+        device, self._device = self._device, None
         for descriptor in values:
             with suppress(OSError):
                 os.close(descriptor)
-        self._scans.close()
-        device, self._device = self._device, None
+        with suppress(OSError):
+            self._scans.close()
         if device is not None:
             device.close()
 

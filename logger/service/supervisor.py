@@ -1,16 +1,19 @@
 """Keeping one device alive: open, poll, and after a fault close, wait and open again.
 
 The wait doubles from half a second to half a minute, so that a cable that is out costs nothing and one that is
-put back is found soon. Only faults of the device are retried; a wrong setting or a programming error is not.
+put back is found soon. Whatever leaves a source is retried, for no fault of one may end the other; what is a mistake of
+the program goes to the log with its trace. A wrong setting is not retried.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 
 from drivers.dump import Event
-from drivers.errors import BadReply, DeviceError, SettingsLost
+from drivers.errors import BadReply, DeviceError, SettingsLost, Unforeseen
+from drivers.foreign_faults import as_device_error
 from drivers.sources import Source
 from logger.service.status import SensorState
 from logger.units import US_PER_S
@@ -92,7 +95,8 @@ class Supervisor:
         if not self._is_open and not self._try_open():
             return []
         try:
-            events = self._source.poll()
+            with as_device_error():
+                events = self._source.poll()
         except SettingsLost as error:
             self._lost(error)
             return []
@@ -109,7 +113,10 @@ class Supervisor:
 
     def flush(self) -> list[Event]:
         """What the device holds back, as far as it vouches for it."""
-        return self._source.flush()
+        events: list[Event] = []
+        with suppress(DeviceError), as_device_error():
+            events = self._source.flush()
+        return events
 
     def restart(self, doubt: str) -> None:
         """Ask for the device to be closed and opened at its next turn, though it answers. Any thread may."""
@@ -118,8 +125,7 @@ class Supervisor:
     def close(self) -> list[Event]:
         """Let go of the device for good; gives what it held back."""
         events = self.flush()
-        self._is_open = False
-        self._source.close()
+        self._let_go()
         return events
 
     def _try_open(self) -> bool:
@@ -127,7 +133,8 @@ class Supervisor:
         if now_us < self._retry_us:
             return False
         try:
-            self._source.open()
+            with as_device_error():
+                self._source.open()
         except DeviceError as error:
             self._give_up(error, now_us)
             return False
@@ -159,9 +166,14 @@ class Supervisor:
 
     def _give_up(self, error: DeviceError, now_us: int) -> None:
         if str(error) != self.error:
-            log.warning("%s: %s; trying again", self.name, error)
+            trace = error if isinstance(error, Unforeseen) else None
+            log.warning("%s: %s; trying again", self.name, error, exc_info=trace)
         self.error = str(error)
-        self._is_open = False
-        self._source.close()
+        self._let_go()
         self._retry_us = now_us + self._wait_us
         self._wait_us = min(2 * self._wait_us, LONGEST_WAIT_US)
+
+    def _let_go(self) -> None:
+        self._is_open = False
+        with suppress(DeviceError), as_device_error():
+            self._source.close()

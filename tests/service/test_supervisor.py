@@ -126,13 +126,29 @@ def test_an_open_device_that_says_nothing_is_silent(clock: Clock, device: Device
     assert supervisor.state() == "silent"
 
 
-def test_a_fault_of_the_program_is_not_swallowed(clock: Clock, device: Device) -> None:
+@pytest.mark.parametrize("fault", [ZeroDivisionError(), OSError(71, "Protocol error"), TypeError("torn away")])
+@pytest.mark.parametrize("call", ["open", "poll", "flush", "close"])
+def test_whatever_leaves_a_source_costs_its_own_readings_only(
+        clock: Clock, device: Device, call: str, fault: Exception, caplog: pytest.LogCaptureFixture) -> None:
     def broken() -> list[Event]:
-        raise ZeroDivisionError
+        raise fault
 
-    device.poll = broken  # type: ignore[method-assign]
-    with pytest.raises(ZeroDivisionError):
-        Supervisor(device, clock).step()
+    sound = getattr(device, call)
+    setattr(device, call, broken)
+    supervisor = Supervisor(device, clock)
+    for _ in range(FAULTS_IN_A_ROW + 1):
+        clock.now_us += FAULTY_US
+        supervisor.step()
+    supervisor.restart("looked odd")
+    supervisor.step()
+    if call in ("open", "poll"):
+        assert type(fault).__name__ in caplog.text or "Protocol error" in caplog.text
+        assert ("Traceback" in caplog.text) == (not isinstance(fault, OSError))
+    setattr(device, call, sound)
+    clock.now_us += LONGEST_WAIT_US
+    assert [event.data for event in supervisor.step()] == [device.answer]
+    setattr(device, call, broken)
+    assert supervisor.close() == []
 
 
 @pytest.mark.parametrize("fault", [Fault.NACK, Fault.TIMEOUT, Fault.STUCK_LOW])

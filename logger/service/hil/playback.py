@@ -24,7 +24,7 @@ import numpy as np
 from drivers.accelerometers import accelerometers, line_reader, serial_accelerometers
 from drivers.accelerometers.accelerometer import Decoder, SerialAccelerometer
 from drivers.dump import LATEST_US, DumpHeader, Event
-from drivers.errors import BadReply, SettingsError
+from drivers.errors import BadReply, NotPresent, SettingsError
 from drivers.ports import BytePort
 from drivers.readings import AccelerationBlock
 from drivers.recorded_words import RecordedWords
@@ -106,7 +106,7 @@ def send(
     """Write each event to the port of its source at its time, the first one now.
 
     ``sleep`` takes seconds; ``progress`` is called about once a second with the time played [s]. A chunk that is late
-    delays none of those that follow. Raises ``OSError`` for a port that has gone or takes nothing.
+    delays none of those that follow. Raises NotPresent for a port that has gone or takes nothing.
     """
     late_us = array("q")
     size_bytes = dict.fromkeys(ports, 0)
@@ -120,7 +120,10 @@ def send(
         while (wait_us := due_us - now_us()) > 0:
             sleep(wait_us / US_PER_S)
         late_us.append(-wait_us)
-        ports[event.source].write(event.data)
+        try:
+            ports[event.source].write(event.data)
+        except OSError as error:
+            raise NotPresent(f"the {event.source} port has gone: {error.strerror}") from error
         size_bytes[event.source] += len(event.data)
         if played_us - shown_us >= PROGRESS_EVERY_US:
             shown_us = played_us
