@@ -3,8 +3,8 @@
 Problem. pyserial lets the kernel's ``OSError`` and ``termios.error`` through where an adapter refuses a control
 transfer, and raises ``TypeError`` or ``struct.error`` for a port that was torn away between two calls; files of the
 kernel's drivers give any error number at any call. One that leaves a driver ends more than its own readings. Solution:
-two boundaries. What a library raises is ``OSError`` with a number (``as_os_error``: ``drivers.hardware``); what leaves a
-source is ``DeviceError``, whatever it was (``as_device_error``: around every call of a ``Source``).
+two boundaries. What a library raises is ``OSError`` with a number (``as_os_error``: ``drivers.hardware``); what leaves
+a source is ``DeviceError``, whatever it was (``as_device_error``: around every call of a ``Source``).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def as_os_error(begins: str = "") -> Iterator[None]:
     """Raise whatever is raised in here as ``OSError`` with a number (EIO where there is none), whose words begin so."""
     try:
         yield
-    except Exception as error:  # noqa: BLE001 - a library's, of any kind
+    except Exception as error:
         raise OSError(error_number(error) or errno.EIO, f"{begins}{words_of(error)}") from error
 
 

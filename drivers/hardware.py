@@ -127,10 +127,9 @@ def open_serial(path: str, baud: int) -> BytePort:
     if baud <= 0:
         raise SettingsError(f"{path}: a baud rate is a positive number, not {baud}")
     try:
-        port = Serial(path, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+        return _SerialPort(path, Serial(path, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True))
     except Exception as error:
         raise NotPresent(f"{path}: {_serial_hint(error, path)}") from error
-    return _SerialPort(path, port)
 
 
 class _SerialPort:
@@ -140,7 +139,7 @@ class _SerialPort:
     def __init__(self, path: str, port: Serial) -> None:
         self._path = path
         self._port = port
-        self._device = os.fstat(port.fd).st_rdev
+        self._device = os.fstat(port.fileno()).st_rdev
 
     def read(self, size: int, timeout_s: float) -> bytes:
         with as_os_error(f"{self._path} has gone: "):
@@ -197,5 +196,5 @@ def _serial_hint(error: Exception, path: str = "/dev/PORT") -> str:
         if number in (errno.EAGAIN, errno.EBUSY):
             return "another program has it open (gpsd, a serial console, a second ridelog?)"
     reason = os.strerror(number) if number is not None else words_of(error)
-    return (f"cannot be opened as a serial port: {reason}; unplug the device and plug it in again, and try another cable "
-            "or adapter if this stays")
+    return (f"cannot be opened as a serial port: {reason}; unplug the device and plug it in again, and try another "
+            "cable or adapter if this stays")

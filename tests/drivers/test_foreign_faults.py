@@ -1,4 +1,4 @@
-"""What pyserial, smbus2 and the system raise at real wires: it comes out as what the protocols say, and holds nothing."""
+"""What pyserial, smbus2 and the system raise at real wires comes out as the protocols say, and nothing stays open."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def every_error(kind: type[Exception] = OSError) -> list[Exception]:
 
 def held() -> set[str]:
     """Descriptors of this process, as what they lead to."""
-    return {os.readlink(entry) for entry in Path("/proc/self/fd").iterdir() if entry.is_symlink()}
+    return {str(entry.readlink()) for entry in Path("/proc/self/fd").iterdir() if entry.is_symlink()}
 
 
 @pytest.fixture
@@ -184,7 +184,7 @@ def test_what_a_driver_says_on_purpose_stays_as_it_is() -> None:
         with pytest.raises(type(known)) as caught, as_device_error():
             raise known
         assert caught.value is known
-    with pytest.raises(DeviceError, match="^/dev/x: Protocol error$"), as_device_error():
+    with pytest.raises(DeviceError, match=r"^/dev/x: Protocol error$"), as_device_error():
         raise OSError(errno.EPROTO, os.strerror(errno.EPROTO), "/dev/x")
 
 

@@ -1,5 +1,5 @@
 """The whole service while every call that its devices are reached by fails in every way: the other sensor goes on, rows
-are written, ``status`` names the device and the cause, the file is finished. The calls: ``tests.support.faults.foreign``.
+are written, ``status`` names the device and the cause, the file is finished. Calls: ``tests.support.faults.foreign``.
 """
 
 from __future__ import annotations
