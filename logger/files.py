@@ -14,13 +14,18 @@ from pathlib import Path
 from drivers.regular_file import open_regular
 from logger.errors import BadInput
 
+_GROWN_BYTES = 1 << 20
+
 
 def read_bounded(path: Path | str, max_bytes: int) -> bytes:
     """All bytes of a file. Raises BadInput for one that cannot be read or is longer than ``max_bytes``."""
     try:
         with open_regular(path) as file:
-            too_long = os.fstat(file.fileno()).st_size > max_bytes
-            data = b"" if too_long else file.read(max_bytes + 1)
+            size = os.fstat(file.fileno()).st_size
+            too_long = size > max_bytes
+            data = b"" if too_long else file.read(size + 1)  # what is asked for is held, also where nothing comes
+            while size < len(data) <= max_bytes and (more := file.read(_GROWN_BYTES)):  # it grows, or tells no size
+                data += more
     except OSError as error:
         raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
     if too_long or len(data) > max_bytes:

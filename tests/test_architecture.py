@@ -24,7 +24,7 @@ OUTWARD = ("ridelog.", "logger.public.")
 """Names of the public package: as others know it, and by its folder in a repository."""
 TREES = {module: ast.parse(path.read_text("utf-8")) for path, module in FILES.items()}
 FLOORS = (
-    "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
+    "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab", "extraction",
     "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "fleet", "demo",
@@ -37,7 +37,7 @@ NUMERICAL = FLOORS[: FLOORS.index("extraction") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle", "roads",
+    "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle", "roads",
     "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""

@@ -30,6 +30,7 @@ from logger.api.extracted_runs import (
     folder_of,
     write_runs,
 )
+from logger.bounds import ACCELERATION, samples_between
 from logger.errors import BadInput
 from logger.runs import RecordFacts
 from logger.service.config import Config
@@ -37,7 +38,6 @@ from logger.service.drive_readings import GridReadings
 from logger.store.formats.logger_columns import Named, Recognised, advice, plain
 from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
 from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, units_of
-from logger.store.formats.record_file import MAX_MPS2
 from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
@@ -314,10 +314,9 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     values = np.stack([table.columns[role] for role in roles], axis=1)
     rows = np.flatnonzero(np.isfinite(times_s) & np.isfinite(values).all(axis=1))
     time_s, values = times_s[rows], values[rows]
-    if (wild := (np.abs(values) > MAX_MPS2).any(axis=1)).any():
-        row = int(np.argmax(wild))
-        raise table.wrong(int(rows[row]), f"expected accelerations within {MAX_MPS2:g}, found "
-                          f"{np.abs(values[row]).max():g}")
+    for column, role in enumerate(roles):
+        values[:, column] = ACCELERATION.taken(table.known.columns[role].header, values[:, column],
+                                               lambda row: f"{table.header.path}:{table.lines[rows[row]]}")
     back_s = np.maximum.accumulate(time_s) - time_s if len(time_s) else time_s
     if (back_s > _DISORDER_S).any():
         row = int(np.argmax(back_s > _DISORDER_S))
@@ -398,6 +397,7 @@ def _fixes(tables: _Tables, asked: Asked, config: Config, origin_s: float, even:
     """Fixes as they are written, late as the receiver was."""
     path = tables.acceleration.header.path
     if asked.speed_mps is not None:
+        samples_between(even.time_s[-1] - even.time_s[0], 1.0, str(path))
         time_s = np.arange(even.time_s[0], even.time_s[-1], 1.0)
         nowhere = np.full(len(time_s), np.nan)
         return Fixes(time_s, np.full(len(time_s), asked.speed_mps), nowhere, nowhere)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.api.extracted_runs import Fixes
+from logger.bounds import SPEED
 from logger.errors import BadInput
 from logger.service.config import Config
-from logger.store.formats.drive_file import MAX_SPEED_MPS
 from logger.store.formats.logger_csv import LoggerTable, seconds
 from logger.store.formats.logger_layouts import PLACE, SPEED_UNITS
 
@@ -48,9 +48,9 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
                           f"{lon[row]:g}")
     speed = table.columns["speed"][order] * _speed_scale(table) if has_speed else nowhere
     speed = np.where(speed < 0, np.nan, speed)  # programs write -1 where it is not known
-    if (fast := speed > MAX_SPEED_MPS).any():
+    if (fast := speed > SPEED.largest).any():
         row = int(np.argmax(fast))
-        raise table.wrong(int(order[row]), f"expected a speed within {MAX_SPEED_MPS:g} m/s, found {speed[row]:.4g}: is "
+        raise table.wrong(int(order[row]), f"expected a speed within {SPEED.largest:g} m/s, found {speed[row]:.4g}: is "
                           "its unit right?")
     said_mps = np.where(speed >= standing_mps, speed, 0.0) if has_speed else np.full(len(order), np.inf)
     rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)), said_mps,
@@ -97,10 +97,11 @@ def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -
     alignment = DriveAlignment(2, 1.0)
     heard = even.present
     time_s, samples = even.time_s[heard], even.samples[heard]
-    ends_s = np.arange(time_s[0] + _FEED_S, time_s[-1] + _FEED_S, _FEED_S)
-    parts = np.split(np.arange(len(time_s)), np.searchsorted(time_s, ends_s))
+    turn = np.floor((time_s - time_s[0]) / _FEED_S)
+    first = np.flatnonzero(np.diff(turn)) + 1
+    ends_s = [*(time_s[0] + _FEED_S * (1 + turn[first - 1])), np.inf]
     fix = 0
-    for end_s, part in zip([*ends_s, np.inf], parts, strict=True):
+    for end_s, part in zip(ends_s, np.split(np.arange(len(time_s)), first), strict=True):
         while fix < len(fixes.time_s) and fixes.time_s[fix] < end_s:
             alignment.take_fix(float(fixes.time_s[fix]), float(fixes.speed_mps[fix]))
             fix += 1

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from logger import bounds
 from logger.api.bench import Notify, silent
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
@@ -370,7 +371,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
         raise BadInput(f"{run.path}: expected a drive over a road, found a run that is driven by time")
     road = None if run.profile is None else drive_file.track_of(run.profile)
     try:
-        ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, drive_file.MAX_SPEED_MPS)
+        ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, bounds.SPEED.largest)
     except Unusable as error:
         file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
         raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None

@@ -67,11 +67,11 @@ def check_distances(drive: Drive, file: Path) -> None:
     """Raise BadInput for distances that are none: they fall, leap, or have nothing to do with the speed."""
     import numpy as np
 
-    from logger.store.formats.drive_file import MAX_SPEED_MPS
+    from logger.bounds import SPEED
 
     distance_m = drive.distance_m
     for wrong, words in (
-        (np.diff(distance_m) > MAX_SPEED_MPS / drive.rate_hz + _BACK_M, "that grow steadily"),
+        (np.diff(distance_m) > SPEED.largest / drive.rate_hz + _BACK_M, "that grow steadily"),
         (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > _BACK_M, "that grow, as the car drives forward"),
     ):
         if wrong.any():

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import FASTEST_HZ
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
 from logger.dsp.repeated_samples import find_repeats, fresh_times, resolution
@@ -76,6 +77,9 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
         raise ValueError(f"expected {_FEWEST} samples or more that were taken, each at a time of its own, found fewer")
     own_hz = mean_rate_hz(max(taken, key=lambda one: len(one[0]))[0])
     dropped = 1.0 - sum(len(one[0]) for one in whole) / sum(len(part) for part in pieces)
+    if own_hz > FASTEST_HZ:
+        raise ValueError(f"expected at most {FASTEST_HZ:g} samples a second, found {own_hz:.3g}: is the unit of the "
+                         "time right?")
     if own_hz < LEAST_RATE_HZ:
         also = f" written at {len(time_s) / (time_s[-1] - time_s[0]):.3g} Hz" if dropped > 0 else ""
         raise ValueError(f"expected {LEAST_RATE_HZ:g} samples a second or more that were taken, found {own_hz:.3g}"

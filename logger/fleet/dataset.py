@@ -202,7 +202,7 @@ class Dataset:
                          int(file["last_day"]))
                 for file in one["files"])) for one in content["commits"])
             return Manifest(str(content["roads"]), float(content["trim_m"]), commits)
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             raise BadInput(f"{path}: expected the manifest of a fleet's dataset, format {_FORMAT}") from None
 
 

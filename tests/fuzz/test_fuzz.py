@@ -12,10 +12,14 @@ from pathlib import Path
 import pytest
 
 from ..support.fuzz import huge_inputs
+from ..support.fuzz.field_targets import FIELD_TARGETS
 from ..support.fuzz.mutation import Counts, fuzz, read_counts
-from ..support.fuzz.targets import TARGETS, Workshop
+from ..support.fuzz.targets import TARGETS as BYTE_TARGETS
+from ..support.fuzz.targets import Workshop
 
-INPUTS = {"vehicle_yaml": 250, "config_yaml": 300, "pasco_profile_yaml": 250, "pasco_ps2119": 300}
+TARGETS = {**BYTE_TARGETS, **FIELD_TARGETS}
+INPUTS = {"vehicle_yaml": 250, "config_yaml": 300, "pasco_profile_yaml": 250, "pasco_ps2119": 300,
+          "fields:phone_csv": 60, "fields:record_checks": 200, "fields:run_folder": 200, "fields:vehicle": 250}
 MEMORY_MB = 150
 ROOT = Path(__file__).resolve().parents[2]
 HUGE_GB = 0.02

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from logger.api.road_sets import expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, repeat_row
+from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
@@ -29,6 +30,8 @@ from logger.studies.study import Column, Effort, Item, Picture, Result, Study, T
 Array = npt.NDArray[np.float64]
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
+_COLUMNS = ("timestamp", "value", "lat", "lng")
+_QUANTITIES = (DISTANCE, SIGNAL, LATITUDE, LONGITUDE)
 _WINDOWS_M = (10.0, 100.0)
 _CELL_M, _MOST_CELLS = 10.0, 1
 _STRETCH_CELLS, _STRETCH_MOST_M = 20, 4.0
@@ -45,9 +48,11 @@ class ProfilerPass:
             points = json.loads(gzip.decompress(data) if path.suffix == ".gz" else data)["path"]["data"]
             rows = np.array([(float(one["timestamp"]), one["value"], one["pos"]["lat"], one["pos"]["lng"])
                              for one in points], dtype=np.float64)
-            at_m, self.iri_m_per_km, lat_deg, lon_deg = rows.T
+            at_m, self.iri_m_per_km, lat_deg, lon_deg = (
+                quantity.taken(name, column, lambda row: f"{path}: point {row + 1}")
+                for name, quantity, column in zip(_COLUMNS, _QUANTITIES, rows.T, strict=True))
             self.line = MeasuredLine.of(at_m, lat_deg, lon_deg)
-        except (KeyError, TypeError, ValueError, OSError, EOFError, zlib.error) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, OSError, EOFError, zlib.error) as error:
             raise BadInput(f"{path}: expected path.data with pos, timestamp (metres, growing) and value, found "
                            f"{type(error).__name__}: {str(error)[:80]}") from None
         self.name = path.name.split(".")[0].removeprefix("trip_iri_")

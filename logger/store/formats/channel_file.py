@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import SIGNAL
 from logger.dsp.repeated_samples import find_repeats
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import parse_columns, place
+from logger.store.formats.csv_table import parse_columns, place, taken
 from logger.store.formats.drive_file import DISTANCE, PLACE, SPEED, USABLE, header_of
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 
-MAX_VALUE = 1e12  # beyond it, squares lose their digits
 MAX_CHANNELS = 64
 LONGEST_NAME = 100
 NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)
@@ -55,11 +55,8 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
-    samples = table[:, 1:].copy()
-    if (wild := np.abs(samples) > MAX_VALUE).any():
-        row, column = (int(place[0]) for place in np.nonzero(wild))
-        raise BadInput(f"{place(file, row)}: expected {wanted[column + 1]} within {MAX_VALUE:g}, found "
-                       f"{samples[row, column]:g}")
+    samples = np.stack([taken(SIGNAL, name, column, file)
+                        for name, column in zip(wanted[1:], table.T[1:], strict=True)], axis=1)
     for column, name in enumerate(wanted[1:]):
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
             raise BadInput(f"{place(file, 0)}: expected {name} to move, found {samples[0, column]:g} all along; "

@@ -20,12 +20,14 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from math import isfinite, nan
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.errors import shortened
+from logger.bounds import Quantity
 from logger.errors import BadInput
 
 Array = npt.NDArray[np.float64]
@@ -71,6 +73,11 @@ def place(file: str, row: int) -> str:
     if not len(lines):
         return f"{file}:{row + 2}"
     return f"{file}:{lines[row] if row < len(lines) else lines[-1] + row + 1 - len(lines)}"
+
+
+def taken(quantity: Quantity, name: str, values: Array, file: str) -> Array:
+    """A column (n,) of a table, or of a stretch of it, within its bounds, as ``Quantity.taken``."""
+    return quantity.taken(name, values, partial(place, file))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,17 +15,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger import bounds
 from logger.errors import BadInput
 from logger.files import naming, read_bounded
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
-from logger.store.formats.csv_table import find_table, parse_columns, place
+from logger.store.formats.csv_table import find_table, parse_columns, place, taken
 from logger.store.formats.excitation_file import COLUMNS as EXCITATION_COLUMNS
 from logger.store.formats.excitation_file import read_excitation
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import Profile, read_profile
-from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, check_times, even_rate_hz
+from logger.store.formats.record_file import MAX_BYTES, TIME, VERTICAL, even_rate_hz
 from logger.store.formats.run_file import check_columns, read_run_facts
 
 Array = npt.NDArray[np.float64]
@@ -35,7 +36,8 @@ SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
 USABLE = "usable"
-MAX_SPEED_MPS = 150.0
+_QUANTITIES = {TIME: bounds.TIME, VERTICAL: bounds.ACCELERATION, SPEED: bounds.SPEED, DISTANCE: bounds.DISTANCE,
+               **dict(zip(PLACE, (bounds.LATITUDE, bounds.LONGITUDE), strict=True))}
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
 _LINES_AT_ONCE = 50_000
 _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
@@ -162,11 +164,9 @@ def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()
                                        _HEADER.format(",".join(needed)))
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
-    columns = dict(zip(names, table.T.copy(), strict=True))
+    columns = {name: taken(_QUANTITIES.get(name, bounds.SIGNAL), name, column, file)
+               for name, column in zip(names, table.T, strict=True)}
     columns |= {name: np.zeros(len(table)) for name in COLUMNS if name not in columns}
-    check_times(columns[TIME], file)
-    _check_size(columns[VERTICAL], VERTICAL, MAX_MPS2, "m/s2", file)
-    _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
     if USABLE in columns and not (known := np.isin(columns[USABLE], (NO_READING, READING, CLIPPED))).all():
         row = int(np.argmin(known))
         raise BadInput(f"{place(file, row)}: expected {USABLE} 0, 1 or 2, found {columns[USABLE][row]:g}")
@@ -187,15 +187,14 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     )
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
-    time_s, speed_mps = table.T.copy()
-    _check_size(time_s, TIME, _MAX_TIME_S, "s", file)
+    time_s = taken(replace(bounds.TIME, largest=_MAX_TIME_S), TIME, table[:, 0], file)
+    speed_mps = taken(bounds.SPEED, SPEED, table[:, 1], file)
     if (back := np.diff(time_s) <= 0).any():
         row = int(np.argmax(back)) + 1
         raise BadInput(f"{place(file, row)}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")
     if (speed_mps < 0).any():
         row = int(np.argmax(speed_mps < 0))
         raise BadInput(f"{place(file, row)}: expected a speed of 0 or more, found {speed_mps[row]:g}")
-    _check_size(speed_mps, SPEED, MAX_SPEED_MPS, "m/s", file)
     return time_s, speed_mps
 
 
@@ -241,9 +240,3 @@ def _choose(names: tuple[str, ...], needed: tuple[str, ...]) -> tuple[str, ...] 
     wanted = needed + (PLACE if any(name in names for name in PLACE) else ())
     wanted += (USABLE,) if USABLE in names else ()
     return wanted if all(names.count(name) == 1 for name in wanted) else None
-
-
-def _check_size(values: Array, name: str, largest: float, unit: str, file: str) -> None:
-    if (wild := np.abs(values) > largest).any():
-        row = int(np.argmax(wild))
-        raise BadInput(f"{place(file, row)}: expected {name} within {largest:g} {unit}, found {values[row]:g}")

@@ -29,6 +29,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import ELEVATION
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.store.formats.csv_table import refuse_long_lines, shown
@@ -43,7 +44,6 @@ MAX_HEADER_BYTES = 1024 * 1024
 MAX_NUMBERS = 50_000_000
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
 MAX_LINE = 64 * 1024
-HIGHEST_M = 10_000.0
 
 _BLOCK_BYTES = 1024 * 1024
 _FIELD_CHARS = 20
@@ -82,8 +82,8 @@ class ErdFile:
         """
         chosen = self._sides()
         tracks = tuple(self.values[:, channel] * self._unit_m(channel) for channel in chosen)
-        if any(np.abs(track).max(initial=0.0) > HIGHEST_M for track in tracks):
-            raise BadInput(f"{self.place}: expected elevations within {HIGHEST_M:g} m, found "
+        if any(np.abs(track).max(initial=0.0) > ELEVATION.largest for track in tracks):
+            raise BadInput(f"{self.place}: expected elevations within {ELEVATION.largest:g} m, found "
                            f"{max(np.abs(track).max() for track in tracks):.3g} (another byte order?)")
         return tracks
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from logger.bounds import ELEVATION
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.profiles.excitation import Excitation
-from logger.store.formats.csv_table import parse_columns, place
-from logger.store.formats.erd_file import HIGHEST_M
+from logger.store.formats.csv_table import parse_columns, place, taken
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 COLUMNS = (TIME, "elevation_m", "elevation_rear_m")
@@ -28,9 +28,6 @@ def read_excitation(path: Path | str) -> Excitation:
         f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")
     if len(table) < _FEWEST:
         raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
-    for name, column in zip(names[1:], table.T[1:], strict=True):
-        if (wild := np.abs(column) > HIGHEST_M).any():
-            row = int(np.argmax(wild))
-            raise BadInput(f"{place(file, row)}: expected {name} within {HIGHEST_M:g} m, found {column[row]:g}")
-    heights = table[:, 1:] if len(names) > 2 else table[:, 1]
+    columns = [taken(ELEVATION, name, column, file) for name, column in zip(names[1:], table.T[1:], strict=True)]
+    heights = np.stack(columns, axis=1) if len(columns) > 1 else columns[0]
     return Excitation(even_rate_hz(table[:, 0], file), np.ascontiguousarray(heights), float(table[0, 0]))

@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import TIME
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.store.formats.csv_table import Names, Table, find_table, read_rows, shown
 from logger.store.formats.logger_columns import Named, Recognised, plain, recognise, unit_of_cell
 from logger.store.formats.logger_layouts import TIME_UNITS, units_of
-from logger.store.formats.record_file import MAX_BYTES, MAX_TIME_S
+from logger.store.formats.record_file import MAX_BYTES
 
 Array = npt.NDArray[np.float64]
 
@@ -121,10 +122,10 @@ def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
         raise BadInput(f"{table.header.path}: expected to know the unit of the time {table.known.columns['t'].header}: "
                        f"give t={table.known.columns['t'].header}:UNIT in --columns, one of {', '.join(TIME_UNITS)}")
     times_s = np.asarray(times * TIME_UNITS[unit])
-    if (far := np.abs(times_s) > MAX_TIME_S).any():
-        raise table.wrong(int(np.argmax(far)), f"expected times within {MAX_TIME_S:g} s, found "
+    if (far := np.abs(times_s) > TIME.largest).any():
+        raise table.wrong(int(np.argmax(far)), f"expected times within {TIME.largest:g} s, found "
                           f"{times_s[np.argmax(far)]:.4g} s: is the unit {unit} right?")
-    return times_s
+    return np.where(np.abs(times_s) < TIME.least, 0.0, times_s)
 
 
 def _time_of(table: LoggerTable) -> str:

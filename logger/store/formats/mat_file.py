@@ -1,47 +1,64 @@
-"""Files of MATLAB up to version 7: plain arrays by name, and the coordinates of a ``geopoint`` object.
+"""Files of MATLAB of version 5 to 7: arrays of numbers by name, and the coordinates of a ``geopoint`` object.
 
 Problem: what MATLAB saves of an object of a class is not documented; readers give its bytes alone. Solution: those
-bytes are a variable of the documented format without a name (MAT-File Format, The MathWorks, "Subsystem data"). Given a
-name, they are read as any other, and the numbers in it are found by their size.
+bytes are elements of the documented format (MAT-File Format, The MathWorks, "Data Element Format" and "Subsystem
+data"). They are read as any other, and the numbers in them are found by their size.
+
+Elements are a kind and a size of 4 bytes each, or, up to 4 bytes long, of 2 bytes each; a matrix holds others: its
+class, its dimensions, its name, and its numbers or further matrices. They are followed here and not by SciPy, which
+follows a damaged size or class out of the file, where the process ends.
 """
 
 from __future__ import annotations
 
-import io
 import struct
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import read_bounded
+from logger.printable import printable
 
 Array = npt.NDArray[np.float64]
 
-_MOST_BYTES = 1 << 30
-_HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-_SUBSYSTEM = "__function_workspace__"
-_NAME_AT = 40  # after the tag of the matrix (8 bytes), its flags (16) and its two dimensions (16)
-_NO_NAME, _A_NAME = b"\x01\0\0\0\0\0\0\0", b"\x01\0\x01\0w\0\0\0"  # of 8-bit letters: none; one, in the short form
+_MOST_BYTES = 1 << 28
+_ORDERS = {b"IM": "<", b"MI": ">"}
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_FLOATING, _NUMERIC = (6, 7), range(6, 16)  # classes of matrices: double and single; these and whole numbers
+_COMPLEX = 1 << 11
 _FEWEST = 3
+_DEEPEST = 30
+
+
+@dataclass(frozen=True, eq=False)
+class _Matrix:
+    """A matrix of a file; ``numbers`` (n,) None: it holds something else, or matrices, ``inside``."""
+
+    name: str
+    numbers: Array | None
+    is_floating: bool
+    inside: tuple[_Matrix, ...]
 
 
 def read_arrays(path: Path, names: tuple[str, ...]) -> list[Array]:
-    """Arrays of these names, each as one row of numbers (n,). Raises BadInput for what is not there or no numbers."""
-    found = _load(path, read_bounded(path, _MOST_BYTES))
+    """Arrays of these names, each as one row of numbers (n,), column by column. Raises BadInput for what is not there
+    or no numbers."""
+    found = {one.name: one for one in _load(path)}
     arrays = []
     for name in names:
         if name not in found:
-            there = ", ".join(one for one in found if not one.startswith("__"))
-            raise BadInput(f"{path}: expected an array {name}, found {there[:160] or 'none'}")
-        value = np.asarray(found[name])
-        if value.dtype.kind not in "fiu" or value.size < 2:
-            raise BadInput(f"{path}: expected {name} to be numbers, found {value.dtype} of size {value.size}")
-        arrays.append(value.ravel().astype(np.float64))
+            raise BadInput(f"{path}: expected an array {name}, found {_names(found) or 'none'}")
+        numbers = found[name].numbers
+        if numbers is None or len(numbers) < 2:
+            raise BadInput(f"{path}: expected {name} to be numbers, found "
+                           f"{'something else' if numbers is None else len(numbers)}")
+        arrays.append(numbers)
     return arrays
 
 
@@ -52,54 +69,95 @@ def read_geopoint(path: Path) -> tuple[Array, Array]:
     In an object the first row of numbers within 90 degrees is taken for the latitudes, the next as long for the
     longitudes: in that order MATLAB keeps them.
     """
-    found = _load(path, read_bounded(path, _MOST_BYTES))
+    matrices = _load(path)
+    found = {one.name: one for one in matrices}
     if {"lat", "lon"} <= set(found):
         lat, lon = read_arrays(path, ("lat", "lon"))
         return lat, lon
-    rows = list(_rows(_subsystem(path, found))) if _SUBSYSTEM in found else []
+    nameless = [one.numbers for one in matrices if not one.name and one.numbers is not None]
+    rows = [row for numbers in nameless for row in _subsystem(path, numbers)]
     for first, lat in enumerate(rows):
         if np.abs(lat).max() <= 90 and np.ptp(lat) > 0:
             for lon in rows[first + 1:]:
                 if len(lon) == len(lat) and np.abs(lon).max() <= 180 and np.ptp(lon) > 0:
                     return lat, lon
-    there = ", ".join(one for one in found if not one.startswith("__"))
-    raise BadInput(f"{path}: expected a geopoint, or arrays lat and lon, found {there[:160] or 'nothing of that'}")
+    raise BadInput(f"{path}: expected a geopoint, or arrays lat and lon, found {_names(found) or 'nothing of that'}")
 
 
-def _load(path: Path, data: bytes) -> dict[str, Any]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
+def _names(found: dict[str, _Matrix]) -> str:
+    return printable(", ".join(one for one in found if one))[:160]
 
+
+def _load(path: Path) -> list[_Matrix]:
+    data = read_bounded(path, _MOST_BYTES)
+    if data.startswith(b"MATLAB 7.3"):
+        raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7")
+    order = _ORDERS.get(data[126:128])
+    if not data.startswith(b"MATLAB") or order is None:
+        raise BadInput(f"{path}: expected a .mat file of version 5 to 7, found another beginning: save it with -v7")
     try:
-        read: dict[str, Any] = loadmat(io.BytesIO(data))
-    except NotImplementedError:
-        raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7") from None
-    except (ValueError, TypeError, KeyError, IndexError, OSError, MemoryError, MatReadError, zlib.error) as error:
-        raise BadInput(f"{path}: expected a .mat file, found {str(error)[:120]}") from None
-    return read
+        return list(_matrices(data, 128, len(data), order))
+    except (ValueError, struct.error, zlib.error) as error:
+        raise BadInput(f"{path}: expected a whole .mat file, found {error}") from None
 
 
-def _subsystem(path: Path, found: dict[str, Any]) -> Any:
-    """What lies in the nameless variable: the first 8 bytes repeat version and byte order."""
-    held = np.asarray(found[_SUBSYSTEM]).tobytes()[8:]
-    if held[_NAME_AT: _NAME_AT + 8] == _NO_NAME:
-        held = held[:_NAME_AT] + _A_NAME + held[_NAME_AT + 8:]
-    kind, size = struct.unpack("<II", held[:8]) if len(held) >= 8 else (0, 0)
-    return _load(path, _HEADER + held[: 8 + size]) if kind == 14 else {}
+def _subsystem(path: Path, held: Array) -> list[Array]:
+    """Rows of numbers in the nameless variable, whose first 8 bytes repeat version and byte order."""
+    data = held.astype(np.uint8).tobytes()
+    try:
+        return list(_rows(list(_matrices(data, 8, len(data), _ORDERS.get(data[2:4], "<")))))
+    except (ValueError, struct.error, zlib.error) as error:
+        raise BadInput(f"{path}: expected a whole object, found {error}") from None
 
 
-def _rows(value: Any) -> Iterator[Array]:
-    """Every row of numbers in nested cells, structures and objects."""
-    if isinstance(value, dict):
-        for name, one in value.items():
-            if not name.startswith("__"):
-                yield from _rows(one)
-    elif isinstance(value, np.ndarray) and value.dtype.names:
-        for name in value.dtype.names:
-            for one in value[name].ravel():
-                yield from _rows(one)
-    elif isinstance(value, np.ndarray) and value.dtype == object:
-        for one in value.ravel():
-            yield from _rows(one)
-    elif isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size >= _FEWEST:
-        yield value.ravel().astype(np.float64)
+def _rows(matrices: list[_Matrix] | tuple[_Matrix, ...]) -> Iterator[Array]:
+    """Every row of floating numbers in nested cells, structures and objects."""
+    for one in matrices:
+        if one.numbers is not None and one.is_floating and len(one.numbers) >= _FEWEST and np.isfinite(
+                one.numbers).all():
+            yield one.numbers
+        yield from _rows(one.inside)
+
+
+def _elements(data: bytes, at: int, end: int, order: str) -> Iterator[tuple[int, int, int]]:
+    """Kind, begin and end of each element. ValueError for one that goes beyond what holds it."""
+    while at + 8 <= end:
+        kind, size = struct.unpack_from(order + "II", data, at)
+        body, after = at + 8, at + 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
+        if kind >> 16:
+            kind, size, body, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        if body + size > min(end, after):
+            raise ValueError(f"an element of {size} bytes where {max(0, end - body)} are left")
+        yield kind, body, body + size
+        at = after
+
+
+def _matrices(data: bytes, at: int, end: int, order: str, depth: int = 0) -> Iterator[_Matrix]:
+    if depth > _DEEPEST:
+        raise ValueError(f"more than {_DEEPEST} matrices inside each other")
+    for kind, begin, stop in _elements(data, at, end, order):
+        if kind == _COMPRESSED:
+            engine = zlib.decompressobj()
+            inside = engine.decompress(data[begin:stop], _MOST_BYTES)
+            if engine.unconsumed_tail:
+                raise ValueError(f"a variable of more than {_MOST_BYTES} bytes")
+            yield from _matrices(inside, 0, len(inside), order, depth + 1)
+        elif kind == _MATRIX and stop > begin:
+            yield _matrix(data, begin, stop, order, depth)
+
+
+def _matrix(data: bytes, begin: int, stop: int, order: str, depth: int) -> _Matrix:
+    parts = list(_elements(data, begin, stop, order))
+    if not parts or parts[0][2] - parts[0][1] < 8:
+        raise ValueError("a matrix without a class")
+    flags, = struct.unpack_from(order + "I", data, parts[0][1])
+    name = data[parts[2][1] : parts[2][2]].decode("latin-1") if len(parts) > 2 else ""
+    if flags & 0xFF not in _NUMERIC:
+        return _Matrix(name, None, False, tuple(_matrices(data, begin, stop, order, depth + 1)))
+    kind, first, last = parts[3] if len(parts) > 3 else (9, stop, stop)
+    if kind not in _NUMBERS or flags & _COMPLEX:
+        raise ValueError(f"numbers of a kind that there is not, {kind}, or complex ones")
+    form = np.dtype(order + _NUMBERS[kind])
+    with np.errstate(invalid="ignore"):  # of numbers that are none
+        numbers = np.frombuffer(data, form, (last - first) // form.itemsize, first).astype(np.float64)
+    return _Matrix(name, numbers, flags & 0xFF in _FLOATING, ())

@@ -17,17 +17,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import DISTANCE, ELEVATION, MOST_SAMPLES
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows
-from logger.store.formats.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
+from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
+from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
 
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 PLACE = ("lat_deg", "lon_deg")
 MAX_BYTES = 512 * 1024 * 1024
-FARTHEST_M = 1e9
 WIDEST_BRIDGED_M = 1.0
 """A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
 # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
@@ -102,24 +102,15 @@ def _check_place(row: Array, where: str) -> None:
     distance_m, lat_deg, lon_deg = row
     if not np.isfinite(row[1:]).all():
         raise BadInput(f"{where}: expected both of {','.join(PLACE)} or neither")
-    if not abs(distance_m) <= FARTHEST_M:
-        raise BadInput(f"{where}: expected distances within {FARTHEST_M:g} m, found {distance_m:g}")
+    DISTANCE.taken("distances", np.array([distance_m]), lambda row: where)
     if not (abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
         raise BadInput(f"{where}: expected degrees within 90 north and south and 180 east and west, found "
                        f"{lat_deg:g},{lon_deg:g}")
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
-    distance, tracks = table[:, 0], [np.ascontiguousarray(track) for track in table.T[1:]]
-
-    for track in tracks:
-        if (wild := np.abs(track) > HIGHEST_M).any():
-            sample = int(np.argmax(wild))
-            raise BadInput(f"{place(file, sample)}: expected elevations within {HIGHEST_M:g} m, found "
-                           f"{track[sample]:g}")
-    if (far := np.abs(distance) > FARTHEST_M).any():
-        sample = int(np.argmax(far))
-        raise BadInput(f"{place(file, sample)}: expected distances within {FARTHEST_M:g} m, found {distance[sample]:g}")
+    tracks = [taken(ELEVATION, "elevations", track, file) for track in table.T[1:]]
+    distance = taken(DISTANCE, "distances", table[:, 0], file)
     if len(distance) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     steps = np.diff(distance)
@@ -170,11 +161,10 @@ def _pair(tracks: Sequence[Array]) -> tuple[Array, Array | None]:
 
 def _resampled(distance: Array, tracks: Sequence[Array], spacing_m: float, file: str) -> Profile:
     length_m = float(distance[-1] - distance[0])
-    count = length_m / spacing_m if spacing_m > 0 else 0
-    if not 1 <= count < MAX_BYTES / 8:
+    if not 0 < spacing_m <= length_m <= MOST_SAMPLES * spacing_m:
         raise BadInput(f"{file}: expected a spacing within the {length_m:.6g} m of profile to resample to, "
                        f"found {spacing_m:g} m")
-    grid = distance[0] + spacing_m * np.arange(int(count + 1e-9) + 1)
+    grid = distance[0] + spacing_m * np.arange(int(length_m / spacing_m + 1e-9) + 1)
     laid = [np.interp(grid, distance, track) for track in tracks]
     return Profile(float(distance[0]), spacing_m, *_pair(laid), float(np.diff(distance).max()))
 

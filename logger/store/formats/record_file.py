@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger import bounds
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import parse_columns, place
+from logger.store.formats.csv_table import parse_columns, place, taken
 
 Array = npt.NDArray[np.float64]
 
@@ -23,11 +24,6 @@ TIME = "t_s"
 VERTICAL = "accel_z_mps2"
 HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
-# Beyond this something else than an acceleration has been written, and its fourth power may not be a number.
-MAX_MPS2 = 1e6
-# Seconds since 1970, and more; and no accelerometer is read faster.
-MAX_TIME_S = 1e10
-MAX_RATE_HZ = 1e6
 # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
 _ROUNDING_S = 0.00101
 _ROUNDING_STEPS = 0.2
@@ -78,14 +74,9 @@ def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array]]:
     wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER)
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
-    t_s = table[:, 0].copy()
-    check_times(t_s, file)
-    accel = dict(zip(wanted[1:], table.T[1:].copy(), strict=True))
-    for name, samples in accel.items():
-        if (wild := np.abs(samples) > MAX_MPS2).any():
-            row = int(np.argmax(wild))
-            raise BadInput(f"{place(file, row)}: expected {name} within {MAX_MPS2:g} m/s2, found {samples[row]:g}")
-    return file, t_s, accel
+    return file, taken(bounds.TIME, TIME, table[:, 0], file), {
+        name: taken(bounds.ACCELERATION, name, samples, file)
+        for name, samples in zip(wanted[1:], table.T[1:], strict=True)}
 
 
 def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
@@ -94,16 +85,9 @@ def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 
 
-def check_times(t_s: Array, file: str) -> None:
-    """BadInput for times that no clock has."""
-    if (far := np.abs(t_s) > MAX_TIME_S).any():
-        sample = int(np.argmax(far))
-        raise BadInput(f"{place(file, sample)}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
-
-
 def check_grows(t_s: Array, file: str, mend: str = "") -> None:
     """BadInput, with what would ``mend`` it, for a time that is not after the one before."""
-    if (early := np.diff(t_s) < 1.0 / MAX_RATE_HZ).any():
+    if (early := np.diff(t_s) < 1.0 / bounds.FASTEST_HZ).any():
         sample = int(np.argmax(early)) + 1
         raise BadInput(f"{place(file, sample)}: expected a time after {t_s[sample - 1]:.10g} s, found "
                        f"{t_s[sample]:.10g}{mend}")
@@ -111,7 +95,7 @@ def check_grows(t_s: Array, file: str, mend: str = "") -> None:
 
 def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
     """The rate of the times; BadInput with the line where they leave an even grid, and what would ``mend`` it."""
-    check_times(t_s, file)
+    taken(bounds.TIME, TIME, t_s, file)
     steps = np.diff(t_s)
     check_grows(t_s, file, mend if (steps >= 0).all() and steps.any() else "")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import DISTANCE
 from logger.errors import BadInput
 from logger.store.formats.road_lines import read_geojson, road_lines_of
 
@@ -67,7 +67,8 @@ def _metres(path: Path | str, named: dict[str, Any], key: str) -> float | None:
     value = named.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (
+            abs(value) <= DISTANCE.largest / 1000):
         raise BadInput(f"{path}: {key}: expected a number of kilometres, found {json.dumps(value)[:40]}")
     return 1000.0 * value
 

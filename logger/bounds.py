@@ -1,0 +1,68 @@
+"""What a number out of a file can be, and how many numbers may be made of it: one place for every reader.
+
+Problem: a file of a few lines can hold an acceleration of 1e-160 m/s2, whose square is 0, or a clock that steps by 1e-8
+s, for which a filter of gigabytes would be made. Solution: each quantity has a largest size, beyond which it is refused
+with its line, and a least one, far below what any instrument resolves, under which it is 0; and who makes as many
+numbers as a file's lengths and rates ask for counts them first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+
+Array = npt.NDArray[np.float64]
+
+MOST_SAMPLES = 10_000_000
+"""28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""
+FASTEST_HZ = 1e6
+"""No accelerometer is read faster."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measured quantity: its unit, its largest size, and the size below which it is 0."""
+
+    unit: str
+    largest: float
+    least: float
+
+    def taken(self, name: str, values: Array, place: Callable[[int], str]) -> Array:
+        """The values (n,) of a column as they count.
+
+        place    of the row with this number, as complaints begin: "file:line"
+
+        Raises BadInput for one that is larger than anything that is measured.
+        """
+        size = np.abs(values)
+        if (wild := ~(size <= self.largest)).any():
+            row = int(np.argmax(wild))
+            raise BadInput(f"{place(row)}: expected {name} within {self.largest:g} {self.unit}".rstrip()
+                           + f", found {values[row]:g}")
+        return np.where(size < self.least, 0.0, values)
+
+
+TIME = Quantity("s", 1e10, 1e-12)
+"""Seconds since 1970, and more."""
+ACCELERATION = Quantity("m/s2", 1e6, 1e-9)
+"""A larger one is something else, and its fourth power may not be a number. A smaller one is about as much as the
+quietest ground moves (J. Peterson, USGS 93-322, 1993: 6e-10 m/s2 per root hertz and more)."""
+SPEED = Quantity("m/s", 150.0, 1e-9)
+DISTANCE = Quantity("m", 1e9, 1e-9)
+ELEVATION = Quantity("m", 1e4, 1e-12)
+LATITUDE, LONGITUDE = Quantity("degrees", 90.0, 0.0), Quantity("degrees", 360.0, 0.0)
+SIGNAL = Quantity("", 1e12, 1e-30)
+"""Of any sensor, in any unit: beyond, squares lose their digits, or are lost."""
+
+
+def samples_between(span: float, step: float, words: str) -> int:
+    """How many steps a span has, where so many numbers are to be made. Raises BadInput, which begins with ``words``,
+    for more than ``MOST_SAMPLES``."""
+    if not span <= MOST_SAMPLES * step:
+        raise BadInput(f"{words}: expected at most {MOST_SAMPLES} samples, found {span:.4g} in steps of {step:.4g}")
+    return int(span / step)
