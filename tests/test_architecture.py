@@ -37,8 +37,8 @@ NUMERICAL = FLOORS[: FLOORS.index("extraction") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle", "roads",
-    "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
+    "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle",
+    "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [
