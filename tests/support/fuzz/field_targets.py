@@ -172,16 +172,10 @@ def phone(folder: Path) -> Target:
         alone = b"lat_deg" in data[:200]
         asked = Asked(named_columns(columns) if data.startswith(b"time") else None,
                       None if alone else place, speed_mps=12.0 if rng.random() < 0.1 else None)
-        try:
-            found = _recorded(file.hold(data), asked, Config(), lambda words: None)
-        except BadInput as error:
-            if str(error).startswith(str(place)):
-                raise BadInput(str(file.path) + str(error).removeprefix(str(place))) from error
-            raise
+        found = _recorded(file.hold(data), asked, Config(), lambda words: None)
         _finite(found.readings.time_s, found.readings.accel_mps2, found.fixes.time_s, found.fixes.speed_mps)
         return len(found.notes), found.torn_tail
-    return Target("phone csv", [one, ridelog, semicolons], read, damage=fields.tables(), file=str(file.path),
-                  limit_s=10.0)
+    return Target("phone csv", [one, ridelog, semicolons], read, damage=fields.tables(), limit_s=10.0)
 
 
 def vehicle(folder: Path) -> Target:
