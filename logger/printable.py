@@ -1,16 +1,66 @@
-"""Text from outside, fit for a terminal.
+"""Words from outside, fit for a terminal, a page, a table, and the files of other programs.
 
-Problem. A file's name, or a word in it, may hold control characters: printed as they are they clear the screen, turn
-the direction of writing, or end the line and begin one that says "ok"; and bytes that are no text cannot be printed at
-all. Solution: what cannot be seen is shown by its number.
+Problem. The name of a car, a sensor, a road or a file comes from whoever made it. Control characters clear a terminal's
+screen or end the line and begin one that says "ok"; marks of direction and characters without width make a word read
+as another one; a spreadsheet computes a cell that begins with =; a megabyte fills every page; and bytes that are no
+text cannot be printed at all. Solution. What cannot be seen is shown by its number, a word has ``LONGEST_WORD``
+characters at most, and a cell that a spreadsheet would compute begins with an apostrophe.
 """
 
 from __future__ import annotations
 
+import re
+from typing import Any
 
-def printable(text: str) -> str:
-    """Escape what is not printable, line ends too, as ``\\x1b``, ``\\u202e`` or ``\\U000e0001``."""
-    return text if text.isprintable() else "".join(map(_shown, text))
+LONGEST_WORD = 80
+"""Characters of a word from outside; of a longer one the middle is left out. That of ``drivers.errors.shortened``."""
+
+LONGEST_COMPLAINT = 80 * 24
+"""Characters of a complaint, which is one line: a terminal of the usual size, full."""
+
+# What Unicode counts as printable and draws as nothing: fillers, joiners, variation selectors and the empty pattern of
+# Braille (Unicode 15, property Default_Ignorable_Code_Point, less what str.isprintable refuses; U+2800).
+_UNSEEN = re.compile("[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0"
+                     "\U000e0100-\U000e01ef]")
+_COMPUTED = re.compile(r"(^|[,;])(?=\s*[-=+@＝＋－＠])")
+"""Where a cell begins that some spreadsheet takes for more than text (OWASP, CSV Injection), also behind what separates
+cells in one of another country."""
+_LEFT_OUT = "..."
+
+
+def printable(text: str, keep: str = "") -> str:
+    """Escape what cannot be seen, as ``\\x1b``, ``\\u202e`` or ``\\U000e0001``: line ends too, but for what is in
+    ``keep``."""
+    plain = text.translate(dict.fromkeys(map(ord, keep))) if keep and not text.isprintable() else text
+    if plain.isprintable() and (plain.isascii() or not _UNSEEN.search(plain)):
+        return text
+    return "".join(one if one in keep else _shown(one) for one in text)
+
+
+def word(text: str, longest: int = LONGEST_WORD) -> str:
+    """A word from outside: ``printable``, and of at most ``longest`` characters, of which the first and last stay."""
+    if len(text) > longest:  # the middle of a megabyte is never looked at
+        half = longest // 2
+        text = text[:half] + _LEFT_OUT + text[-half:]
+    shown = printable(text)
+    if len(shown) <= longest:
+        return shown
+    end = (longest - len(_LEFT_OUT)) // 2
+    return shown[: longest - len(_LEFT_OUT) - end] + _LEFT_OUT + shown[-end:]
+
+
+def words_in(content: Any) -> Any:
+    """What a JSON file holds, with every text in it as a ``word``, keys too."""
+    if isinstance(content, dict):
+        return {word(key): words_in(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [words_in(value) for value in content]
+    return word(content) if isinstance(content, str) else content
+
+
+def cell(text: str) -> str:
+    """A word for a table that a spreadsheet may open: with an apostrophe before what it would compute."""
+    return _COMPUTED.sub(r"\1'", text)
 
 
 def counted(number: int, what: str) -> str:
@@ -19,7 +69,7 @@ def counted(number: int, what: str) -> str:
 
 
 def _shown(character: str) -> str:
-    if character.isprintable():
+    if character.isprintable() and not _UNSEEN.match(character):
         return character
     code = ord(character)
     if code < 0x100:

@@ -32,6 +32,7 @@ from logger.api.extracted_runs import (
 )
 from logger.bounds import ACCELERATION, samples_between
 from logger.errors import BadInput
+from logger.printable import word
 from logger.runs import RecordFacts
 from logger.service.config import Config
 from logger.service.drive_readings import GridReadings
@@ -106,8 +107,8 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
     tell(f"reading {source.name}")
     notes: list[str] = []
     tables = _tables(source, asked, notes)
-    notes += [("" if one.header.path == source else f"{one.header.path.name}: ") + f"{one.known.name} ({_listed(one)})"
-             for one in tables.all()]
+    notes += [("" if one.header.path == source else f"{word(one.header.path.name)}: ")
+              + f"{one.known.name} ({_listed(one)})" for one in tables.all()]
     time_s, samples, has_gravity = _accelerations(tables, asked, notes)
     origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
     tell("laying it on an even grid")
@@ -235,7 +236,7 @@ def _location(beside: list[Header], acceleration: LoggerTable, known: list[tuple
 
 
 def _listed(table: LoggerTable) -> str:
-    words = (f"{role}={column.header}" + (f":{column.unit}" if column.unit else "")
+    words = (f"{role}={word(column.header)}" + (f":{column.unit}" if column.unit else "")
              for role, column in table.known.columns.items())
     return ", ".join(words)
 

@@ -16,6 +16,7 @@ from drivers.events import GPS, Event
 from drivers.readings import Fix
 from logger.api.shown import Shown, table
 from logger.errors import BadInput
+from logger.printable import word
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -171,7 +172,7 @@ class Dump(Shown):
                    for name in dict.fromkeys(event.source for event in self.events)}
         lasts_s = (self.events[-1].t_us - self.events[0].t_us) * _US if self.events else 0.0
         return table(f"Dump {self.path}", [
-            ("accelerometer", self.header.accelerometer["driver"], ""), ("vehicle", self.header.vehicle, ""),
+            ("accelerometer", self.header.accelerometer["driver"], ""), ("vehicle", word(self.header.vehicle), ""),
             ("began", self.header.start_utc or "not known", "UTC" if self.header.start_utc else ""),
             ("time", lasts_s, "s"), *((f"events of {name}", count, "") for name, count in sources.items()),
             ("cut off", "yes" if self.torn_tail else None, "")])

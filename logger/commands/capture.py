@@ -56,7 +56,8 @@ def run(args: argparse.Namespace) -> int:
             writer.close()
     finally:
         port.close()
-    print(f"\r{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {args.out}")
+    print("\r", end="", file=sys.stderr, flush=True)
+    print(f"{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {args.out}")
     print("\n".join(first_look(look)))
     if fault is not None:
         print(f"ridelog: {fault}; what came before is kept", file=sys.stderr)

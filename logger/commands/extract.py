@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         wipe()
         done.append(found)
         if not args.json:
-            print("\n".join(lines(source, found)))
+            print("\n".join(map(printable, lines(source, found))))
     if not done:
         raise BadInput(f"expected a {'recording' if args.csv else 'dump'} that can be used, found none among "
                        f"{len(sources)}")

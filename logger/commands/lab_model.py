@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from logger.api.ranges import TOLERANCE, USUAL_TOLERANCE
 from logger.commands.numbers import add_number
+from logger.printable import word
 from logger.report.text_layout import WIDTH
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def wipe() -> None:
 
 
 def _show(words: str) -> None:
-    print(f"\r{words[:WIDTH - 1]:{WIDTH - 1}}", end="", file=sys.stderr, flush=True)
+    print(f"\r{word(words, WIDTH - 1):{WIDTH - 1}}", end="", file=sys.stderr, flush=True)
 
 
 def _show_nothing(_words: str) -> None:

@@ -12,11 +12,12 @@ import os
 import re
 import sys
 import textwrap
-from typing import NoReturn
+from collections.abc import Iterable
+from typing import Any, NoReturn, TextIO, cast
 
 from drivers.errors import DriverError
 from logger.errors import EXIT_BAD_INPUT, RidelogError, did_you_mean
-from logger.printable import printable
+from logger.printable import LONGEST_COMPLAINT, printable, word
 
 VERBS = {
     "demo": "run a recorded drive through the service and show the result; needs no hardware",
@@ -80,7 +81,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         for theirs, ours in _SAID:
             message = re.sub(theirs, ours, message)
-        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {printable(message)} (try '{self.prog} --help')\n")
+        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {word(message, LONGEST_COMPLAINT)} (try '{self.prog} --help')\n")
 
 
 # All matrices here are small: more threads in the algebra library would only wait for each other.
@@ -104,6 +105,7 @@ def run() -> NoReturn:
     """The console script."""
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
+    sys.stdout, sys.stderr = cast(TextIO, _Screen(sys.stdout, "\n\t")), cast(TextIO, _Screen(sys.stderr, "\n\t\r"))
     try:
         status = main(sys.argv[1:])
         sys.stdout.flush()
@@ -126,8 +128,27 @@ def run() -> NoReturn:
 
 
 def _complain(message: str, status: int) -> int:
-    print("ridelog: " + printable(" ".join(message.split())), file=sys.stderr)
+    print("ridelog: " + word(" ".join(message.split()), LONGEST_COMPLAINT), file=sys.stderr)
     return status
+
+
+class _Screen:
+    """Where commands print: no word, whoever wrote it, moves the cursor, turns the direction of writing or hides.
+    ``keep``: control characters of our own."""
+
+    def __init__(self, stream: TextIO, keep: str) -> None:
+        self._stream, self._keep = stream, keep
+
+    def write(self, text: str) -> int:
+        """Write what can be seen."""
+        return self._stream.write(printable(text, self._keep))
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """The same of many."""
+        self._stream.writelines(printable(line, self._keep) for line in lines)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def _without_verb(arguments: list[str]) -> int:

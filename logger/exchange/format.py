@@ -45,12 +45,12 @@ def format_of(path: Path) -> Format:
 
 
 def write_layer(layer: Layer, path: Path) -> None:
-    """Write a file that is there whole, in place of an old one, or not at all. BadInput as ``format_of`` and
-    ``Format.write``, and where it cannot be written."""
+    """Write a file that is there whole, in place of an old one, or not at all; its texts are words that can be seen
+    (``logger.printable``). BadInput as ``format_of`` and ``Format.write``, and where it cannot be written."""
     form = format_of(path)
     new = path.with_name(f".{os.getpid()}-{path.name}")  # GDAL goes by the ending
     try:
-        form.write(layer, new)
+        form.write(layer.printable(), new)
         new.replace(path)
     except OSError as error:
         raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from logger.exchange.geometry import Geometry, Place
+from logger.printable import word
 
 Value = str | int | float | None
 """None: not known."""
@@ -66,6 +67,13 @@ class Layer:
     def names(self) -> tuple[str, ...]:
         """Of the columns."""
         return tuple(field.name for field in self.fields)
+
+    def printable(self) -> Layer:
+        """The same with every text a ``word``: whose names they are, and who opens the file, is not known."""
+        return replace(self, features=tuple(
+            replace(one, group=word(one.group), title=word(one.title),
+                    values=tuple(word(value) if isinstance(value, str) else value for value in one.values))
+            for one in self.features))
 
     @property
     def placed(self) -> int:

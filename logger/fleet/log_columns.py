@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from drivers.regular_file import open_regular
 from logger.errors import BadInput
-from logger.store.log.row_format import COLUMNS, HEADER, LATEST_US, scan
+from logger.store.log.row_format import COLUMNS, FLAGS, HEADER, LATEST_US, scan
 from logger.units import US_PER_S
 
 _COUNTS = ("segment", "drive")
@@ -114,6 +114,8 @@ def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, np
     columns["t_us"] = np.round(columns.pop("t_s") * US_PER_S).astype(np.int64)
     columns["utc_us"] = table["t_utc"].cast(pyarrow.int64()).fill_null(0).to_numpy()
     if ((columns["utc_us"] < 0) | (columns["utc_us"] >= LATEST_US)).any():
+        return None
+    if not all(FLAGS.fullmatch(flags or "none") for flags in table["flags"].unique().to_pylist()):
         return None
     columns["flags"] = table["flags"].to_numpy(zero_copy_only=False)
     columns["crc32"] = checks

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from html import escape
 
+from logger.printable import printable
+
 
 class Html(str):
     """Text that is HTML. Text that is not is escaped when it is added to it."""
@@ -27,8 +29,8 @@ EMPTY = Html()
 
 
 def escaped(text: str) -> Html:
-    """The text as HTML; HTML as it is."""
-    return text if isinstance(text, Html) else Html(escape(text))
+    """The text as HTML, with what cannot be seen shown by its number; HTML as it is."""
+    return text if isinstance(text, Html) else Html(escape(printable(text, keep="\n\t\u00a0")))
 
 
 def html(template: str, *values: object, **named: object) -> Html:

@@ -109,7 +109,8 @@ def test_a_dump_that_names_files_of_this_machine(verb: str, trap: Trap, dump_of:
             assert done.returncode == 2
             assert done.stderr.count("\n") == 1 and "expected --vehicle FILE.yaml or one of" in done.stderr
     for said in ({"driver": "pasco", "profile": str(trap.profile)},
-                 {"driver": "bma220", "vertical_axis": str(trap.car)}, {"driver": "bma220", "noise": {"noise_mps2": str(trap.car)}},
+                 {"driver": "bma220", "vertical_axis": str(trap.car)},
+                 {"driver": "bma220", "noise": {"noise_mps2": str(trap.car)}},
                  {"driver": "pasco", "calibrated": str(trap.car)}, {"driver": "iio", "scale_mps2": str(trap.car)}):
         done = called(verb, dump_of(accelerometer=said, gps={"baud": str(trap.car), "latency_s": str(trap.car)}),
                       *READERS[verb])

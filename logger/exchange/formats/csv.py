@@ -8,6 +8,7 @@ from pathlib import Path
 
 from logger.exchange.format import Format
 from logger.exchange.layer import Layer
+from logger.printable import cell
 
 
 class Csv(Format):
@@ -20,7 +21,8 @@ class Csv(Format):
         with path.open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(layer.names)
-            table.writerows(one.values for one in layer.features)
+            table.writerows([cell(value) if isinstance(value, str) else value for value in one.values]
+                            for one in layer.features)
 
 
 FORMAT = Csv()

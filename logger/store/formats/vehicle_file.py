@@ -16,6 +16,7 @@ import yaml
 
 from logger.errors import BadInput
 from logger.files import write_text
+from logger.printable import LONGEST_COMPLAINT, LONGEST_WORD, word
 from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.vehicle.named_parameters import changed, names, read, sized
 from logger.vehicle.uncertain import NumberErrors
@@ -166,7 +167,7 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
     body = {key: _number_of(keys, key, mass_kg)
             for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
     vehicle = Vehicle(
-        name=keys["name"].text(),
+        name=_name_of(keys["name"]),
         model=model,
         sprung_mass_kg=mass_kg,
         pitch_inertia_kg_m2=body.get("pitch_inertia_kg_m2"),
@@ -178,6 +179,14 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
         sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
     )
     return vehicle, keys
+
+
+def _name_of(node: Node) -> str:
+    """The name of a car, as it can stand in tables and on pages."""
+    name = node.text()
+    if word(name) != name:
+        raise node.wrong(f"a name of at most {LONGEST_WORD} characters that can be seen")
+    return name
 
 
 def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> float:
@@ -215,7 +224,7 @@ def _read_sensor(node: Node, model: str) -> SensorPlace:
 def _read_step(node: Node) -> Step:
     keys = node.mapping(required=("step", "error"), optional=("noise_floor_error",))
     floor = keys.get("noise_floor_error")
-    return Step(keys["step"].text(), keys["error"].number(low=0),
+    return Step(word(keys["step"].text(), LONGEST_COMPLAINT), keys["error"].number(low=0),
                 None if floor is None or floor.is_null() else floor.number(low=0))
 
 

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from logger.errors import BadInput
 from logger.geodesy import ground_distance_m
+from logger.printable import word, words_in
 from logger.records import WindowRecord
 from logger.store.log.log_folder import inside_of
 from logger.store.log.log_name import LogName, finished_path
@@ -38,7 +39,8 @@ class Placed(Protocol):
 
 @dataclass(frozen=True)
 class LoggedFile:
-    """One log file as it was read. ``sidecar`` None: it is missing or cannot be read."""
+    """One log file as it was read; its name and the texts of its sidecar are words that can be seen
+    (``logger.printable``). ``sidecar`` None: it is missing or cannot be read."""
 
     name: str
     records: Sequence[WindowRecord]
@@ -122,7 +124,7 @@ def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:
     except (ValueError, OSError):
         sidecar = None
     name = str(log.relative_to(place)) if place is not None and place in log.parents else log.name
-    return LoggedFile(name, content.records, content.damaged_lines, sidecar)
+    return LoggedFile(word(name), content.records, content.damaged_lines, words_in(sidecar))
 
 
 # --- rows ---

@@ -38,6 +38,10 @@ _MICROSECOND = timedelta(microseconds=1)
 _UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
 _SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,9})\.([0-9]{6})")
 _COUNT = re.compile(r"0|-?[1-9][0-9]{0,17}")
+_COMFORT = re.compile("[a-z_]{0,40}")
+_CLASS = re.compile("[A-H]?")
+FLAGS = re.compile("[a-z_]{1,40}(?:[|][a-z_]{1,40})*")
+"""Words of a row are names of our own; one of a newer logger may be another, and is none that could do harm."""
 _SHOWN = 40
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
 
@@ -140,8 +144,14 @@ def _count(name: str) -> Column:
     return Column(name, name, lambda value: f"{value:d}", _read_count)
 
 
-def _word(name: str) -> Column:
-    return Column(name, name, str, str)
+def _word(name: str, known: re.Pattern[str]) -> Column:
+    return Column(name, name, str, lambda text: _read_word(text, known))
+
+
+def _read_word(text: str, known: re.Pattern[str]) -> str:
+    if not known.fullmatch(text):
+        raise BadRow(f"expected a word of a logger's, found {text[:_SHOWN]!a}")
+    return text
 
 
 COLUMNS = (
@@ -160,9 +170,9 @@ COLUMNS = (
     _number("mtvv_mps2", 4),
     _number("vdv_mps175", 4),
     _number("crest_factor", 3),
-    _word("comfort"),
-    _word("iri_class"),
-    Column("flags", "flags", "|".join, lambda text: tuple(text.split("|")) if text else ()),
+    _word("comfort", _COMFORT),
+    _word("iri_class", _CLASS),
+    Column("flags", "flags", "|".join, lambda text: tuple(_read_word(text, FLAGS).split("|")) if text else ()),
     _count("drive"),
     _known_number("duration_s", 6),
     _number("accel_rms_mps2", 4),

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
+from logger.printable import word
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import Model, Step, read_model, read_vehicle, write_model, write_vehicle
@@ -101,7 +102,8 @@ def axles(draw: st.DrawFn, mass_kg: float) -> Axle:
     return Axle(0.0, *each)
 
 
-names = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), min_size=1)
+names = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Zl", "Zp", "Mn")), min_size=1, max_size=80
+                ).filter(lambda text: word(text) == text)
 places = st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10))
 
 
