@@ -24,6 +24,12 @@ hypothesis.settings.register_profile("any_machine", deadline=None)
 hypothesis.settings.load_profile("any_machine")
 
 
+@pytest.fixture
+def folders_as_sticks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder beside that of the logs counts as a stick, though it is on the same disk."""
+    monkeypatch.setattr("logger.store.export.export.are_on_one_disk", lambda *_: False)
+
+
 @pytest.fixture(scope="session")
 def ridelog() -> Path:
     """The installed command."""

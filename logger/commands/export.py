@@ -116,7 +116,7 @@ def summary(result: ExportResult) -> str:
     there = f"{counted(len(result.copied), 'file')} copied ({result.bytes_copied / 1e6:.1f} MB), " \
             f"{len(result.already_there)} {'was' if len(result.already_there) == 1 else 'were'} there"
     if result.complete and result.unmarked is not None:
-        return f"{there}, but the logger cannot remember it, and will not make room: {result.unmarked}"
+        return f"{there}, but this does not count as exported, and the logs stay on the card: {result.unmarked}"
     if result.complete:
         return there
     reason, _ = Counter(failure.reason for failure in result.failures).most_common(1)[0]
@@ -132,7 +132,7 @@ def screen(result: ExportResult) -> list[str]:
         lines.append(f"    {first}{f' and {count - 1} more' if count > 1 else ''}: {reason}")
     lines += [f"    set aside on the stick: {name}" for name in result.set_aside]
     if result.unmarked is not None and not result.complete:
-        lines.append(f"    the logger does not remember this export: {result.unmarked}")
+        lines.append(f"    this does not count as exported, and the logs stay on the card: {result.unmarked}")
     return lines
 
 

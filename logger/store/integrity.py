@@ -27,7 +27,8 @@ from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.manifest import is_of_export, read_manifest
 from logger.store.log.intact_rows import Hole, are_in_holes
 from logger.store.log.log_folder import inside_of
-from logger.store.log.log_name import LogName, finished_path, open_path
+from logger.store.log.log_name import LogName, finished_path, name_before, open_path
+from logger.store.log.log_reader import other_recordings
 from logger.store.log.row_format import Row, scan
 from logger.store.log.sidecar import SETTINGS_LOST, load_sidecar, repairs_of
 from logger.units import US_PER_S
@@ -161,6 +162,7 @@ def _files_of(path: Path) -> list[Path]:
     files = {file for file in inside if file.is_file()
              and (LogName.of(file) or file.name == manifest.NAME
                   or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
+    files |= set(other_recordings(inside))
     # An export without its manifest cannot be checked: one that is not there is looked for all the same.
     files |= {folder / manifest.NAME for folder in inside if folder.is_dir() and is_of_export(folder.resolve())}
     if not files:
@@ -191,6 +193,8 @@ def _check_log(path: Path) -> _Findings:
     empty = not path.stat().st_size
     if not findings.good and not LogName.of(path) and (lines or empty):
         raise BadInput(f"{path}:1: expected a segment log or a recorded dump, found no row of one")
+    if (before := name_before(path.name)) is not None:
+        findings.note(f"it was called {before} until an export found another log in its place: a drive of its own")
     if not _is_part(path):
         if empty:
             findings.wrong("line 1: torn: expected the header line of a segment log")

@@ -18,6 +18,9 @@ from logger.store.export.export_marks import exported_names
 from logger.store.export.stick_status import read_note
 
 
+pytestmark = pytest.mark.usefixtures("folders_as_sticks")
+
+
 @pytest.fixture
 def logs(tmp_path: Path) -> Path:
     folder = tmp_path / "log"
@@ -164,7 +167,7 @@ def test_an_export_that_the_logger_cannot_remember_is_no_success(
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
     said = capsys.readouterr().out
     assert said.startswith("WRONG: 2 files copied")
-    assert "cannot remember it, and will not make room: Read-only file system" in said
+    assert "does not count as exported, and the logs stay on the card: Read-only file system" in said
     main(["export", "--unmounted", str(stick), "--note", str(note)])
     assert reported(note).startswith("stick sda1: WRONG, 2 files copied")
 

@@ -18,6 +18,7 @@ import re
 import secrets
 import stat
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -25,6 +26,8 @@ from drivers.regular_file import check_regular
 from logger.store.log.quarantine import ENDING, numbered
 
 BLOCK_BYTES = 1 << 18
+LOCK_NAME = "exported.lock"
+"""In a folder of logs: who changes what it remembers of its exports holds this file."""
 
 _TEMPORARY = re.compile(r"[0-9a-f]{16}\.ridelog-tmp")
 _DIRECTORY = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
@@ -100,6 +103,16 @@ class DirectoryHandle:
         except BlockingIOError:
             return False
         return True
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """Wait for others that change what the folder remembers, for the moment that takes them."""
+        descriptor = self.open_lock_file(LOCK_NAME)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(descriptor)
 
     def open_lock_file(self, name: str) -> int:
         """Descriptor of a file to lock, made when it is not there; readable is enough, of any owner."""

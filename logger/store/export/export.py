@@ -6,7 +6,8 @@ may be full, read-only or worn, may carry other cars' logs, and may hold names t
 
 Solution. Every logger has a folder of its own on the stick, ``ridelog/<identity>``. A file is written there under a
 temporary name, flushed, read back from the medium against the SHA-256 of what was read from the card, and only then
-given its name. What has the name already, and is not the same, is set aside under another name, never overwritten.
+given its name. What has the name already, and is not the same, is set aside under another name, never overwritten, and
+stays in the manifest if it was in it.
 Now and then, the more seldom the longer it is, the manifest is replaced in the same way; only what a manifest that was
 read back lists is marked as exported. So at every instant the marks are true, and a second export copies what the first
 one did not. Nothing is written when all is there, so that a stick that is write-protected by then is no fault. What a
@@ -26,7 +27,8 @@ from pathlib import Path
 from logger.errors import BadInput
 from logger.store.export import manifest
 from logger.store.export.directory_handle import DirectoryHandle, OpenFile
-from logger.store.export.export_marks import Mark, logger_identity, mark_exported, read_marks
+from logger.store.export.export_marks import Mark, mark_exported, read_marks
+from logger.store.export.logger_identity import logger_identity
 from logger.store.export.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.export.pairing import (
     NOT_PAIRED,
@@ -36,7 +38,8 @@ from logger.store.export.pairing import (
     stick_name,
     trusted_sticks,
 )
-from logger.store.log.log_name import OwnFile
+from logger.store.log.log_name import OwnFile, name_before, old_name
+from logger.store.log.log_place import are_on_one_disk
 
 FILES_PER_MANIFEST = 32
 GROWTH_PER_MANIFEST = 8
@@ -108,7 +111,7 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
     ``report`` is called before the first file and after each. What the stick or the card refuses is in the result.
     Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them, and
     CheckFailed for a stick that ``pairing`` refuses. Who copies ``by_hand`` gets a copy anywhere, which counts as an
-    export where the stick is paired.
+    export where the stick is paired. A copy on the disk that holds the logs never counts: no stick is mounted there.
     """
     if _overlap(logs, stick / manifest.FOLDER):
         raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
@@ -116,7 +119,7 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
     with _folder(stick, "to copy to, such as a mounted stick") as root, _folder(logs, "with the logs") as card:
         names = finished_files(card, dumps)
         try:
-            identity = logger_identity(card)
+            identity = logger_identity(card, logs)
         except OSError as error:
             raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
                            "service's user or with sudo") from None
@@ -124,13 +127,17 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
         if not by_hand:
             refuse_stranger(pairing, card, logs, name)
         try:
+            why_not = f"no stick is mounted at {stick}, it is on the disk that holds the logs" \
+                if are_on_one_disk(stick, logs) else ""
             with root.inside(manifest.FOLDER) as common, common.inside(identity) as own:
                 if not own.lock():
                     raise OSError(errno.EBUSY, "another export is writing to this stick")
-                if not by_hand:
+                if not by_hand and not why_not:
                     name = pair_first(pairing, card, own, name)
                 trusted = trusted_sticks(pairing, card)
-                return _Export(card, own, identity, report, name, trusted is None or name in trusted).run(names)
+                if trusted is not None and name not in trusted:
+                    why_not = why_not or "this place is not paired with it"
+                return _Export(card, own, identity, report, name, why_not).run(names)
         except OSError as error:
             reason = f"{manifest.FOLDER}/{identity} on the stick: {_reason(error)}"
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
@@ -150,17 +157,18 @@ def finished_files(card: DirectoryHandle, dumps: bool) -> list[str]:
 
 
 class _Export:
-    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. What is copied is
-    only marked where it ``counts``."""
+    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. ``why_not``: why what
+    is copied may not be marked; empty: it may."""
 
     def __init__(self, card: DirectoryHandle, stick: DirectoryHandle, identity: str, report: Callable[[Progress], None],
-                 name: str, counts: bool) -> None:
+                 name: str, why_not: str) -> None:
         self._card = card
         self._stick = stick
         self._identity = identity
         self._report = report
         self._name = name
-        self._counts = counts
+        self._counts = not why_not
+        self._digits = secrets.token_hex(4)
         self._marks = read_marks(card)
         self._listed = self._read_manifest()
         listed = self._listed or {}
@@ -171,7 +179,7 @@ class _Export:
         self._failures: list[Failure] = []
         self._set_aside: list[str] = []
         self._bytes = 0
-        self._unmarked: str | None = None if counts else "this place is not paired with it"
+        self._unmarked = why_not or None
 
     def run(self, names: list[str]) -> ExportResult:
         """Everything in turn; what does not fit is left out from the end."""
@@ -208,21 +216,25 @@ class _Export:
         return missing
 
     def _is_there(self, name: str) -> bool:
-        """True when the stick holds the file as the card does. Both are read, but for what a mark says of the card."""
+        """True when the stick holds the file as the card does, under its name or one that it was set aside under. Both
+        are read, but for what a mark says of the card."""
         try:
-            found = self._stick.find(name)
+            places = (name, *(listed for listed in self._entries if name_before(listed) == name))
             with self._card.open(name) as file:
-                if found is None or found.st_size != file.stat.st_size:
+                alike = [place for place in places if (found := self._stick.find(place)) is not None
+                         and found.st_size == file.stat.st_size]
+                if not alike:
                     return False
                 known = self._marks.get(name)
                 is_known = known is not None and known.is_of(file.stat)
                 mark = known if known and is_known else self._mark(file, self._card.sha256(name))
-            if self._stick.sha256(name) != mark.sha256:
-                return False
+            there = next((place for place in alike if self._stick.sha256(place) == mark.sha256), None)
         except OSError:
             return False  # the copy will meet the same fault, and report it
+        if there is None:
+            return False
         self._there.append(name)
-        self._entries[name] = mark.sha256
+        self._entries[there] = mark.sha256
         if not is_known or mark.stick != self._name:
             self._fresh[name] = replace(mark, stick=self._name)
         return True
@@ -288,9 +300,21 @@ class _Export:
         """Set aside what stands in the way: an older state, a damaged copy, or something that is not ours."""
         if self._stick.find(name) is None:
             return
-        aside = f"{name}.{secrets.token_hex(4)}.old"
+        aside = old_name(name, self._digits)
+        if self._stick.find(aside) is not None:
+            aside = old_name(name, secrets.token_hex(4))
+        listed = self._entries.pop(name, None)
+        is_whole = listed is not None and self._is_as_listed(name, listed)
         self._stick.rename(name, aside)
         self._set_aside.append(aside)
+        if listed is not None and is_whole:
+            self._entries[aside] = listed
+
+    def _is_as_listed(self, name: str, digest: str) -> bool:
+        try:
+            return self._stick.sha256(name) == digest
+        except OSError:
+            return False
 
     def _settle(self) -> str | None:
         """Bring the manifest up to date, then remember what it lists. Gives the reason when the stick refuses."""

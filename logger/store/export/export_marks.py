@@ -1,4 +1,4 @@
-"""What a folder of logs remembers of its exports: who it is, and which of its files lie on a stick already.
+"""What a folder of logs remembers of its exports: which of its files lie on a stick already.
 
 Problem. Room on the card may be made by removing what has been exported, and nothing else: so the memory must never
 say yes too early, nor of a file that has changed since, as a log does that learns its UTC after it was exported.
@@ -6,23 +6,13 @@ Solution. A mark carries size, time of change and SHA-256 of what was exported; 
 size and time. The marks are one list with a checksum over itself, replaced in one step; one that is damaged is as good
 as none, and the files are marked again by the next export that finds them on its stick. Exports to two sticks at once
 take turns.
-
-The identity is a random number made at the first export. It names the logger's folder on every stick, so that the logs
-of two cars, which have the same names, never meet. A card that has gone read-only or is full can still be emptied: then
-the number comes from the machine's own.
 """
 
 from __future__ import annotations
 
-import errno
-import fcntl
-import hashlib
-import os
 import re
-import secrets
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -32,15 +22,10 @@ from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.pairing import NOT_PAIRED, Pairing, trusted_sticks
 
 MARKS_NAME = "exported-marks"
-LOCK_NAME = "exported.lock"
-IDENTITY_NAME = "logger-id"
-MACHINE_ID = Path("/etc/machine-id")
 
-_IDENTITY = re.compile(rb"([0-9a-f]{12})\n")
 _FIRST = "# ridelog-exported 1"
 _NO_STICK = "-"
 _ENTRY = re.compile(r"([0-9a-f]{64}) (\d{1,15}) (-?\d{1,19}) ([0-9a-f]{32}|-) ([0-9][0-9A-Za-z._-]{0,63})")
-_CARD_FAULTS = {errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +64,7 @@ def read_marks(log_folder: DirectoryHandle) -> dict[str, Mark]:
 
 def mark_exported(log_folder: DirectoryHandle, new: Mapping[str, Mark]) -> None:
     """Remember files that lie on a stick; forget those that the folder no longer has. Raises ``OSError``."""
-    with _turn(log_folder):
+    with log_folder.turn():
         present = set(log_folder.names())
         fresh = [(name, mark) for name, mark in new.items() if name in present]
         kept = ((name, mark) for name, mark in _stored(log_folder) if name in present and name not in new)
@@ -110,44 +95,3 @@ def _stored(log_folder: DirectoryHandle) -> Iterator[tuple[str, Mark]]:
                 yield entry[5], Mark(int(entry[2]), int(entry[3]), entry[1], stick)
     except OSError as error:
         raise ValueError(f"expected a readable file ({error.strerror})") from None
-
-
-def logger_identity(log_folder: DirectoryHandle) -> str:
-    """The logger's 12 hex digits, made when there are none. Raises ``OSError`` when there can be none."""
-    known = _read_identity(log_folder)
-    if known is not None:
-        return known
-    try:
-        return _make_identity(log_folder)
-    except OSError as error:
-        if error.errno not in _CARD_FAULTS:
-            raise
-        return hashlib.sha256(b"ridelog " + MACHINE_ID.read_bytes()).hexdigest()[:12]
-
-
-def _make_identity(log_folder: DirectoryHandle) -> str:
-    with _turn(log_folder):
-        known = _read_identity(log_folder)
-        if known is None:
-            known = secrets.token_hex(6)
-            log_folder.replace(IDENTITY_NAME, [f"{known}\n".encode("ascii")])
-    return known
-
-
-def _read_identity(log_folder: DirectoryHandle) -> str | None:
-    try:
-        match = _IDENTITY.fullmatch(log_folder.read(IDENTITY_NAME, 64))
-    except OSError:
-        return None
-    return match[1].decode("ascii") if match else None
-
-
-@contextmanager
-def _turn(log_folder: DirectoryHandle) -> Iterator[None]:
-    """Wait for other exports that change the same file, for the moment that takes them."""
-    descriptor = log_folder.open_lock_file(LOCK_NAME)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)

@@ -1,7 +1,8 @@
 """The names of a logger's files, and what they say.
 
 ``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
-``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too.
+``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way of
+one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ PART = ".part"
 _SESSION, _NUMBER = "[0-9]{5,9}", "[0-9]{3,9}"
 _LOG = re.compile(rf"({_SESSION})-({_NUMBER})(?:(\.csv)(\.part)?|(\.json))")
 _DUMP = re.compile(rf"({_SESSION})(?:-([0-9]{{1,9}}))?(\.dump(?:\.gz)?)(\.part)?")
+_ASIDE = re.compile(r"(.+)\.([0-9a-f]{8})\.old")
 _NUMBERED = re.compile(rf"({_SESSION})[-.]")
 
 
@@ -73,6 +75,19 @@ def finished_path(part: Path) -> Path:
     return part.with_name(part.name.removesuffix(PART)) if part.name.endswith(PART) else part
 
 
+def old_name(name: str, digits: str) -> str:
+    """What a file is called that an export sets aside on a stick."""
+    return f"{name}.{digits}.old"
+
+
+def name_before(old: str) -> str | None:
+    """The name that a file had before an export set it aside; None for one that was not."""
+    match = _ASIDE.fullmatch(old)
+    return match[1] if match else None
+
+
 def sidecar_path(log: Path) -> Path:
-    """The name of a log's sidecar, open or finished."""
+    """The name of a log's sidecar, open, finished, or set aside with it."""
+    if match := _ASIDE.fullmatch(log.name):
+        return log.with_name(old_name(sidecar_path(Path(match[1])).name, match[2]))
     return log.with_name(log.name.partition(".")[0] + ".json")

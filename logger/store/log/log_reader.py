@@ -19,7 +19,7 @@ from logger.geodesy import ground_distance_m
 from logger.printable import word, words_in
 from logger.records import WindowRecord
 from logger.store.log.log_folder import inside_of
-from logger.store.log.log_name import LogName, finished_path
+from logger.store.log.log_name import LogName, finished_path, name_before
 from logger.store.log.row_format import read_log, write_utc
 from logger.store.log.sidecar import read_sidecar
 
@@ -49,22 +49,48 @@ class LoggedFile:
 
 
 def find_logs(place: Path) -> list[Path]:
-    """The logs in a folder at any depth, open ones too, folder by folder in order of their writing; or the one file.
-    Raises BadInput for none."""
+    """The logs in a folder at any depth, open ones too, folder by folder in order of their writing, and those of other
+    recordings that an export set aside (``other_recordings``); or the one file. Raises BadInput for none."""
     if place.is_file() or finished_path(place).is_file():
         return [place]
     if not place.is_dir():
         raise BadInput(f"{place}: expected a folder of segment logs, or one log file")
     found: dict[tuple[Path, int, int], Path] = {}
-    for path in sorted(inside_of(place)):
+    inside = sorted(inside_of(place))
+    for path in inside:
         name = LogName.of(path)
         if name is None or path.is_dir():
             continue
         if name.finished or (path.parent, name.session, name.part) not in found:
             found[path.parent, name.session, name.part] = path
-    if not found:
+    others = other_recordings(inside)
+    if not found and not others:
         raise BadInput(f"{place}: expected segment logs (such as 00001-001.csv), found none")
-    return [found[key] for key in sorted(found)]
+    return [found[key] for key in sorted(found)] + others
+
+
+def other_recordings(paths: Iterable[Path]) -> list[Path]:
+    """Those of the files that are logs which an export set aside on a stick, and no older state of what has their name
+    now: they have no row in common with it, nor with each other. Two loggers once had one number, and so one folder."""
+    rows: dict[Path, set[tuple[int, int]]] = {}
+    found = []
+    for path in sorted(paths):
+        before = name_before(path.name)
+        if before is None or LogName.of(named := path.with_name(before)) is None or not path.is_file():
+            continue
+        mine, theirs = _rows_in(path), rows.setdefault(named, _rows_in(named))
+        if mine and not mine & theirs:
+            found.append(path)
+        theirs |= mine
+    return found
+
+
+def _rows_in(log: Path) -> set[tuple[int, int]]:
+    """What distinguishes the rows of a log: number and monotonic time; none where it cannot be read."""
+    try:
+        return {(row.segment, row.t_us) for row in read_log(log).records}
+    except OSError:
+        return set()
 
 
 def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:

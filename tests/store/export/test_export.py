@@ -35,6 +35,9 @@ from ...support.faults.sticks import (
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
+pytestmark = pytest.mark.usefixtures("folders_as_sticks")
+
+
 @pytest.fixture
 def logs(tmp_path: Path) -> Path:
     return a_card(tmp_path)

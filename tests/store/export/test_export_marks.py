@@ -9,16 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.export.directory_handle import DirectoryHandle
-from logger.store.export.export_marks import (
-    IDENTITY_NAME,
-    LOCK_NAME,
-    MARKS_NAME,
-    Mark,
-    exported_names,
-    logger_identity,
-    mark_exported,
-)
+from logger.store.export.directory_handle import LOCK_NAME, DirectoryHandle
+from logger.store.export.export_marks import MARKS_NAME, Mark, exported_names, mark_exported
 
 from ...support.faults.small_files import at_most_s
 
@@ -93,30 +85,12 @@ def test_two_exports_at_once_lose_no_mark(tmp_path: Path) -> None:
     assert exported_names(tmp_path) == set(marks)
 
 
-def test_the_identity_stays_and_two_folders_have_two(tmp_path: Path) -> None:
-    found = []
-    for name in ("a", "a", "b"):
-        (tmp_path / name).mkdir(exist_ok=True)
-        with DirectoryHandle.at(tmp_path / name) as folder:
-            found.append(logger_identity(folder))
-    assert found[0] == found[1] != found[2]
-    assert all(len(identity) == 12 and int(identity, 16) >= 0 for identity in found)
-
-
-@pytest.mark.parametrize("content", [b"", b"../../../../etc\n", b"0123456789AB\n", b"0" * 5000])
-def test_a_damaged_identity_is_made_again(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / IDENTITY_NAME).write_bytes(content)
-    with DirectoryHandle.at(tmp_path) as folder:
-        assert logger_identity(folder) == logger_identity(folder)
-    assert (tmp_path / IDENTITY_NAME).read_bytes() != content
-
-
 def test_nothing_else_is_left_in_the_folder(tmp_path: Path) -> None:
     mark(tmp_path, {"00001-001.csv": a_file(tmp_path, "00001-001.csv")})
     assert {path.name for path in tmp_path.iterdir()} == {"00001-001.csv", MARKS_NAME, LOCK_NAME}
 
 
-@pytest.mark.parametrize("name", [LOCK_NAME, MARKS_NAME, IDENTITY_NAME])
+@pytest.mark.parametrize("name", [LOCK_NAME, MARKS_NAME])
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("nowhere")],
                          ids=["pipe", "folder", "link to nothing"])
 def test_what_has_the_name_of_a_small_file_and_is_none_is_put_aside(
@@ -124,8 +98,5 @@ def test_what_has_the_name_of_a_small_file_and_is_none_is_put_aside(
     make(tmp_path / name)
     with at_most_s(5):
         mark(tmp_path, {"00001-001.csv": a_file(tmp_path, "00001-001.csv")})
-        with DirectoryHandle.at(tmp_path) as opened:
-            known = logger_identity(opened)
-            assert logger_identity(opened) == known
     assert exported_names(tmp_path) == {"00001-001.csv"}
     assert (tmp_path / f"{name}.aside").lstat()

@@ -18,6 +18,9 @@ KEY = b"0123456789abcdef0123456789abcdef\n"
 FIRST = Pairing(FIRST_STICK)
 
 
+pytestmark = pytest.mark.usefixtures("folders_as_sticks")
+
+
 @pytest.fixture
 def logs(tmp_path: Path) -> Path:
     return a_card(tmp_path)

@@ -23,7 +23,8 @@ from logger.errors import BadInput, CheckFailed
 from logger.store.export import directory_handle, manifest
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.export import ExportResult, Progress, export
-from logger.store.export.export_marks import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
+from logger.store.export.export_marks import MARKS_NAME, Mark, exported_names, mark_exported
+from logger.store.export.logger_identity import HOMES_NAME, IDENTITY_NAME
 from logger.store.export.manifest import read_manifest
 from logger.store.export.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
 
@@ -137,7 +138,8 @@ def quiet(progress: Progress) -> None:
 
 
 def run(logs: Path, stick: Path, dumps: bool = False, pairing: Pairing = NOT_PAIRED) -> ExportResult:
-    return export(logs, stick, dumps, quiet, pairing)
+    with patch("logger.store.export.export.are_on_one_disk", lambda *_: False):  # a folder stands for the stick
+        return export(logs, stick, dumps, quiet, pairing)
 
 
 def own(logs: Path, stick: Path) -> Path:
@@ -202,7 +204,7 @@ def fault_at_any_call(folder: Path, case: tuple[int, bool]) -> Found:
     calls = number_of_calls(logs, folder / "measure")
     assert calls > 80
     for at in range(1, calls + 2):
-        for name in (MARKS_NAME, IDENTITY_NAME):
+        for name in (MARKS_NAME, IDENTITY_NAME, HOMES_NAME):
             (logs / name).unlink(missing_ok=True)
         stick = a_stick(folder / f"stick-{at}")
         system = Stick(stick, at, error, lost)
@@ -454,7 +456,7 @@ def card_that_cannot_be_written_to(folder: Path, error: int) -> Found:
     def refuse(*_: object) -> int:
         raise OSError(error, os.strerror(error))
 
-    with (patch("logger.store.export.export_marks.MACHINE_ID", folder / "machine-id"),
+    with (patch("logger.store.export.logger_identity.MACHINE_ID", folder / "machine-id"),
           patch.object(DirectoryHandle, "open_lock_file", refuse)):
         result, again = run(logs, stick), run(logs, stick)
     assert result.complete
