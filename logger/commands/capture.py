@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.accelerometers import line_reader
+from drivers.board_serial_port import port_advice
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import open_serial
 from drivers.ports import BytePort
@@ -59,6 +60,8 @@ def run(args: argparse.Namespace) -> int:
     print("\r", end="", file=sys.stderr, flush=True)
     print(f"{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {args.out}")
     print("\n".join(first_look(look)))
+    if not total and (advice := port_advice(args.port)):
+        print(f"{advice}.")
     if fault is not None:
         print(f"ridelog: {fault}; what came before is kept", file=sys.stderr)
     return EXIT_DONE if total and fault is None else EXIT_CHECK_FAILED

@@ -11,8 +11,11 @@ import sys
 from pathlib import Path
 
 import logger
-from logger.errors import EXIT_DONE, BadInput
-from logger.installation import PROGRAM, Installation, Step, hidden_from_services, run_command
+from drivers.board_serial_port import port_advice
+from logger.errors import EXIT_DONE, BadInput, RidelogError
+from logger.installation import CONFIG, PROGRAM, Installation, Step, hidden_from_services, run_command
+from logger.service.config import Config, load_config
+from logger.store.log.log_place import memory_notice
 
 _THIS_MACHINE = Path("/")
 
@@ -28,7 +31,23 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog install``. A dry run refuses what the real one would, but for the lack of rights."""
     if args.root.resolve() == _THIS_MACHINE:
         _refuse_hidden(_program())
-    return carry_out(installation(args).install(), args)
+    status = carry_out(installation(args).install(), args)
+    for notice in notices(args.root):
+        print(f"note: {notice}")
+    return status
+
+
+def notices(root: Path) -> list[str]:
+    """What somebody should know of the machine with the settings that it has now: logs in memory, a receiver's port that
+    is not on the pins. Of a folder that is to become a machine only its port."""
+    try:
+        config = load_config(root / CONFIG) if (root / CONFIG).exists() else Config()
+    except RidelogError as error:
+        return [str(error)]
+    sensor = config.accelerometer
+    ports = [config.gps.port, sensor.kind.place(sensor.settings)]
+    in_memory = memory_notice(config.log.directory) if root.resolve() == _THIS_MACHINE else ""
+    return list(filter(None, [in_memory, *(port_advice(port, root) for port in ports)]))
 
 
 def installation(args: argparse.Namespace) -> Installation:

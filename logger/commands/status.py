@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from drivers.accelerometers import accelerometers
+from drivers.board_serial_port import port_advice
 from drivers.sources import serial_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
@@ -123,7 +124,9 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     error = f" It said: {sensor.last_error}." if sensor.last_error else ""
     kind = accelerometers().get(sensor.driver)
     check = serial_advice(sensor.state) if kind is None else kind.advice(sensor.state)
-    return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{error}"]
+    board = f" {port_advice(sensor.place)}".rstrip()
+    return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{board}{'.' * bool(board)}"
+            f"{error}"]
 
 
 def _settings_advice(sensor: SensorStatus) -> list[str]:

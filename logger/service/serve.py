@@ -32,6 +32,7 @@ from logger.service.systemd_notify import Notifier, watchdog_interval_s
 from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.folder_lock import FolderLock
+from logger.store.log.log_place import memory_notice
 
 LONGEST_BEAT_S = 2.0
 log = logging.getLogger(__name__)
@@ -70,7 +71,7 @@ def _serve(config: Config, stop: Stop) -> None:
     listeners = [Listener(part, events, source.rest)
                  for part, source in zip((accelerometer, gps), sources, strict=True)]
     counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: asdict(decoder.counters)}
-    notices = wiring.notices(model.vehicle)
+    notices = tuple(filter(None, (*wiring.notices(model.vehicle), memory_notice(config.log.directory))))
     for notice in notices:
         log.warning("%s", notice)
     observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, delay_learning,

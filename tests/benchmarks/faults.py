@@ -72,9 +72,9 @@ when it was tried. It is made by `python -m tests.benchmarks.faults`; the counts
   A card that does not even refuse (an fsync that never returns) stops the main loop: systemd's watchdog ends the
   service after 30 s and starts it again, rows that were not yet synced are lost. A process that is stuck in the kernel
   ends only when the kernel lets it go; then nothing but the next turn of the ignition key helps.
-- **Sensors.** What one does wrong costs its own readings only. It is tried again until it is back, rows are flagged,
-  and no figure is made up. What a frozen sensor says looks like a smooth road until it has lasted for half a minute:
-  rows that were written before that keep their figures.
+- **Sensors.** What one does wrong, or its port, bus or driver raises, costs its own readings only. It is tried again
+  until it is back, rows are flagged, and no figure is made up. What a frozen sensor says looks like a smooth road until
+  it has lasted for half a minute: rows that were written before that keep their figures.
 - **Sticks.** Only what was read back from the stick counts as exported. Pulled at any instant nothing is lost, and the
   next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there, and nothing on it
   takes memory without bound. Where the logger is paired with its sticks, no other gets a file.

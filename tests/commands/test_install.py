@@ -299,3 +299,19 @@ def test_without_a_folder_or_rights_nothing_is_begun(tmp_path: Path, monkeypatch
     monkeypatch.setattr("sys.executable", "/home/pi/venv/bin/python")
     with pytest.raises(BadInput, match="a place that a service can see"):
         main(["install"])
+
+
+def test_a_port_that_is_not_on_the_pins_and_logs_in_memory_are_said(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "dev").mkdir()
+    (tmp_path / "dev/ttyAMA10").touch()
+    (tmp_path / "dev/serial0").symlink_to("ttyAMA10")
+    main(["install", "--root", str(tmp_path)])
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
+    assert [line[:60] for line in said] == ["note: /dev/serial0 is the three-pin debug connector; pins 8 and 10"[:60]]
+    (tmp_path / CONFIG).write_text("log: {directory: /dev/shm/logs}\ngps: {port: /dev/ttyUSB0}\n")
+    monkeypatch.setattr("logger.commands.install._THIS_MACHINE", tmp_path)
+    monkeypatch.setattr("logger.commands.install._refuse_hidden", lambda program: None)
+    main(["install", "--root", str(tmp_path), "--dry-run"])
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("note: logs: /dev/shm/logs lies in memory (/dev/shm is a tmpfs, a file system in memory): every")

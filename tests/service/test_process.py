@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -209,11 +210,27 @@ def test_a_sensor_beside_the_middle_line_is_reported(start: Callable[[], Service
     with (tmp_path / "ridelog.yaml").open("a") as settings:
         settings.write("vehicle: ./car.yaml\n")
     service = start()
-    (notice,) = service.wait_for(lambda status: True)["notices"]
+    notice = service.wait_for(lambda status: True)["notices"][0]
     assert "0.3 m right of the middle" in notice
     assert "roll is not corrected" in notice
     assert service.terminate() == 0
     assert service.errors.read_text().count(notice) == 1
+
+
+def test_logs_in_memory_are_reported(ridelog: Path, start: Callable[[], Service], tmp_path: Path) -> None:
+    write_config(tmp_path, "250")
+    config = tmp_path / "ridelog.yaml"
+    logs = Path("/dev/shm", f"ridelog-test-{os.getpid()}")
+    config.write_text(config.read_text().replace(f"{tmp_path / 'log'}", f"{logs}"))
+    try:
+        service = start()
+        service.wait_for(lambda status: True)
+        said = subprocess.run([ridelog, "status", "--config", config], capture_output=True, text=True).stdout
+        assert f"logs: {logs} lies in memory (/dev/shm is a tmpfs" in said
+        assert "every drive is lost when the power goes" in service.errors.read_text()
+        assert service.terminate() == 0
+    finally:
+        shutil.rmtree(logs, ignore_errors=True)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from logger.commands.status import screen
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.status import (
+    SensorState,
     SensorStatus,
     ServiceStatus,
     StorageStatus,
@@ -119,3 +120,12 @@ def test_a_service_that_cannot_write_says_so_in_the_first_line() -> None:
 
 def test_without_a_service_the_screen_says_how_to_start_one() -> None:
     assert any("systemctl start ridelog" in line for line in screen(None, "ridelog is not running"))
+
+
+@pytest.mark.parametrize(("state", "is_said"), [("silent", True), ("absent", True), ("retrying", True), ("ok", False)])
+def test_a_port_that_is_not_on_the_pins_is_said_beside_its_silence(
+        state: SensorState, is_said: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("logger.commands.status.port_advice", lambda port: f"{port} is the debug connector")
+    gps = SensorStatus("nmea", "/dev/serial0", state, last_error="no such port")
+    said = "\n".join(screen(replace(STATUS, gps=gps), None))
+    assert ("/dev/serial0 is the debug connector. It said: no such port." in said) == is_said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import fnmatch
 import re
 import shlex
 import shutil
@@ -212,9 +213,51 @@ def list_of(rule: dict[tuple[str, str], str]) -> list[tuple[str, str, str]]:
     return [(key, operator, value) for (key, operator), value in rule.items()]
 
 
+def the_stick() -> dict[tuple[str, str], str]:
+    return the_rule("ENV{RIDELOG_STICK}", "=", "1")
+
+
+def wanted_by(properties: dict[str, str], parents: tuple[str, ...]) -> str:
+    """The unit that the rules start for a disk with these properties, below devices of these subsystems: they are
+    carried out as udev does it, as far as they ask for nothing else (man udev)."""
+    env = dict(properties)
+    for rule in rules():
+        def holds(key: str, pattern: str) -> bool:
+            if key == "SUBSYSTEMS":
+                return any(fnmatch.fnmatchcase(parent, pattern) for parent in ("block", *parents))
+            known = {"ACTION": "add", "SUBSYSTEM": "block", "KERNEL": "sda1"}
+            found = env.get(key[4:-1], "") if key.startswith("ENV{") else known.get(key, "")
+            return any(fnmatch.fnmatchcase(found, one) for one in pattern.split("|"))
+
+        if all(holds(key, value) == (operator == "==") for key, operator, value in rule if operator in ("==", "!=")):
+            env |= {key[4:-1]: value for key, operator, value in rule if operator in ("=", "+=") and key.startswith("ENV{")}
+    return env.get("SYSTEMD_WANTS", "")
+
+
+USB_PARENTS = ("scsi", "usb", "pci")
+FAT = {"ID_FS_USAGE": "filesystem", "ID_FS_TYPE": "vfat", "DEVTYPE": "partition"}
+
+
+@pytest.mark.parametrize(("properties", "parents", "is_stick"), [
+    ({"ID_BUS": "usb"}, USB_PARENTS, True),
+    ({"ID_BUS": "ata", "ID_USB_DRIVER": "uas"}, USB_PARENTS, True),
+    ({"ID_BUS": "ata", "ID_USB_DRIVER": "usb-storage"}, (), True),
+    ({"ID_BUS": "scsi", "ID_USB_VENDOR": "Samsung"}, (), True),
+    ({"ID_BUS": "nvme"}, USB_PARENTS, True),
+    ({}, USB_PARENTS, True),
+    ({"ID_BUS": "ata"}, ("scsi", "pci"), False),
+    ({"ID_BUS": "nvme"}, ("nvme", "pci"), False),
+    ({}, ("mmc", "platform"), False),
+])
+@pytest.mark.parametrize("label", ["RIDELOG", "ridelog", "Ridelog", "rideLOG", "RIDELOG2", ""])
+def test_a_disk_on_usb_with_the_label_gets_the_logs_whatever_udev_calls_its_bus(
+        properties: dict[str, str], parents: tuple[str, ...], is_stick: bool, label: str) -> None:
+    wanted = wanted_by({**FAT, **properties, "ID_FS_LABEL": label}, parents)
+    assert wanted.startswith("ridelog-export@") == (is_stick and label.upper() == "RIDELOG")
+
+
 def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
-    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
-    assert stick["ENV{ID_BUS}", "=="] == "usb"
+    stick = the_stick()
     assert re.fullmatch(EXPORT.replace("@", "@.+"), stick["ENV{SYSTEMD_WANTS}", "+="])
     light = the_rule("KERNEL", "==", "ACT")
     assert light["SUBSYSTEM", "=="] == "leds"
@@ -223,7 +266,7 @@ def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
 
 def test_a_stick_with_another_file_system_is_refused_in_words() -> None:
     """Its label asks for the logs: the export starts, cannot mount it, and says which kinds it takes."""
-    assert not [key for key, _ in the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog") if key == "ENV{ID_FS_TYPE}"]
+    assert not [key for key, _ in the_stick() if key == "ENV{ID_FS_TYPE}"]
     copy = next(line for line in runs_of(str(PROGRAM)) if "--to" in line)
     assert "--mounted" in copy
 
@@ -231,7 +274,7 @@ def test_a_stick_with_another_file_system_is_refused_in_words() -> None:
 def test_a_stick_without_partitions_that_shows_as_a_disk_and_a_partition_is_one() -> None:
     """mkfs.fat 4.2 gives a whole disk a table with one partition that begins where the disk does: both have the label,
     and the second cannot be mounted. The disk goes first, and what it says of itself is there for its partitions."""
-    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    stick = the_stick()
     assert stick["ENV{RIDELOG_STICK}", "!="] == stick["ENV{RIDELOG_STICK}", "="] == "1"
     phantom = the_rule("IMPORT{parent}", "=", "RIDELOG_STICK")
     assert (phantom["ENV{DEVTYPE}", "=="], phantom["ATTR{start}", "=="]) == ("partition", "0")
@@ -241,7 +284,7 @@ def test_a_stick_without_partitions_that_shows_as_a_disk_and_a_partition_is_one(
 def test_each_time_that_a_stick_is_plugged_in_is_an_instance_of_its_own() -> None:
     """A name such as sda1 comes back within a second, and systemd refuses to start an instance that it is still
     stopping, for good. The sequence number of a disk is given out once (Linux 5.15 and later)."""
-    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    stick = the_stick()
     instance = stick["ENV{SYSTEMD_WANTS}", "+="].removeprefix("ridelog-export@").removesuffix(".service")
     assert "$env{DISKSEQ}" in instance
     assert stick["SYMLINK", "+="] == f"ridelog/{instance}"

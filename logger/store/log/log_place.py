@@ -69,6 +69,13 @@ def why_in_memory(folder: Path) -> str:
     return _why(mount, mounts) if mount is not None else ""
 
 
+def memory_notice(folder: Path) -> str:
+    """The same for a person, with what to do about it; empty: nothing has to be done."""
+    why = why_in_memory(folder)
+    return (f"logs: {folder} lies in memory ({why}): every drive is lost when the power goes. Name a folder on a disk in "
+            "log.directory, or switch the Overlay File System off (sudo raspi-config, Performance Options)" if why else "")
+
+
 def _why(mount: Mount, mounts: Sequence[Mount]) -> str:
     if mount.kind in _IN_MEMORY:
         return f"{mount.point} is a {mount.kind}, a file system in memory"
@@ -96,13 +103,13 @@ def _keeps_in_memory(overlay: Mount, mounts: Sequence[Mount]) -> bool:
     return room[0] * room[1] <= os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
-def _room(mount: Mount) -> tuple[int, int, int, int] | None:
-    """Size of a block, blocks, and files of all and free; None where it has none or cannot be asked."""
+def _room(mount: Mount) -> tuple[int, int, int] | None:
+    """Size of a block, how many, and of how many files; None where it has none or cannot be asked."""
     try:
         said = os.statvfs(mount.point)
     except OSError:
         return None
-    return (said.f_frsize, said.f_blocks, said.f_files, said.f_ffree) if said.f_blocks else None
+    return (said.f_frsize, said.f_blocks, said.f_files) if said.f_blocks else None
 
 
 def _disk(device: int, mount: Mount | None) -> Path | None:
