@@ -1,11 +1,12 @@
 """Which serial port is on the pins of a Raspberry Pi, where somebody named another one.
 
 Problem. /dev/serial0 is on pins 8 and 10 of every Raspberry Pi but the 5 and its like, where it is the three-pin debug
-connector: a receiver on the pins is silent there, however right its wires. And /dev/ttyAMA0, which is right on those, is
-the Bluetooth chip on a 3, a 4 and a Zero W. Solution. What the names lead to, and the model, are read from the kernel.
+connector: a receiver on the pins is silent there, however right its wires. And /dev/ttyAMA0, which is right on those,
+is the Bluetooth chip on a 3, a 4 and a Zero W. Solution. What the names lead to, and the model, are read from the
+kernel.
 
-Sources: Raspberry Pi documentation, computers/configuration/uart.adoc (primary and secondary UART by model; pull request
-3294 of raspberrypi/documentation); overlays/README (dtparam uart0).
+Sources: Raspberry Pi documentation, computers/configuration/uart.adoc (primary and secondary UART by model; pull
+request 3294 of raspberrypi/documentation); overlays/README (dtparam uart0).
 """
 
 from __future__ import annotations

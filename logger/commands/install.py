@@ -38,8 +38,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def notices(root: Path) -> list[str]:
-    """What somebody should know of the machine with the settings that it has now: logs in memory, a receiver's port that
-    is not on the pins. Of a folder that is to become a machine only its port."""
+    """What somebody should know of the machine with the settings that it has now: logs in memory, a receiver's port
+    that is not on the pins. Of a folder that is to become a machine only its port."""
     try:
         config = load_config(root / CONFIG) if (root / CONFIG).exists() else Config()
     except RidelogError as error:

@@ -17,7 +17,6 @@ from logger.store.export import export as export_of_store
 from logger.store.export.export_marks import exported_names
 from logger.store.export.stick_status import read_note
 
-
 pytestmark = pytest.mark.usefixtures("folders_as_sticks")
 
 

@@ -314,4 +314,4 @@ def test_a_port_that_is_not_on_the_pins_and_logs_in_memory_are_said(
     monkeypatch.setattr("logger.commands.install._refuse_hidden", lambda program: None)
     main(["install", "--root", str(tmp_path), "--dry-run"])
     last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith("note: logs: /dev/shm/logs lies in memory (/dev/shm is a tmpfs, a file system in memory): every")
+    assert last.startswith("note: logs: /dev/shm/logs lies in memory (/dev/shm is a tmpfs, a file system in memory): ")

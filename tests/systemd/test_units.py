@@ -221,16 +221,18 @@ def wanted_by(properties: dict[str, str], parents: tuple[str, ...]) -> str:
     """The unit that the rules start for a disk with these properties, below devices of these subsystems: they are
     carried out as udev does it, as far as they ask for nothing else (man udev)."""
     env = dict(properties)
-    for rule in rules():
-        def holds(key: str, pattern: str) -> bool:
-            if key == "SUBSYSTEMS":
-                return any(fnmatch.fnmatchcase(parent, pattern) for parent in ("block", *parents))
-            known = {"ACTION": "add", "SUBSYSTEM": "block", "KERNEL": "sda1"}
-            found = env.get(key[4:-1], "") if key.startswith("ENV{") else known.get(key, "")
-            return any(fnmatch.fnmatchcase(found, one) for one in pattern.split("|"))
+    known = {"ACTION": "add", "SUBSYSTEM": "block", "KERNEL": "sda1"}
 
+    def holds(key: str, pattern: str) -> bool:
+        if key == "SUBSYSTEMS":
+            found = ["block", *parents]
+        else:
+            found = [env.get(key[4:-1], "") if key.startswith("ENV{") else known.get(key, "")]
+        return any(fnmatch.fnmatchcase(one, part) for one in found for part in pattern.split("|"))
+
+    for rule in rules():
         if all(holds(key, value) == (operator == "==") for key, operator, value in rule if operator in ("==", "!=")):
-            env |= {key[4:-1]: value for key, operator, value in rule if operator in ("=", "+=") and key.startswith("ENV{")}
+            env |= {key[4:-1]: value for key, operator, value in rule if operator in ("=", "+=") and "ENV{" in key}
     return env.get("SYSTEMD_WANTS", "")
 
 

@@ -157,8 +157,8 @@ def finished_files(card: DirectoryHandle, dumps: bool) -> list[str]:
 
 
 class _Export:
-    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. ``why_not``: why what
-    is copied may not be marked; empty: it may."""
+    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. ``why_not``: why
+    what is copied may not be marked; empty: it may."""
 
     def __init__(self, card: DirectoryHandle, stick: DirectoryHandle, identity: str, report: Callable[[Progress], None],
                  name: str, why_not: str) -> None:

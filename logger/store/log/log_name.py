@@ -1,8 +1,8 @@
 """The names of a logger's files, and what they say.
 
 ``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
-``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way of
-one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
+``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way
+of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
 """
 
 from __future__ import annotations

@@ -71,16 +71,18 @@ def why_in_memory(folder: Path) -> str:
 
 def memory_notice(folder: Path) -> str:
     """The same for a person, with what to do about it; empty: nothing has to be done."""
-    why = why_in_memory(folder)
-    return (f"logs: {folder} lies in memory ({why}): every drive is lost when the power goes. Name a folder on a disk in "
-            "log.directory, or switch the Overlay File System off (sudo raspi-config, Performance Options)" if why else "")
+    if not (why := why_in_memory(folder)):
+        return ""
+    return (f"logs: {folder} lies in memory ({why}): every drive is lost when the power goes. Name a folder on a disk "
+            "in log.directory, or switch the Overlay File System off (sudo raspi-config, Performance Options)")
 
 
 def _why(mount: Mount, mounts: Sequence[Mount]) -> str:
     if mount.kind in _IN_MEMORY:
         return f"{mount.point} is a {mount.kind}, a file system in memory"
     if mount.kind in _OVERLAYS:
-        return f"{mount.point} is an overlay whose changes are kept in memory" if _keeps_in_memory(mount, mounts) else ""
+        in_memory = _keeps_in_memory(mount, mounts)
+        return f"{mount.point} is an overlay whose changes are kept in memory" if in_memory else ""
     if _MEMORY_DISK.fullmatch(name := Path(mount.source).resolve().name):
         return f"{mount.point} is on {name}, a disk in memory"
     return ""
@@ -124,7 +126,7 @@ def _disk(device: int, mount: Mount | None) -> Path | None:
 
 def _device_of(mount: Mount | None) -> int:
     try:
-        return os.stat(mount.source).st_rdev if mount is not None and mount.source.startswith("/") else 0
+        return Path(mount.source).stat().st_rdev if mount is not None and mount.source.startswith("/") else 0
     except OSError:
         return 0
 

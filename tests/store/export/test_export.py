@@ -34,7 +34,6 @@ from ...support.faults.sticks import (
 )
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
-
 pytestmark = pytest.mark.usefixtures("folders_as_sticks")
 
 
