@@ -341,6 +341,9 @@ def _repairs(even: EvenSamples) -> list[str]:
     if even.repeats > 0:
         notes.append(f"{even.repeats:.0%} of the samples only repeated the one before and were dropped: "
                      f"{even.own_hz:.4g} Hz were taken")
+    if even.holds_s and even.repeats > 0:
+        notes[-1:] = [f"the sensor stood still on all axes for {sum(even.holds_s):.3g} s in {len(even.holds_s)} places, "
+                      f"the longest {max(even.holds_s):.3g} s; nothing was taken then"]
     if not even.as_read:
         notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
     if SEEN * even.own_hz < _FLAT_TO_HZ:

@@ -13,6 +13,11 @@ stands still, on all axes at once. In a held record nearly all of them do. That 
 without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23, 1952): repeats are
 reported where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis are left out: there a
 sensor may stand at the end of its range. What never moves by several steps between two samples is not judged.
+
+That judges many short holds by their number. A few long ones are judged by their length: where a sensor moves by m
+steps from sample to sample right before and right after, each further sample that stands still on all axes has, by the
+same flat density, a chance of 1 in m. A car that comes to rest, or a coarse sensor on a quiet road, moves by single
+steps before it stands still, and is not meant.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.stretches import stretches_inside
+from logger.dsp.stretches import stretches_inside, stretches_of
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -35,7 +40,12 @@ SMALL, LARGE = 2.5, 3.5  # steps; between whole ones, as steps are written round
 CHANCE_STILL = 0.5  # that a stretch of small moves is none at all: 1 in 5 by the flat density, with room
 LEAST_SHARE = 0.03  # fewer repeats raise a weighted r.m.s. by 2 % at most
 _OUTER = 0.05
+_CONVERSION = 1e-9  # of the span: whole steps times a factor differ by so little at most
 _WIDE = 16.0  # steps
+_BESIDE = 7  # moves beside a long hold, of which the median counts: a bump that dies away ends in small ones
+_FEWEST_BESIDE = 3
+LONGEST_END_S = 0.5
+"""A car leaves the range of no sensor for longer: half a second of free fall is a drop of 1.2 m."""
 _FOLLOW = 0.1
 _ON_COMB = 1.0  # samples: a held reading is written at the next instant
 
@@ -100,6 +110,43 @@ def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | 
     if chance > false_alarm:
         return None
     return Repeats(share, chance, fresh, _period(np.flatnonzero(fresh)))
+
+
+def find_holds(time_s: Array, samples: Array, false_alarm: float = FALSE_ALARM) -> Bools:
+    """Which samples (n, axes) at times (n,) [s] repeat the one before in a stretch in which the sensor stood still on
+    all axes for longer than by chance (n,). Before it moved for the first time it may have been parked, unless it
+    stood still for longer later."""
+    held = np.zeros(len(samples), dtype=np.bool_)
+    fresh = fresh_samples(samples)
+    first, end = stretches_of(~fresh)
+    if not len(first):
+        return held
+    steps = [_finest(axis) for axis in samples.T]
+    places = np.flatnonzero(fresh)
+    size = np.append(np.inf, moves(samples, steps))[places]
+    span = np.ptp(samples, axis=0)
+    extreme = ((samples == samples.max(axis=0)) | (samples == samples.min(axis=0)) | (span == 0)).all(axis=1)
+    least, longest = log(len(samples) / false_alarm), 0
+    may_be = (end - first) * log(max(2.0, float(size[1:].max(initial=0.0)))) > least
+    for begin, stop in zip(first[may_be], end[may_be], strict=True):
+        at = int(np.searchsorted(places, begin))
+        before, after = size[max(1, at - _BESIDE) : at], size[at : at + _BESIDE]
+        sides = [one for one in (before, after) if len(one)] if max(len(before), len(after)) >= _FEWEST_BESIDE else []
+        move = min((float(np.median(one)) for one in sides), default=0.0) if len(before) else 0.0
+        clipped = extreme[begin] and time_s[stop - 1] - time_s[begin - 1] <= LONGEST_END_S
+        if move > LARGE and (stop - begin) * log(move) > least and not clipped:
+            held[begin:stop] = True
+            longest = max(longest, stop - begin)
+    if first[0] == 1 and end[0] - 1 <= longest:
+        held[1 : end[0]] = True
+    return held
+
+
+def _finest(values: Array) -> float:
+    """The finest step in which values (n,) are written, but for the rounding of a conversion; 0: they never change."""
+    there = np.diff(np.unique(values))
+    there = there[there > _CONVERSION * np.ptp(values)]
+    return float(np.quantile(there, _OUTER)) if len(there) else 0.0
 
 
 def are_fresh(samples: Array, least_stretches: int = 20) -> bool:

@@ -9,6 +9,7 @@ samples are missing, or were clipped, the grid says so.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,8 @@ import numpy.typing as npt
 from logger.bounds import FASTEST_HZ
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import find_repeats, fresh_times, resolution
+from logger.dsp.repeated_samples import find_holds, find_repeats, fresh_samples, fresh_times, resolution
+from logger.dsp.stretches import stretches_of
 from logger.dsp.uneven import mean_rate_hz, on_even_grid
 from logger.extraction.stretches import LONGEST_HOLE_S
 
@@ -40,6 +42,7 @@ class EvenSamples:
     own_hz       the recorder's own rate
     repeats      share of the samples that only repeated the one before; these were dropped
     as_read      nothing had to be laid on the grid: the samples stood on it
+    holds_s      how long the sensor stood still each time, which is left out [s]
     """
 
     time_s: Array
@@ -49,6 +52,7 @@ class EvenSamples:
     own_hz: float
     repeats: float
     as_read: bool
+    holds_s: tuple[float, ...] = ()
 
 
 def clipped_samples(samples: Array, range_end: float | None) -> Bools:
@@ -64,19 +68,27 @@ def clipped_samples(samples: Array, range_end: float | None) -> Bools:
     return found
 
 
+def still_until_s(time_s: Array, samples: Array) -> float:
+    """Until when samples (n, axes) are all the same as the first [s]: a parked car, or a sensor that does not work."""
+    return float(time_s[max(0, int(np.argmax(np.append(fresh_samples(samples)[1:], True))))])
+
+
 def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float | None = None) -> EvenSamples:
     """Lay samples (n, axes) at times (n,), not decreasing [s], on a grid. ValueError where that cannot be."""
-    clipped = clipped_samples(samples, range_end)
-    ends = np.flatnonzero(np.diff(time_s) > LONGEST_HOLE_S) + 1
-    pieces = [part for part in np.split(np.arange(len(time_s)), ends) if len(part) >= _FEWEST]
+    pieces = _pieces(time_s)
     if not pieces:
         raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
-    whole = [_taken(time_s[part], samples[part], clipped[part]) for part in pieces]
-    taken = [one for one in whole if len(one[0]) >= _FEWEST]
-    if not taken:
-        raise ValueError(f"expected {_FEWEST} samples or more that were taken, each at a time of its own, found fewer")
-    own_hz = mean_rate_hz(max(taken, key=lambda one: len(one[0]))[0])
+    held = find_holds(time_s, samples)
+    whole = [_taken(time_s[part], samples[part], held[part]) for part in pieces]
+    clipped = clipped_samples(np.concatenate([one[1] for one in whole]), range_end)
+    ends = np.cumsum([len(one[0]) for one in whole])[:-1]
+    taken = [(one[0][part], one[1][part], ends_met[part]) for one, ends_met in zip(whole, np.split(clipped, ends),
+                                                                              strict=True) for part in _pieces(one[0])]
     dropped = 1.0 - sum(len(one[0]) for one in whole) / sum(len(part) for part in pieces)
+    longest = max(taken, key=lambda one: len(one[0]))[0] if taken else np.concatenate([one[0] for one in whole])
+    if len(longest) < 2:
+        raise ValueError("expected samples that were taken, each at a time of its own, found one")
+    own_hz = mean_rate_hz(longest)
     if own_hz > FASTEST_HZ:
         raise ValueError(f"expected at most {FASTEST_HZ:g} samples a second, found {own_hz:.3g}: is the unit of the "
                          "time right?")
@@ -86,20 +98,32 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
                          f"{also}: set the program to a higher rate")
     laid = [_laid(*one, own_hz, rate_hz) for one in taken]
     times_s, values, present, ends_met = (np.concatenate(part) for part in list(zip(*laid, strict=True))[:4])
-    return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid))
+    return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid),
+                       tuple(float(end_s - begin_s) for begin_s, end_s in zip(*holes_of(time_s, held), strict=True)))
 
 
-def _taken(time_s: Array, samples: Array, clipped: Bools) -> tuple[Array, Array, Bools]:
+def holes_of(time_s: Array, held: Bools) -> tuple[Array, Array]:
+    """Begin and end (k,) [s] of the holes that samples at times (n,) leave which were not taken (``find_holds``)."""
+    first, end = stretches_of(held)
+    return time_s[first - 1], time_s[np.minimum(end, len(time_s) - 1)]
+
+
+def _pieces(time_s: Array) -> list[Any]:
+    """Samples without a long pause among them."""
+    ends = np.flatnonzero(np.diff(time_s) > LONGEST_HOLE_S) + 1
+    return [part for part in np.split(np.arange(len(time_s)), ends) if len(part) >= _FEWEST]
+
+
+def _taken(time_s: Array, samples: Array, held: Bools) -> tuple[Array, Array]:
     """What was taken, and when: without repeats, at times that grow."""
     if (ends := burst_ends(time_s)) is not None:
         time_s = spread(time_s, ends)
     grows = np.append(True, np.diff(time_s) > 0)
-    time_s, samples, clipped = time_s[grows], samples[grows], clipped[grows]
-    repeats = find_repeats(samples)
+    time_s, samples, held = time_s[grows], samples[grows], held[grows]
+    repeats = find_repeats(samples[~held])
     if repeats is None:
-        return time_s, samples, clipped
-    times_s = fresh_times(repeats, time_s)
-    return times_s, samples[repeats.fresh], clipped[repeats.fresh]
+        return time_s[~held], samples[~held]
+    return fresh_times(repeats, time_s[~held]), samples[~held][repeats.fresh]
 
 
 def _laid(time_s: Array, samples: Array, clipped: Bools, own_hz: float, rate_hz: float

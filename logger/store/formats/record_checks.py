@@ -18,7 +18,8 @@ import numpy.typing as npt
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import Repeats, find_repeats, fresh_times
+from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times
+from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
 from logger.store.formats.csv_table import place
 from logger.store.formats.drive_file import SPEED
@@ -39,6 +40,7 @@ _QUIET_MPS2, _LOUD_MPS2 = 0.1, 30.0
 _MOVING_MPS = 3.0
 _LEAST_FOR_ROADS_HZ = 79.9
 _HOLES = 0.02  # of the time
+_MOSTLY = 0.5  # of the samples: the recorder is slow, and did not stop for a while
 _HOLE_STEPS = 2.5
 
 
@@ -119,18 +121,39 @@ def even_record(
     scale = STANDARD_GRAVITY_MPS2 if asked.unit == "g" else 1.0
     samples = np.stack([scale * one for one in accel.values()], axis=1)
     doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)
-    repeats = find_repeats(samples)
+    held = find_holds(t_s, samples)
+    doubts += _hold_doubts(t_s, held, file)
+    repeats = find_repeats(samples) if not held.any() else None
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
         raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
                        f"{_rate_hz(t_s):.4g}): --resample drops the repeats")
-    kept = slice(None) if repeats is None else repeats.fresh
+    kept = ~held if repeats is None else repeats.fresh
     doubts += [doubt for name, axis in zip(accel, samples[kept].T, strict=True) for doubt in end_doubts(name, axis)]
     if asked.resample_hz is None:
         rate_hz = even_rate_hz(t_s, file, _MEND)
         columns = dict(zip(accel, samples.T.copy(), strict=True))
         return EvenRecord(float(t_s[0]), rate_hz, columns, dict(others), tuple(doubts), None)
-    return _resampled(t_s, samples, accel, others, repeats, file, asked.resample_hz, doubts)
+    return _resampled(t_s, samples, accel, others, repeats, held, file, asked.resample_hz, doubts)
+
+
+def _hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
+    """That the sensor stood still for a while; BadInput where that is too long to draw a line across."""
+    if not held.any():
+        return []
+    first, end = stretches_of(held)
+    begin_s, end_s = t_s[first - 1], t_s[np.minimum(end, len(t_s) - 1)]
+    lasted_s, row = end_s - begin_s, int(np.argmax(end_s - begin_s))
+    if (share := float(held.mean())) > _MOSTLY:
+        raise BadInput(f"{file}: expected every sample to be a new measurement, found {share:.0%} that repeat the one "
+                       f"before ({(~held).sum() / (t_s[-1] - t_s[0]):.3g} Hz written at {_rate_hz(t_s):.4g}): record "
+                       "at a higher rate")
+    if lasted_s[row] > WIDEST_STEP_S:
+        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {WIDEST_STEP_S:g} s, found a sensor that "
+                       f"stands still on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record there")
+    return [Doubt("held", f"the sensor stands still on all axes for {lasted_s.sum():.2g} s in {len(first)} places, the "
+                  f"first at {begin_s[0]:.6g} s: the ride is harder than the values say",
+                  {"seconds": float(lasted_s.sum()), "places": len(first)})]
 
 
 def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
@@ -151,7 +174,7 @@ _MEND = " (--resample lays samples on an even grid)"
 
 def _resampled(
     t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array], repeats: Repeats | None,
-    file: str, rate_hz: float, doubts: list[Doubt],
+    held: Bools, file: str, rate_hz: float, doubts: list[Doubt],
 ) -> EvenRecord:
     from logger.dsp.uneven import mean_rate_hz, on_even_grid
 
@@ -159,6 +182,8 @@ def _resampled(
     taken_s, taken = times_s, samples
     if repeats is not None:
         taken_s, taken = fresh_times(repeats, times_s), samples[repeats.fresh]
+    elif held.any():
+        taken_s, taken = times_s[~held], samples[~held]
     steps = np.diff(taken_s)
     widest_s = float(steps.max()) if len(steps) else 0.0
     if widest_s > WIDEST_STEP_S:
@@ -176,7 +201,7 @@ def _resampled(
     laid = on_even_grid(taken_s, taken, own_hz, wanted_hz)
     grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
     beside = {name: np.interp(grid_s, times_s, one) for name, one in others.items()}
-    dropped = 0.0 if repeats is None else repeats.share
+    dropped = float(held.mean()) if repeats is None else repeats.share
     return EvenRecord(float(taken_s[0]), wanted_hz, dict(zip(names, laid.T.copy(), strict=True)), beside, tuple(doubts),
                       Resampled(own_hz, wanted_hz, widest_s, dropped))
 
