@@ -24,7 +24,7 @@ OUTWARD = ("ridelog.", "logger.public.")
 """Names of the public package: as others know it, and by its folder in a repository."""
 TREES = {module: ast.parse(path.read_text("utf-8")) for path, module in FILES.items()}
 FLOORS = (
-    "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "fitting",
+    "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "left_out", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab", "extraction",
     "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "fleet", "demo",

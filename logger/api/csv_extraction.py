@@ -32,10 +32,12 @@ from logger.api.extracted_runs import (
 )
 from logger.bounds import ACCELERATION, samples_between
 from logger.errors import BadInput
-from logger.printable import word
+from logger.left_out import LeftOut
+from logger.printable import counted, word
 from logger.runs import RecordFacts
 from logger.service.config import Config
 from logger.service.drive_readings import GridReadings
+from logger.service.frozen_sensor import MOVING_MPS
 from logger.store.formats.logger_columns import Named, Recognised, advice, plain
 from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
 from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, units_of
@@ -119,6 +121,7 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
         raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
     notes += _repairs(even)
     raw = _fixes(tables, asked, config, origin_s, even)
+    even = _without_standstill(even, raw, notes)
     receiver = receiver_of(config, even, raw, learns=has_gravity and samples.shape[1] == 3 and asked.speed_mps is None)
     if asked.speed_mps is not None:
         receiver = replace(receiver, delay_s=0.0, std_s=0.0)
@@ -127,7 +130,8 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
     seen_hz = SEEN * even.own_hz
     facts = RecordFacts(step_mps2=_step_mps2(samples), range_mps2=range_end,
                         pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
-    return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes))
+    return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes),
+                    left_out=_left_out(even, len(time_s)))
 
 
 # --- files ---
@@ -334,6 +338,13 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     return time_s[~twice], values[~twice]
 
 
+def _left_out(even: EvenSamples, count: int) -> tuple[LeftOut, ...]:
+    """Of so many samples."""
+    if even.holds_s:
+        return (LeftOut(sum(even.holds_s), "s", "in which the sensor stood still on all axes"),)
+    return (LeftOut(even.repeats * count, "sample", "that only repeated the one before"),)
+
+
 def _repairs(even: EvenSamples) -> list[str]:
     from logger.extraction.even_samples import SEEN
 
@@ -342,8 +353,9 @@ def _repairs(even: EvenSamples) -> list[str]:
         notes.append(f"{even.repeats:.0%} of the samples only repeated the one before and were dropped: "
                      f"{even.own_hz:.4g} Hz were taken")
     if even.holds_s and even.repeats > 0:
-        notes[-1:] = [f"the sensor stood still on all axes for {sum(even.holds_s):.3g} s in {len(even.holds_s)} places, "
-                      f"the longest {max(even.holds_s):.3g} s; nothing was taken then"]
+        places = counted(len(even.holds_s), "place")
+        notes[-1:] = [f"the sensor stood still on all axes for {sum(even.holds_s):.3g} s in {places}, the longest "
+                      f"{max(even.holds_s):.3g} s; nothing was taken then"]
     if not even.as_read:
         notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
     if SEEN * even.own_hz < _FLAT_TO_HZ:
@@ -354,6 +366,19 @@ def _repairs(even: EvenSamples) -> list[str]:
     if not even.present.all():
         notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s lie in holes between samples, and are marked")
     return notes
+
+
+def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> EvenSamples:
+    """Without what a sensor said that stood still from the beginning, while the car drove."""
+    from logger.extraction.even_samples import still_until_s
+    from logger.extraction.stretches import LONGEST_HOLE_S
+
+    still = even.time_s <= still_until_s(even.time_s, even.samples)
+    still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
+    if (lasts_s := np.count_nonzero(still) / RATE_HZ) <= LONGEST_HOLE_S:
+        return even
+    notes.append(f"the sensor stood still on all axes for the first {lasts_s:.3g} s, while the car drove; left out")
+    return replace(even, present=even.present & ~still)
 
 
 def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[str]) -> GridReadings:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from drivers.errors import SettingsError
 from drivers.recorded_words import folder_name
 from logger.errors import BadInput
+from logger.left_out import LeftOut, counting
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
@@ -87,11 +88,11 @@ class ExtractedRun:
 
 @dataclass(frozen=True)
 class Extracted:
-    """What became of a recording: its runs; seconds of driving that were left out because they were off the profile or
-    too short; whether the recording was cut short; and what was recognised and repaired in it, a line each."""
+    """What became of a recording: its runs; what was left out of it; whether the recording was cut short; and what was
+    recognised and repaired in it, a line each."""
 
     runs: tuple[ExtractedRun, ...]
-    left_out_s: float
+    left_out: tuple[LeftOut, ...]
     torn_tail: bool
     notes: tuple[str, ...] = ()
 
@@ -145,6 +146,7 @@ class Recorded:
     facts    what is known of the sensor
     notes    what was recognised and repaired, a line each
     hint     why nothing lies on the profile
+    left_out    before it was decoded
     """
 
     readings: GridReadings
@@ -156,6 +158,7 @@ class Recorded:
     torn_tail: bool = False
     notes: tuple[str, ...] = ()
     hint: str = ""
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def apart(time_s: Array) -> npt.NDArray[np.bool_]:
@@ -183,18 +186,19 @@ def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured:
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out}: expected a folder")
     tell("cutting it into runs")
-    drives, left_out_s = _drives(recorded, measured)
+    drives, left_out = _drives(recorded, measured)
     if not drives:
-        why = "on the profile" if measured is not None and left_out_s > 0 else "with fixes and readings"
+        why = "on the profile" if measured is not None and left_out else "with fixes and readings"
+        also = f" ({'; '.join(one.words for one in left_out)})" if left_out and not recorded.hint else ""
         raise BadInput(f"{source}: expected {LEAST_S:g} s and {LEAST_M:g} m of driving {why}, found none"
-                       f"{recorded.hint}")
+                       f"{recorded.hint}{also}")
     folders = [out / (name + (f"-{number}" if number > 1 else "")) for number in range(1, len(drives) + 1)]
     _make_room(folders, source, out)
     runs = []
     for folder, drive in zip(folders, drives, strict=True):
         tell(f"writing {folder.name}")
         runs.append(_written(folder, drive, recorded, measured, source.name))
-    return Extracted(tuple(runs), left_out_s, recorded.torn_tail, recorded.notes)
+    return Extracted(tuple(runs), left_out, recorded.torn_tail, recorded.notes)
 
 
 def _make_room(folders: list[Path], source: Path, out: Path) -> None:
@@ -231,22 +235,38 @@ class _Drive:
     registered: Registered | None
 
 
-def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], float]:
-    """The runs of a dump, and how many seconds of driving were left out."""
+def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:
+    """The runs of a dump, and what was left out of it."""
     from logger.extraction.stretches import stretches
 
     config, fixes, readings = recorded.config, recorded.fixes, recorded.readings
     found: list[_Drive] = []
-    driving_s = 0.0
+    seconds = dict.fromkeys(("driven", "unknown", "parked"), 0.0)
+    outside = readings.present.copy()
     for begin_s, end_s in stretches(readings.time_s, readings.present, fixes.time_s, fixes.speed_mps,
                                     config.gps.bridge_s, config.pipeline.drive_end_s, config.pipeline.stationary_mps):
         inside = fixes.part((fixes.time_s >= begin_s) & (fixes.time_s <= end_s))
         if len(inside.time_s) < 2:
             continue
-        driving_s += inside.time_s[-1] - inside.time_s[0]
+        seconds["driven"] += inside.time_s[-1] - inside.time_s[0]
+        outside &= (readings.time_s < inside.time_s[0]) | (readings.time_s > inside.time_s[-1])
         found += _along(recorded, inside, measured)
-    kept = [one for one in found if len(one.time_s) > LEAST_S * RATE_HZ and np.ptp(one.distance_m) > LEAST_M]
-    return kept, max(0.0, driving_s - sum(len(one.time_s) for one in kept) / RATE_HZ)
+    if len(fixes.time_s):
+        near = np.clip(np.searchsorted(fixes.time_s, readings.time_s), 0, len(fixes.time_s) - 1)
+        parked = outside & (fixes.speed_mps[near] < config.pipeline.stationary_mps)
+        seconds["parked"] = np.count_nonzero(parked) / RATE_HZ
+    seconds["unknown"] = np.count_nonzero(outside) / RATE_HZ - seconds["parked"]
+    long = [one for one in found if len(one.time_s) > LEAST_S * RATE_HZ and np.ptp(one.distance_m) > LEAST_M]
+    kept = [one for one in long if np.count_nonzero(one.usable == READING) > LEAST_S * RATE_HZ]
+    laid_s, long_s, kept_s = (sum(len(one.time_s) for one in some) / RATE_HZ for some in (found, long, kept))
+    return kept, counting((
+        *recorded.left_out,
+        LeftOut(max(0.0, seconds["unknown"]), "s",
+                f"without a fix for more than {config.gps.bridge_s:g} s, or at an end"),
+        LeftOut(seconds["parked"], "s", "of a parked car"),
+        LeftOut(max(0.0, seconds["driven"] - laid_s), "s", "off the profile" if measured else "between two runs"),
+        LeftOut(laid_s - long_s, "s", f"in stretches of less than {LEAST_S:g} s or {LEAST_M:g} m"),
+        LeftOut(long_s - kept_s, "s", "of which no reading is sure: none was taken, or the sensor stood at its end")))
 
 
 def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:

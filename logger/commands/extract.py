@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.left_out import left_out_json, left_out_lines
 from logger.printable import printable
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         notes = {"notes": [note for each in done for note in each.notes]} if args.csv else {}
         print(json.dumps({"runs": [one.as_json() for each in done for one in each.runs],
-                          "left_out_s": sum(each.left_out_s for each in done),
+                          **left_out_json(one for each in done for one in each.left_out),
                           "torn_tail": any(each.torn_tail for each in done), **notes}))
     return EXIT_DONE if len(done) == len(sources) else EXIT_CHECK_FAILED
 
@@ -157,8 +158,7 @@ def lines(source: Path, found: Extracted) -> list[str]:
         if (scale := one.unusual_speed_scale) is not None:
             printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} +- {100 * scale[1]:.2f} % of "
                            "those on the profile; a receiver's are not so far off: is the profile's distance_m right?")
-    if found.left_out_s >= 1:
-        printed.append(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
+    printed += [f"{source}: {words}" for words in left_out_lines(found.left_out)]
     if found.torn_tail:
         printed.append(f"{source}: the recording was cut short; everything before the cut was used")
     return printed

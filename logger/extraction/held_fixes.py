@@ -39,7 +39,8 @@ def new_rows(time_s: Array, columns: Array, speed_mps: Array, hides_m: float = n
     for first, last in zip(fresh, np.append(fresh[1:], len(time_s)), strict=True):
         may_s = hides_m / speed_mps[first] if speed_mps[first] > 0 else np.inf
         end_s = min(time_s[last - 1], time_s[first] + may_s)
-        if time_s[last - 1] - time_s[first] > _LATE * min(usual_s, _SLOWEST_S):
+        late_s = _LATE * (min(usual_s, _SLOWEST_S) if last < len(time_s) else pace_s)
+        if time_s[last - 1] - time_s[first] > late_s:
             rows = np.searchsorted(time_s, np.append(np.arange(time_s[first] + pace_s, end_s, pace_s), end_s), "right")
             kept.append(rows - 1)
     return np.unique(np.concatenate(kept)).astype(np.int64)

@@ -153,3 +153,19 @@ def test_estimate_refuses_and_mends_as_well(tmp_path: Path) -> None:
     assert "(100 Hz written at 200): --resample drops the repeats" in refused.stderr
     mended = json.loads(estimate("--resample").stdout)
     assert mended["iri_m_per_km"] == pytest.approx(right["iri_m_per_km"], rel=0.01)
+
+
+def test_a_sensor_that_stood_still_for_a_while_left_a_hole(comfort) -> None:
+    samples = rounded(at(EVEN_S, FINE), 0.001)
+    still = samples.copy()
+    still[1000:2000] = still[1000]
+    status, _, complaints = comfort(EVEN_S, still)
+    assert (status, len(complaints)) == (2, 1)
+    assert "ride.csv:1003: expected no hole above 0.5 s, found a sensor that stands still" in complaints[0]
+    short = samples.copy()
+    short[1000:1030] = short[1000]
+    status, reported, _ = comfort(EVEN_S, short)
+    assert (status, [one["what"] for one in reported["doubts"]]) == (0, ["held"])
+    status, _, complaints = comfort(EVEN_S, samples[np.arange(len(samples)) // 100 * 100])
+    assert status == 2
+    assert "(1 Hz written at 100)" in complaints[0]

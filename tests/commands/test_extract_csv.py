@@ -235,6 +235,63 @@ def test_a_column_that_was_named_is_not_replaced_by_a_known_one(tmp_path: Path) 
     assert found["accel_z_mps2"].std() == pytest.approx(0.4 * 9.80665e-3, rel=0.05)
 
 
+def steady(folder: Path, still: slice = slice(0)) -> tuple[Path, Path]:
+    """40 s at 36 to 38 km/h, in whole km/h in each row; on some rows the sensor stands still."""
+    time_s = np.arange(0, 40, 0.01)
+    accel = np.array([0.0, 0.0, 9.81]) + 0.3 * np.random.default_rng(6).standard_normal((len(time_s), 3))
+    accel[still] = accel[still][:1]
+    log = table(folder / "log.csv", "t,ax,ay,az,v", time_s, *accel.T, np.floor(36 + time_s / 16), form="%.3f")
+    return log, table(folder / "obd.csv", "t,v", np.arange(0.0, 40.0), np.floor(36 + np.arange(40.0) / 16))
+
+
+NAMES = "t=t:s,x=ax:m/s2,y=ay:m/s2,z=az:m/s2"
+
+
+def test_an_unchanged_speed_is_driven_all_the_way(tmp_path: Path) -> None:
+    log, obd = steady(tmp_path)
+    for words in ((log, "--columns", f"{NAMES},speed=v:km/h"), (log, "--location", obd, "--columns",
+                                                                 f"{NAMES},speed=v:km/h")):
+        done = called("extract", "--csv", *words, "--out", tmp_path / "o", "--json")
+        assert done.returncode == 0, done.stderr
+        found = json.loads(done.stdout)
+        assert sum(one["metres"] for one in found["runs"]) == pytest.approx(39 * 36.75 / 3.6, rel=0.04)
+        assert found["left_out"] == []
+
+
+def test_places_that_are_repeated_while_the_car_drives_on_are_no_fix_and_are_counted(tmp_path: Path) -> None:
+    log, _ = steady(tmp_path)
+    fix_s = np.arange(0.0, 40.0)
+    held_s = np.where((fix_s > 12) & (fix_s < 28), 12.0, fix_s)
+    places = table(tmp_path / "gps.csv", "t,lat,lon,v", fix_s, 45 + 10 * held_s / 111_195, 7 + 0 * fix_s,
+                   36 + 0 * fix_s, form="%.9f")
+    words = ("--location", places, "--columns", f"{NAMES},lat=lat,lon=lon,speed=v:km/h", "--out", tmp_path / "o")
+    found = json.loads(called("extract", "--csv", log, *words, "--json").stdout)
+    assert len(found["runs"]) == 2
+    (lost,) = found["left_out"]
+    assert (lost["unit"], lost["why"]) == ("s", "without a fix for more than 10 s, or at an end")
+    assert lost["amount"] == pytest.approx(16.0, abs=2.0)
+    assert "Left out: 1" in called("extract", "--csv", log, *words).stdout
+
+
+@pytest.mark.parametrize(("still", "runs"), [((1000, 2000), 2), ((0, 1000), 1), ((2500, 4000), 1)])
+def test_a_sensor_that_stood_still_ends_a_run(still: tuple[int, int], runs: int, tmp_path: Path) -> None:
+    log, _ = steady(tmp_path, slice(*still))
+    done = called("extract", "--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o", "--json")
+    found = json.loads(done.stdout)["runs"]
+    assert len(found) == runs
+    assert sum(one["seconds"] for one in found) == pytest.approx(40 - (still[1] - still[0]) / 100, abs=1.5)
+
+
+def test_a_reading_a_second_is_no_record_and_one_that_is_all_clipped_no_run(tmp_path: Path) -> None:
+    time_s = np.arange(0, 40, 0.01)
+    noise = 0.3 * np.random.default_rng(7).standard_normal((len(time_s), 3))
+    held = noise[np.arange(len(time_s)) // 100 * 100] + np.array([0, 0, 9.81])
+    ends = np.clip(noise, -0.05, 0.05) + np.array([0, 0, 9.81])
+    for accel, said in ((held, "found 1 written at 100 Hz"), (ends, "of which no reading is sure")):
+        log = table(tmp_path / "log.csv", "t,ax,ay,az", time_s, *accel.T, form="%.3f")
+        assert said in refused("--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o")
+
+
 def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) -> None:
     time_s = np.arange(10, 60, 0.01)
     accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)

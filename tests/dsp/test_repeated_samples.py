@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.dsp.repeated_samples import chernoff, find_repeats, fresh_times, resolution
+from logger.dsp.repeated_samples import chernoff, find_holds, find_repeats, fresh_times, resolution
 
 from ..support.drives.records import FINE_HZ, at, held, ride, rounded
 
@@ -99,3 +99,35 @@ def test_the_bound_is_above_the_binomial_tail() -> None:
 
     for hits, tries in ((30, 40), (99, 100), (20, 20), (51, 100), (3, 10)):
         assert chernoff(hits, tries, 0.5) >= binom.sf(hits - 1, tries, 0.5) * (1 - 1e-9)
+
+
+def noise(seconds: float = 60.0, step: float = 0.001, axes: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(8)
+    time_s = np.arange(0, seconds, 0.01)
+    return time_s, step * np.round(0.3 / step * rng.standard_normal((len(time_s), axes)))
+
+
+@pytest.mark.parametrize("axes", [1, 3])
+@pytest.mark.parametrize(("begin_s", "end_s"), [(20.0, 40.0), (30.0, 30.3), (40.0, 60.0)])
+def test_a_sensor_that_stands_still_for_long_is_found_once_is_enough(axes: int, begin_s: float, end_s: float) -> None:
+    time_s, samples = noise(axes=axes)
+    still = slice(round(100 * begin_s), round(100 * end_s))
+    samples[still] = samples[still][0]
+    assert np.flatnonzero(find_holds(time_s, samples)).tolist() == list(range(still.start + 1, still.stop))
+
+
+def test_holds_of_a_second_are_no_record_of_100_hz() -> None:
+    time_s, samples = noise(20.0)
+    assert find_holds(time_s, samples[np.arange(2000) // 100 * 100]).sum() == 1980
+
+
+def test_what_stands_still_for_a_reason_is_no_hold() -> None:
+    """A car that comes to rest under a sensor without noise, a coarse sensor on a quiet road, the end of a range."""
+    time_s, samples = noise()
+    rest = 0.0024 * np.round(samples * np.exp(-np.maximum(0, 30 - np.abs(time_s - 30))[:, None] / 1.5) / 0.0024)
+    assert (rest[2500:3500] == 0).mean() > 0.9
+    coarse = 0.6 * np.round(samples / 0.6)
+    clipped = np.clip(samples[:, :1], -0.3, 0.3)
+    clipped[1000:1040] = 0.3
+    for one in (samples, rest, coarse, clipped):
+        assert not find_holds(time_s, one).any()

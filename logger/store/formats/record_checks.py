@@ -21,6 +21,7 @@ from logger.dsp.range_ends import range_ends
 from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times
 from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
+from logger.printable import counted
 from logger.store.formats.csv_table import place
 from logger.store.formats.drive_file import SPEED
 from logger.store.formats.record_file import TIME, VERTICAL, check_grows, even_rate_hz
@@ -121,9 +122,9 @@ def even_record(
     scale = STANDARD_GRAVITY_MPS2 if asked.unit == "g" else 1.0
     samples = np.stack([scale * one for one in accel.values()], axis=1)
     doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)
-    held = find_holds(t_s, samples)
+    repeats = find_repeats(samples)
+    held = find_holds(t_s, samples) if repeats is None else np.zeros(len(samples), dtype=np.bool_)
     doubts += _hold_doubts(t_s, held, file)
-    repeats = find_repeats(samples) if not held.any() else None
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
         raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
@@ -149,11 +150,13 @@ def _hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
                        f"before ({(~held).sum() / (t_s[-1] - t_s[0]):.3g} Hz written at {_rate_hz(t_s):.4g}): record "
                        "at a higher rate")
     if lasted_s[row] > WIDEST_STEP_S:
-        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {WIDEST_STEP_S:g} s, found a sensor that "
-                       f"stands still on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record there")
-    return [Doubt("held", f"the sensor stands still on all axes for {lasted_s.sum():.2g} s in {len(first)} places, the "
-                  f"first at {begin_s[0]:.6g} s: the ride is harder than the values say",
-                  {"seconds": float(lasted_s.sum()), "places": len(first)})]
+        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {WIDEST_STEP_S:g} s, found a sensor "
+                       f"that stands still on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record "
+                       "there")
+    total_s = float(lasted_s.sum())
+    return [Doubt("held", f"the sensor stands still on all axes for {total_s:.2g} s in {counted(len(first), 'place')}, "
+                  f"the first at {begin_s[0]:.6g} s: the ride is harder than the values say",
+                  {"seconds": total_s, "places": len(first)})]
 
 
 def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
