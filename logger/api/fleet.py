@@ -63,7 +63,8 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
 
     logs           folders at any depth, or files, of segment logs
     to             the dataset, a folder; it is made where there is none
-    car            the name of the car, which is kept as a pseudonym; None: that of the vehicle in the logs' description
+    car            the name of the car; None: that of the vehicle in the logs' description. The dataset keeps a
+                   pseudonym, the table beside it (``DATASET.cars.csv``) its name
     car_folders    a car is called as the folder that its logs lie in
     roads          GeoJSON of roads to lay the windows on, at the first ingest; None: cells of the ground, or the roads
                    that the dataset has
@@ -77,7 +78,7 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
     True
     """
     from logger.fleet.ingest import ingest_sessions, sessions_of
-    from logger.fleet.pseudonyms import own_key, pseudonym
+    from logger.fleet.pseudonyms import keep_names, own_key, pseudonym
     from logger.fleet.words import ingest_json, ingest_words
     from logger.store.log.log_reader import find_logs_in
 
@@ -93,6 +94,7 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
         if trim_m is not None and not dataset.is_new and trim_m != dataset.manifest.trim_m:
             raise BadInput(f"--trim-m {trim_m:g}: expected {dataset.manifest.trim_m:g} m, as the dataset was begun "
                            "with")
+        keep_names(dataset.folder, {name for _, name in named}, key)
         with _keys(dataset, None if roads is None else Path(roads)) as (keyed, roads_sha256):
             counts = ingest_sessions(
                 dataset, sessions_of((log, pseudonym(name, key)) for log, name in named), keyed, roads=roads_sha256,
@@ -102,13 +104,14 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
 
 
 def fleet_summarise(dataset: Path | str, *, by: str = "segment", since: str | None = None, until: str | None = None,
-                    engine: str = "duckdb", min_cars: int = 1) -> FleetSummary:
+                    engine: str = "duckdb", min_cars: int = 1, pseudonyms: bool = False) -> FleetSummary:
     """Mean IRI with its standard error, change and comfort of a dataset's roads, and the biases of its cars.
 
     by          segment (66 ft of one direction), section (0.1 mi), cell (0.8 mi square) or route (a road of the map)
     since       first day, such as 2026-03-01; ``until`` the first day that is left out
     engine      duckdb, spark://HOST:PORT, or ``spark MASTER`` such as ``spark local[2]``
     min_cars    segments that fewer cars have driven are left out
+    pseudonyms  cars are called by these, also where the table of their names lies beside the dataset
 
     Raises BadInput for no dataset, another engine, no pass in that time, and routes without a map.
 
@@ -118,7 +121,7 @@ def fleet_summarise(dataset: Path | str, *, by: str = "segment", since: str | No
     """
     from logger.fleet.words import figures_words
 
-    with _summarised(Path(dataset), by, since, until, engine, min_cars) as (figures, _, _):
+    with _summarised(Path(dataset), by, since, until, engine, min_cars, pseudonyms) as (figures, _, _):
         return FleetSummary(figures_words(figures), {}, figures)
 
 
@@ -131,7 +134,7 @@ class FleetReport(CommandResult):
 
 
 def fleet_report(dataset: Path | str, out: Path | str, *, since: str | None = None, until: str | None = None,
-                 engine: str = "duckdb", min_cars: int = 1) -> FleetReport:
+                 engine: str = "duckdb", min_cars: int = 1, pseudonyms: bool = False) -> FleetReport:
     """Write a folder that opens without a server: ``index.html``, the tiles of its map, ``segments.parquet`` and
     sections of 0.1 mi as ``sections.parquet`` and ``sections.csv``. It is there whole, in place of an older one, or
     not at all.
@@ -147,7 +150,8 @@ def fleet_report(dataset: Path | str, out: Path | str, *, since: str | None = No
 
     place = Path(out)
     check_folder(place)
-    with _summarised(Path(dataset), "segment", since, until, engine, min_cars) as (figures, running, pieces):
+    with _summarised(Path(dataset), "segment", since, until, engine, min_cars, pseudonyms) as (
+            figures, running, pieces):
         if not len(figures.roads.key):
             raise BadInput(f"{dataset}: expected a segment that {min_cars} cars have driven, found none")
         steps = history_of(running, figures, day_us(since, "--since"), day_us(until, "--until"))
@@ -158,10 +162,11 @@ def fleet_report(dataset: Path | str, out: Path | str, *, since: str | None = No
 
 
 @contextmanager
-def _summarised(folder: Path, by: str, since: str | None, until: str | None, engine: str, min_cars: int
-                ) -> Iterator[tuple[FleetFigures, Engine, Pieces | None]]:
+def _summarised(folder: Path, by: str, since: str | None, until: str | None, engine: str, min_cars: int,
+                pseudonyms: bool) -> Iterator[tuple[FleetFigures, Engine, Pieces | None]]:
     """Figures, the engine that made them, and the map of the dataset."""
     from logger.fleet.engine import opened
+    from logger.fleet.pseudonyms import names_of, shown_car
     from logger.fleet.summary import summarise
 
     _needs_arrow()
@@ -176,9 +181,10 @@ def _summarised(folder: Path, by: str, since: str | None, until: str | None, eng
     files = dataset.files(since_us, None if until_us is None else until_us - 1)
     if not files:
         raise empty
-    pieces = _pieces(dataset)
+    pieces, names = _pieces(dataset), {} if pseudonyms else names_of(folder)
     with opened(files, engine) as running:
-        figures = summarise(running, by, since_us, until_us, min_cars, pieces)
+        figures = summarise(running, by, since_us, until_us, min_cars, pieces,
+                            lambda car: names.get(car) or shown_car(car))
         if figures is None:
             raise empty
         yield figures, running, pieces

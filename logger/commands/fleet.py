@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                       help="folder of segment logs, exported stick, or log file")
     take.add_argument("--to", metavar="DATASET", type=Path, required=True, help="folder of the dataset; made if needed")
     whose = take.add_mutually_exclusive_group()
-    whose.add_argument("--car", metavar="NAME", help="the car, kept as a pseudonym (default: the vehicle's name in the "
+    whose.add_argument("--car", metavar="NAME", help="the car's name (default: the vehicle's name in the "
                                                     "description beside each log; give one where cars share it)")
     whose.add_argument("--car-folders", action="store_true",
                        help="each car has a folder of logs, which is called as it is")
@@ -61,6 +61,8 @@ def _common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", metavar="DAY", help="first day that is left out")
     parser.add_argument("--engine", default="duckdb", metavar="ENGINE",
                         help="duckdb, spark://HOST:PORT, or 'spark MASTER' such as 'spark local[2]' (default: duckdb)")
+    parser.add_argument("--pseudonyms", action="store_true",
+                        help="call cars by pseudonyms, for others to read; DATASET.cars.csv tells you which is which")
     add_number(parser, "--min-cars", *CARS, kind=int, default=1, metavar="N",
                help="leave out segments that fewer cars have driven (default: 1)")
 
@@ -87,7 +89,7 @@ def _summarise(args: argparse.Namespace) -> int:
         format_of(args.out)
         check_out(args.out, ())
     found = fleet_summarise(args.dataset, by=args.by, since=args.since, until=args.until, engine=args.engine,
-                            min_cars=args.min_cars)
+                            min_cars=args.min_cars, pseudonyms=args.pseudonyms)
     if args.out is not None:
         write_layer(found.layer(), args.out)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
@@ -98,6 +100,6 @@ def _report(args: argparse.Namespace) -> int:
     from logger.api.fleet import fleet_report
 
     done = fleet_report(args.dataset, args.out, since=args.since, until=args.until, engine=args.engine,
-                        min_cars=args.min_cars)
+                        min_cars=args.min_cars, pseudonyms=args.pseudonyms)
     print(json.dumps(done.as_json()) if args.json else done.text)
     return EXIT_DONE

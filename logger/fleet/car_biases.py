@@ -13,6 +13,10 @@ was fitted in place (Henderson's moments: S. R. Searle, G. Casella, C. E. McCull
 5), the traces by random signs (M. F. Hutchinson, Communications in Statistics 19, 1990). So no degree of freedom is
 counted that the cars and roads have used up.
 
+How far one drive is off another is shown by drives that repeat a road: as many as sessions differ by beyond what cars,
+roads and the common growth take up. A car that has driven once has its bias and its drive's error in one number. With
+fewer than ``LEAST_REPEATS`` the scatter of drives is not known, and so is no bias, no error of a mean and no change.
+
 The mean of all cars' ln g is zero: what all cars share cannot be distinguished from the roads. Cars that share no
 road with others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias
 that could be known. Without the growth a car of the second year would be charged with a year's decay.
@@ -38,6 +42,9 @@ _ROUNDS = 2
 _PROBED = 500_000
 """Random signs for a trace: a few of a large data set, many of a small one, so that its error stays below 1 %."""
 _LEAST_FREEDOM = 1e-6
+LEAST_REPEATS = 6
+"""Of which a standard deviation is known within a factor of two, up or down, with 90 % certainty: the square root of 6
+over the 5 % quantile of chi-square with 6 degrees of freedom is 1.92; with 5 degrees it would be 2.09."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +57,10 @@ class CarBiases:
     known            the gain follows from roads shared with other cars
     growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not show it
     growth_std       of roads' own growth about that, as a fraction a year
-    pass_std         relative standard deviation of a pass; NaN: no road has two passes of different cars
-    session_std      of it, what all passes of a session share
+    pass_std         relative standard deviation of a pass; NaN: too few drives repeat a road
+    session_std      of it, what all passes of a session share; NaN likewise
+    repeats          drives over roads that the same car has driven before, as far as they show how drives scatter
+    needed           so many of them; one of those that are there goes into the growth, where they lie apart in time
     """
 
     gain: Array
@@ -62,6 +71,8 @@ class CarBiases:
     growth_std: float
     pass_std: float
     session_std: float
+    repeats: int
+    needed: int
 
 
 @dataclass(frozen=True)
@@ -89,6 +100,11 @@ class Variances:
 def car_biases(passes: Passes, cars: int) -> CarBiases:
     """The biases of so many cars."""
     variances = Variances(0.0, 0.0, 0.0)
+    design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
+    repeats, needed = _repeats(passes, cars), LEAST_REPEATS + design.is_timed
+    if repeats < needed:
+        return CarBiases(np.ones(cars), np.zeros(cars), design.group, np.zeros(cars, dtype=np.bool_), np.nan, np.nan,
+                         np.nan, np.nan, repeats, needed)
     for _ in range(_ROUNDS):
         design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
         _, residual = _fitted(design)
@@ -102,7 +118,24 @@ def car_biases(passes: Passes, cars: int) -> CarBiases:
     between = float(np.std(log_gain[known], ddof=1)) if known.sum() > 1 else 0.0
     return CarBiases(np.where(known, np.exp(log_gain), 1.0), np.where(known, log_std, between), group, known,
                      float(effects[-1]) if design.is_timed else np.nan, float(np.sqrt(variances.of_growth)),
-                     float(np.sqrt(variances.of_pass + variances.of_session)), float(np.sqrt(variances.of_session)))
+                     float(np.sqrt(variances.of_pass + variances.of_session)), float(np.sqrt(variances.of_session)),
+                     repeats, needed)
+
+
+def _repeats(passes: Passes, cars: int) -> int:
+    """By how much sessions and roads have more degrees of freedom than cars and roads: the rank of their columns is
+    their number less that of the parts that hang together."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    roads = int(passes.road.max()) + 1
+
+    def rank(of: Codes, count: int) -> int:
+        size = roads + count
+        edges = csr_matrix((np.ones(len(of)), (passes.road, roads + of)), shape=(size, size))
+        return size - int(connected_components(edges, directed=False)[0])
+
+    return rank(passes.session, len(passes.car_of_session)) - rank(passes.car, cars)
 
 
 def _fitted(design: Elimination) -> tuple[Array, Array]:
@@ -144,10 +177,12 @@ def _variances(design: Elimination, residual: Array) -> Variances:
         return np.mean([once() for _ in range(probes)], axis=0)
 
     found, forms = _quadratic(design, residual), np.stack([expected(of) for of in range(3)], axis=1)
-    if forms[0, 0] < _LEAST_FREEDOM * len(passes.count):
-        return Variances(np.nan, np.nan, 0.0)
-    scale = 1.0 / np.maximum(forms.max(axis=1), 1e-300)
-    solved, _ = nnls(forms * scale[:, None], found * scale)
+    # What is left of a form after cars and roads: nothing where, say, no road has been driven at three times.
+    whole = np.array([len(passes.count), sessions, float(passes.count @ design.time**2)])
+    shown = np.diag(forms) > _LEAST_FREEDOM * whole
+    scale = 1.0 / np.where(shown, forms.max(axis=1), 1.0)
+    solved = np.zeros(3)
+    solved[shown] = nnls((forms * scale[:, None])[np.ix_(shown, shown)], (found * scale)[shown])[0]
     return Variances(*(float(one) for one in solved))
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 DAY_US = 86_400_000_000
-EXTRA = "expected the 'fleet' extra: pip install 'ridelog[fleet]' ({})"
+EXTRA = "expected the 'fleet' extra: pip install '.[fleet]' in the folder of ridelog's source ({})"
 _MANIFEST = "manifest.json"
 _MAX_BYTES = 512 << 20
 _FORMAT = 1

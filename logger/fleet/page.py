@@ -8,11 +8,10 @@ from importlib import resources
 
 import numpy as np
 
-from logger.fleet.pseudonyms import shown_car
 from logger.fleet.road_cells import SEGMENT_M
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
 from logger.fleet.tiles import DEEPEST, highest_level, names_of, projected
-from logger.fleet.words import error_words
+from logger.fleet.words import error_words, not_known
 from logger.printable import counted
 from logger.report.document import data_block, document, grid, heading, hint, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
@@ -69,7 +68,8 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
         ("Road, each direction", distance_words(float(segments.length_m.sum())), ""),
         ("Mean roughness (IRI)", f"{mean:.2f}", "m/km"),
         ("Change of the mean road", f"{growth:+.1%}" if np.isfinite(growth) else "not known", "a year"),
-        ("Became worse", f"{int(sections.worse.sum()):,}", f"of {len(sections.key):,} sections"),
+        ("Became worse", f"{int(sections.worse.sum()):,}" if sections.changes_known else "not known",
+         f"of {len(sections.key):,} sections"),
         ("To visit", f"{int((sections.visit != '').sum()):,}", "sections"),
     ])
 
@@ -126,9 +126,9 @@ def _worse(sections: RoadTable) -> Html:
 def _cars(figures: FleetFigures) -> Html:
     biases = figures.biases
     order = np.argsort(-np.abs(biases.gain - 1.0) * biases.known, kind="stable")[:_SHOWN].tolist()
-    rows = [(shown_car(int(figures.cars[one])), f"{biases.gain[one] - 1.0:+.1%} ± "
+    rows = [(figures.names[one], f"{biases.gain[one] - 1.0:+.1%} ± "
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]
-    return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(
+    return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(not_known(figures) or (
         "What a car reads of the roads that it shares with others, against the mean car; the figures above are free of "
-        "it. The cars that read otherwise come first."))
+        "it. The cars that read otherwise come first.")))

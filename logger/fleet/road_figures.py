@@ -48,12 +48,14 @@ class RoadFigures:
 
 
 def road_figures(sums: Sums, pass_std: float) -> RoadFigures:
-    """Figures of n roads. ``pass_std``: relative standard deviation of a pass, for where no road shows it; NaN: not
-    known either."""
+    """Figures of n roads. ``pass_std``: relative standard deviation of a pass, for where no road shows it; NaN: drives
+    are too few to show how far they scatter, so no error and no change is known."""
     from scipy.stats import t
 
     count = sums.passes
     mean = sums.iri / count
+    if not np.isfinite(pass_std):
+        return RoadFigures(mean, *(np.full(len(mean), np.nan) for _ in range(4)))
     spread_years = np.maximum(sums.years_square - sums.years**2 / count, 0.0)
     product = sums.iri_years - sums.iri * sums.years / count
     has_trend = (count >= 3) & (spread_years > 1e-9 * count)
@@ -90,7 +92,7 @@ def _prior(variance: Array, freedom: Array, otherwise: float) -> tuple[float, fl
 
     known = (freedom > 0) & (variance > 0)
     if known.sum() < 3:
-        return (np.inf, otherwise) if np.isfinite(otherwise) else (0.0, np.nan)
+        return np.inf, otherwise
     half = freedom[known] / 2
     level = np.log(variance[known]) - digamma(half) + np.log(half)
     excess = level.var(ddof=1) - float(polygamma(1, half).mean())

@@ -75,13 +75,18 @@ class RoadTable:
     worse: npt.NDArray[np.bool_]
     visit: npt.NDArray[np.str_]
 
+    @property
+    def changes_known(self) -> bool:
+        """Whether the passes show a change, or that there is none, anywhere."""
+        return bool(np.isfinite(self.trend_std_m_per_km_per_year).any())
+
 
 @dataclass(frozen=True, eq=False)
 class FleetFigures:
     """What a summary holds.
 
     roads         figures by what was asked for
-    cars          pseudonyms (j,), in order, and ``car_passes`` their passes; ``biases`` in the same order
+    cars          numbers (j,), in order, and ``names``; ``car_passes`` their passes; ``biases`` in the same order
     shared        by all passes of a session: the share of a pass's variance
     windows       in all passes
     withheld      segments that fewer cars have driven than may be published
@@ -89,6 +94,7 @@ class FleetFigures:
 
     roads: RoadTable
     cars: Keys
+    names: tuple[str, ...]
     car_passes: Array
     biases: CarBiases
     shared: float
@@ -97,11 +103,12 @@ class FleetFigures:
 
 
 def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | None, least_cars: int,
-              pieces: Pieces | None) -> FleetFigures | None:
+              pieces: Pieces | None, name_of: Callable[[int], str]) -> FleetFigures | None:
     """Figures of a time [us since 1970, half-open]; None where no pass lies in it.
 
     by        segment, section, cell or route
     pieces    of the map that keys were made with, if one was
+    name_of   a car, by its number
     """
     by_car = passes_by_car(engine.rows, since_us, until_us, _ZERO_US)
     with engine.kept(by_car) as kept:
@@ -118,7 +125,8 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     windows = int(of_roads["windows"].sum())
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
-    return FleetFigures(grouped(segments, by, pieces, shared), cars, car_passes, biases, shared, windows,
+    return FleetFigures(grouped(segments, by, pieces, shared), cars, tuple(map(name_of, cars.tolist())), car_passes,
+                        biases, shared, windows,
                         int((~published).sum()))
 
 

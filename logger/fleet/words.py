@@ -9,7 +9,6 @@ import numpy as np
 
 from logger.fleet.ingest import Counts
 from logger.fleet.layer import FIELDS, roads_layer
-from logger.fleet.pseudonyms import shown_car
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable, change_found
 from logger.printable import counted
 from logger.report.quantities import known
@@ -44,11 +43,12 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
     return {
         "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
         "growth_per_year": known(biases.growth_per_year), "pass_std": known(biases.pass_std),
-        "session_std": known(biases.session_std), "change_found_m_per_km_per_year": known(change_found(figures.roads)),
-        "cars": [{"car": shown_car(car), "passes": int(passes), "bias": known(gain - 1.0 if estimated else np.nan),
+        "session_std": known(biases.session_std), "repeats": biases.repeats, "repeats_needed": biases.needed,
+        "not_known": not_known(figures) or None, "change_found_m_per_km_per_year": known(change_found(figures.roads)),
+        "cars": [{"car": car, "passes": int(passes), "bias": known(gain - 1.0 if estimated else np.nan),
                   "bias_std": known(gain * std if estimated else np.nan), "group": int(group)}
                  for car, passes, gain, std, group, estimated in zip(
-                     figures.cars.tolist(), figures.car_passes.tolist(), biases.gain.tolist(), biases.log_std.tolist(),
+                     figures.names, figures.car_passes.tolist(), biases.gain.tolist(), biases.log_std.tolist(),
                      biases.group.tolist(), biases.known.tolist(), strict=True)],
         "roads": [dict(zip(names, one.values, strict=True)) for one in roads_layer(figures.roads).features]}
 
@@ -60,6 +60,8 @@ def figures_words(figures: FleetFigures) -> str:
              f"{counted(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
+    if why := not_known(figures):
+        lines.append(why)
     if isfinite(biases.pass_std):
         lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
                      f"{biases.session_std:.1%} are shared by all passes of a session")
@@ -68,16 +70,30 @@ def figures_words(figures: FleetFigures) -> str:
     return "\n".join([*lines, "", *_cars(figures), "", *_roads(roads), "", *_changes(roads)])
 
 
+def not_known(figures: FleetFigures) -> str:
+    """Why figures are empty that too few drives show; nothing where there are enough."""
+    if isfinite(figures.biases.pass_std):
+        return ""
+    return ("Not known yet: how far one drive is off another, and so the error of an IRI, its change a year, and what "
+            f"each car reads too high. It takes {figures.biases.needed} drives over roads that the same car has driven "
+            f"before; there {'is' if figures.biases.repeats == 1 else 'are'} {figures.biases.repeats}. Drive the same "
+            "roads again.")
+
+
 def _cars(figures: FleetFigures) -> list[str]:
     biases = figures.biases
     bias, std = biases.gain - 1.0, biases.gain * biases.log_std
+    if not isfinite(biases.pass_std):
+        more = len(figures.names) - _SHOWN_CARS
+        return [f"Cars: {', '.join(figures.names[:_SHOWN_CARS])}" + f" and {more} more (--json has all)" * (more > 0)]
     if not biases.known.any():
         return ["No road has passes of two cars: nothing is known of their biases"]
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
     sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > _SURE * std[one]]
     alone = int((~biases.known).sum())
     lines = [f"Cars that read otherwise than the mean car ({len(sure)} of {len(bias)})"]
-    lines += [f"  {shown_car(int(figures.cars[one]))}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
+    width = max((len(figures.names[one]) for one in sure[:_SHOWN_CARS]), default=0)
+    lines += [f"  {figures.names[one]:{width}}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
               f"{int(figures.car_passes[one]):,} passes" for one in sure[:_SHOWN_CARS]]
     if len(sure) > _SHOWN_CARS:
         lines.append(f"  and {len(sure) - _SHOWN_CARS} more (--json has all)")
@@ -103,6 +119,8 @@ def _changes(roads: RoadTable) -> list[str]:
     limit = change_found(roads)
     power = ([f"A change of {limit:.2f} m/km a year would be found on every second {roads.by} with 80 % certainty"]
             if isfinite(limit) else [])
+    if not roads.changes_known:
+        return [f"Whether a {roads.by} has become worse is not known"]
     if not order:
         return [f"No {roads.by} has become worse, as far as these drives show", *power]
     lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,

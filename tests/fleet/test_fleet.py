@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import signal
 import subprocess
@@ -173,9 +174,7 @@ def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, 
     capsys.readouterr()
     assert main(["fleet", "summarise", str(tmp_path / "town"), "--json"]) == 0
     figures = said(capsys)
-    from logger.fleet.pseudonyms import own_key, pseudonym, shown_car
-
-    names = {shown_car(pseudonym(f"car{car:03d}", own_key(tmp_path / "town"))): car for car in range(5)}
+    names = {f"car{car:03d}": car for car in range(5)}
     biases = {names[one["car"]]: one for one in figures["cars"]}
     errors = np.array([(np.log1p(biases[car]["bias"]) - place.log_gain[car]) / biases[car]["bias_std"]
                        for car in range(5)])
@@ -212,3 +211,51 @@ def test_biases_of_few_roads_with_many_passes_are_estimated(most: int, logs: Pat
     ingest(logs, tmp_path / "town")
     assert main(["fleet", "summarise", str(tmp_path / "town"), "--json"]) == 0
     assert seen[0] >= most / 4
+
+
+def test_cars_have_their_names_and_for_others_pseudonyms_which_the_owner_can_look_up(
+    logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dataset, names = tmp_path / "town", {one.name for one in logs.iterdir()}
+    assert main(["fleet", "ingest", str(logs), "--to", str(dataset), "--car-folders"]) == 0
+    assert main(["fleet", "ingest", str(logs), "--to", str(dataset), "--car", "=van"]) == 0
+    capsys.readouterr()
+
+    def cars(*options: str) -> set[str]:
+        assert main(["fleet", "summarise", str(dataset), "--json", *options]) == 0
+        return {one["car"] for one in said(capsys)["cars"]}  # type: ignore
+
+    assert cars() == names | {"'=van"}  # a spreadsheet opens the table of names
+    hidden = cars("--pseudonyms")
+    assert not hidden & names
+    rows = list(csv.reader((tmp_path / "town.cars.csv").read_text("utf-8").splitlines()))
+    assert rows[0] == ["car", "name"]
+    assert {name for car, name in rows[1:] if car in hidden} == names | {"'=van"}
+    assert not [path for path in dataset.rglob("*") if path.is_file() and b"car001" in path.read_bytes()]
+    (tmp_path / "town.cars.csv").unlink()
+    assert cars() == hidden
+
+
+def test_two_cars_with_a_drive_each_are_not_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = town(1, 200.0, 2)
+    found = drives(place, 2)
+    found.car[:] = [0, 1]
+    found.street[:] = 0
+    write_logs(found, tmp_path / "logs")
+    dataset, page = tmp_path / "town", tmp_path / "map"
+    assert main(["fleet", "ingest", str(tmp_path / "logs"), "--to", str(dataset), "--car-folders"]) == 0
+    capsys.readouterr()
+    assert main(["fleet", "summarise", str(dataset)]) == 0
+    text = capsys.readouterr().out
+    assert "It takes 6 drives over roads that the same car has driven before; there are 0." in text
+    assert "Cars: car000, car001" in text and "Whether a segment has become worse is not known" in text
+    assert not {sign for sign in ("±", "%") if sign in text}
+    assert main(["fleet", "summarise", str(dataset), "--json"]) == 0
+    figures = said(capsys)
+    assert "It takes 6 drives" in str(figures["not_known"])
+    assert [figures[name] for name in ("pass_std", "session_std", "growth_per_year")] == [None] * 3
+    assert {(one["bias"], one["bias_std"]) for one in figures["cars"]} == {(None, None)}  # type: ignore
+    assert {(one["iri_std_m_per_km"], one["trend_m_per_km_per_year"], one["p_value"])
+            for one in figures["roads"]} == {(None, None, None)}  # type: ignore
+    assert main(["fleet", "report", str(dataset), "--out", str(page)]) == 0
+    assert "It takes 6 drives" in (page / "index.html").read_text("utf-8")
