@@ -33,6 +33,16 @@ def read_bounded(path: Path | str, max_bytes: int) -> bytes:
     return data
 
 
+def file_in(path: Path | str, name: str) -> Path:
+    """A file or, of a folder, the file of that name in it. Raises BadInput for a folder without one."""
+    place = Path(path)
+    if not place.is_dir():
+        return place
+    if not (place / name).is_file():
+        raise BadInput(f"{path}: expected a file, or a folder with {name}, found a folder without it")
+    return place / name
+
+
 @contextmanager
 def naming(path: Path | str) -> Iterator[None]:
     """Give an OSError that has no file's name the name of the one that is written in here."""

@@ -59,6 +59,7 @@ class RecordFacts:
     place_std_m              standard error of a place on the profile [m]
     delay_s, delay_std_s     of the receiver, and its standard error; taken out [s]
     speed_scale, speed_scale_std    of its speeds over those on the profile, and its standard error; taken out
+    taken_hz                 samples a second that the recorder took, where they were laid on other times [Hz]
     pass_band_hz             frequencies, the lowest and the highest, between which the record is to be believed [Hz]
     places_by                ``BY_ROAD`` where places were found by the road as this vehicle's model feels it, or
                              ``BY_RECEIVER``
@@ -75,11 +76,18 @@ class RecordFacts:
     delay_std_s: float | None = None
     speed_scale: float | None = None
     speed_scale_std: float | None = None
+    taken_hz: float | None = None
     pass_band_hz: tuple[float, float] | None = None
     places_by: str | None = None
     vehicle: str | None = None
     source: str | None = None
     signals: tuple[Signal, ...] = ()
+
+    @property
+    def seen_to_hz(self) -> float | None:
+        """What lies above was not recorded [Hz]; None: nothing is said of it."""
+        ends_hz = [] if self.pass_band_hz is None else [self.pass_band_hz[1]]
+        return self.taken_hz / 2 if self.taken_hz is not None else min(ends_hz, default=None)
 
     @property
     def late_std_s(self) -> float | None:

@@ -119,6 +119,8 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
         even = even_samples(time_s - origin_s, samples, RATE_HZ, range_end)
     except ValueError as error:
         raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
+    notes += [f"{role} is {axis[0]:.4g} m/s2 in every row, and a sensor that works shows some noise at least: check "
+              "that it was read" for role, axis in zip(AXES, samples.T, strict=False) if np.ptp(axis) == 0.0]
     notes += _repairs(even)
     raw = _fixes(tables, asked, config, origin_s, even)
     even = _without_standstill(even, raw, notes)
@@ -129,6 +131,7 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
     readings = _levelled(even, asked, has_gravity, notes)
     seen_hz = SEEN * even.own_hz
     facts = RecordFacts(step_mps2=_step_mps2(samples), range_mps2=range_end,
+                        taken_hz=None if even.as_read else even.own_hz,
                         pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
     return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes),
                     left_out=_left_out(even, len(time_s)))

@@ -22,7 +22,7 @@ from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
-from logger.store.formats.run_file import read_run_facts, write_run_facts
+from logger.store.formats.run_file import facts_beside, write_run_facts
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
@@ -126,8 +126,8 @@ def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
     even = {drive_file.TIME: np.array([found.start_s]), **found.accel_mps2, **found.others}
     drive = drive_file.drive_of(place, found.rate_hz, even)
     # What was laid on other times, or written in another unit, is on none of the steps that its facts say.
-    as_written = found.resampled is None and asked.unit is None and place.is_dir()
-    facts = replace(read_run_facts(place), signals=()) if as_written else UNKNOWN
+    as_written = found.resampled is None and asked.unit is None
+    facts = facts_beside(place) if as_written else UNKNOWN
     return Run(**{**vars(drive), "facts": facts}, profile=profile), found
 
 

@@ -14,8 +14,10 @@ from logger.api.drives import Run
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
+from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import record_file
-from logger.store.formats.record_checks import Asked, EvenRecord, even_record
+from logger.store.formats.record_checks import Asked, EvenRecord, even_record, with_marks
+from logger.store.formats.run_file import facts_beside
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -141,7 +143,8 @@ def comfort(
     axes = {axis: ride.accel_mps2.get(f"accel_{axis}_mps2") for axis in "zxy"}
     taken_hz = None if ride.resampled is None else ride.resampled.from_hz
     try:
-        found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal), daily_hours, taken_hz)
+        found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal), daily_hours, taken_hz,
+                             _facts_of(record).seen_to_hz)
     except ValueError as error:
         is_file = not isinstance(record, (Record, Run))
         can_be_laid = is_file and taken_hz is None and LEAST_TAKEN_HZ <= ride.rate_hz < LOWEST_RATE_HZ
@@ -154,13 +157,21 @@ def comfort(
                    tuple(doubt.words for doubt in ride.doubts))
 
 
+def _facts_of(record: Record | Run | Path | str) -> RecordFacts:
+    """What a run says of itself, also where its ``drive.csv`` alone was given."""
+    if isinstance(record, Record):
+        return UNKNOWN
+    return record.facts if isinstance(record, Run) else facts_beside(record)
+
+
 def _even(record: Record | Run | Path | str, name: str, asked: Asked) -> EvenRecord:
     """The accelerations to weigh, checked."""
     if isinstance(record, Run):
-        return even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
+        found = even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
+        return with_marks(found, record.usable)
     if not isinstance(record, Record):
-        file, t_s, accel = record_file.read_columns(record)
-        return even_record(t_s, accel, {}, file, asked)
+        file, t_s, accel, usable = record_file.read_marked_columns(record)
+        return with_marks(even_record(t_s, accel, {}, file, asked), usable)
     t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz
     accel = {f"accel_{axis}_mps2": one for axis, one in record.by_axis.items() if one is not None}
     return even_record(t_s, accel, {}, name, asked)

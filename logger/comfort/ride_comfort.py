@@ -18,6 +18,8 @@ LEAST_TAKEN_HZ = 40.0
 SHORTEST_S = 1.0
 # Rounded times make an 80 Hz record look a little slower.
 _RATE_ROUNDING = 1e-3
+_STILL = 1e-12
+"""Of the level: a constant that was laid on another grid differs from itself by some parts in 1e15."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class RideComfort:
     daily_hours    hours a day of such riding, for the health values
     left_out       an axis was recorded and not combined
     taken_hz       samples a second that were taken, where they were laid on another grid; None: ``rate_hz``
+    seen_to_hz     nothing above it was recorded, as somebody says [Hz]; None: nobody does
     """
 
     rate_hz: float
@@ -37,6 +40,7 @@ class RideComfort:
     weighted_mps2: Array
     left_out: bool
     taken_hz: float | None = None
+    seen_to_hz: float | None = None
 
     @property
     def weighting(self) -> Weighting:
@@ -56,13 +60,14 @@ class RideComfort:
     @property
     def unseen_from_hz(self) -> float | None:
         """Where the record ends and the weighting does not [Hz]; None when the record holds all that counts."""
-        end_hz = (self.rate_hz if self.taken_hz is None else min(self.rate_hz, self.taken_hz)) / 2
+        rate_hz = self.rate_hz if self.taken_hz is None else min(self.rate_hz, self.taken_hz)
+        end_hz = rate_hz / 2 if self.seen_to_hz is None else min(rate_hz / 2, self.seen_to_hz)
         return end_hz if end_hz < self.weighting.counts_up_to_hz else None
 
 
 def ride_comfort(
     accel_mps2: dict[str, Array | None], rate_hz: float, weighting: Weighting, horizontal: Weighting | None,
-    daily_hours: float | None = None, taken_hz: float | None = None,
+    daily_hours: float | None = None, taken_hz: float | None = None, seen_to_hz: float | None = None,
 ) -> RideComfort:
     """Weigh the axes of a record that belong together and take their figures.
 
@@ -70,6 +75,7 @@ def ride_comfort(
     weighting      of ``z``; ``horizontal`` that of the others beside it, None: they are not combined with it
     daily_hours    None: as long as the record
     taken_hz       of a record that was laid on this grid, the rate at which its samples were taken [Hz]
+    seen_to_hz     what the record's facts say [Hz]; None: nothing
 
     ValueError for fewer than 80 samples a second, fewer than 40 that were taken, or less than 1 s.
     """
@@ -82,12 +88,20 @@ def ride_comfort(
         raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
     if duration_s < SHORTEST_S:
         raise ValueError(f"expected at least {SHORTEST_S:g} s, found {duration_s:.3g} s")
-    weighted_mps2 = weighting.weigh(vertical, rate_hz)
+    weighted_mps2 = _weighed(weighting, vertical, rate_hz)
     axes, by = {"z": axis_figures(weighted_mps2, rate_hz)}, {"z": weighting}
     others = {axis: accel for axis, accel in accel_mps2.items() if axis != "z" and accel is not None}
     combined = horizontal is not None and len(others) == len("xy")
     if horizontal is not None and combined:
         for axis, accel in others.items():
-            axes[axis], by[axis] = axis_figures(horizontal.weigh(accel, rate_hz), rate_hz), horizontal
+            axes[axis], by[axis] = axis_figures(_weighed(horizontal, accel, rate_hz), rate_hz), horizontal
     hours = daily_hours if daily_hours is not None else duration_s / 3600.0
-    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz)
+    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz,
+                       seen_to_hz)
+
+
+def _weighed(weighting: Weighting, accel_mps2: Array, rate_hz: float) -> Array:
+    """(n,); nothing at all of an axis that stands still: what a filter makes of a constant is its rounding."""
+    if np.ptp(accel_mps2) <= _STILL * np.abs(accel_mps2).max():
+        return np.zeros(len(accel_mps2))
+    return weighting.weigh(accel_mps2, rate_hz)

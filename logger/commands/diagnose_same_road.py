@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,10 +46,8 @@ def run_same_road(args: argparse.Namespace) -> int:
 def _drives(runs: Sequence[Path]) -> list[tuple[Drive, str]]:
     """The drives of folders and files, and their names. BadInput for one that is named twice."""
     from logger.store.formats.drive_file import DRIVE, read_drive
-    from logger.store.formats.run_file import read_run_facts
 
     files = [run / DRIVE if run.is_dir() else run for run in runs]
     if len({file.resolve() for file in files}) != len(files) or len(files) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")
-    return [(replace(read_drive(file), facts=read_run_facts(run)) if run.is_dir() else read_drive(file), str(run))
-            for run, file in zip(runs, files, strict=True)]
+    return [(read_drive(file), str(run)) for run, file in zip(runs, files, strict=True)]

@@ -189,10 +189,10 @@ def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
 
 def _drive(path: Path, flat_will_do: bool) -> tuple[Drive, Track | Excitation | None]:
     """A drive on its road, or where that will do on none."""
-    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE, read_drive, read_run
+    from logger.store.formats.drive_file import EXCITATION, PROFILE, read_drive, read_run
 
     if flat_will_do and not any((path / name).exists() for name in (PROFILE, EXCITATION)):
-        return read_drive(path / DRIVE if path.is_dir() else path), None
+        return read_drive(path), None
     run = read_run(path)
     return run, run.track
 

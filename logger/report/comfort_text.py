@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 from logger.comfort import exposure
@@ -106,7 +107,8 @@ def lines(result: RideComfort, name: str) -> list[str]:
         figures = result.axes[axis]
         values = (figures.a_w_mps2, figures.mtvv_mps2, figures.vdv_mps175, figures.crest_factor, figures.mtvv_ratio,
                   figures.vdv_ratio)
-        printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" for value in values))
+        printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" if isfinite(value) else f"{'-':>13}"
+                                                  for value in values))
     exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
     printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *_conclusions(result), "",
               f"Method: {METHOD}; the mean is taken off."]

@@ -77,7 +77,7 @@ def test_values_in_g_are_refused_and_converted(comfort) -> None:
 def test_a_record_that_never_changes_is_reported(comfort, level: float) -> None:
     status, reported, complaints = comfort(EVEN_S, np.full_like(EVEN_S, level))
     assert (status, [doubt["what"] for doubt in reported["doubts"]], len(complaints)) == (0, ["constant"], 1)
-    assert f"every sample is {level:.4g} m/s2" in complaints[0]
+    assert f"every sample of accel_z_mps2 is {level:.4g} m/s2" in complaints[0]
 
 
 def test_a_record_of_zeros_is_refused(comfort) -> None:
@@ -169,3 +169,71 @@ def test_a_sensor_that_stood_still_for_a_while_left_a_hole(comfort) -> None:
     status, _, complaints = comfort(EVEN_S, samples[np.arange(len(samples)) // 100 * 100])
     assert status == 2
     assert "(1 Hz written at 100)" in complaints[0]
+
+
+def test_an_axis_that_stands_still_has_no_verdict_and_is_named(tmp_path: Path) -> None:
+    """What a filter makes of a constant is its rounding."""
+    z = at(EVEN_S, FINE)
+    path = write_record(tmp_path / "ride.csv", EVEN_S, accel_x_mps2=np.full(len(z), 0.05),
+                        accel_y_mps2=np.full(len(z), 9.81), accel_z_mps2=z)
+    alone = json.loads(called("comfort", write_record(tmp_path / "z.csv", EVEN_S, accel_z_mps2=z), "--json").stdout)
+    for more in ((), ("--unit", "mps2"), ("--resample", "128")):
+        done = called("comfort", path, "--json", *more)
+        found = json.loads(done.stdout)
+        assert [one["axis"] for one in found["doubts"] if one["what"] == "constant"] == ["accel_x_mps2", "accel_y_mps2"]
+        for axis in "xy":
+            assert found["axes"][axis]["a_w_mps2"] == 0
+            assert found["axes"][axis]["crest_factor"] is None
+        assert done.stderr.count("a sensor that works shows some noise") == 2
+    shown = called("comfort", path).stdout
+    assert "Report with it x" not in shown and "y:" not in shown
+    assert found["a_w_mps2"] == pytest.approx(alone["a_w_mps2"], rel=0.01)
+
+
+def test_an_axis_that_stands_still_for_a_while_is_named(tmp_path: Path) -> None:
+    x, z = (rounded(np.roll(at(EVEN_S, FINE), places), 0.001) for places in (700, 0))
+    x[1000:2000] = x[1000]
+    path = write_record(tmp_path / "ride.csv", EVEN_S, accel_x_mps2=x, accel_y_mps2=z[::-1], accel_z_mps2=z)
+    (doubt,) = json.loads(called("comfort", path, "--json").stdout)["doubts"]
+    assert (doubt["what"], doubt["axis"]) == ("held", "accel_x_mps2")
+    assert doubt["seconds"] == pytest.approx(10.0, abs=0.05)
+
+
+def test_what_a_run_says_of_itself_is_heard_of_its_folder_and_of_its_drive(tmp_path: Path) -> None:
+    t_s = np.arange(0, 20, 1 / 59.36)
+    phone = write_record(tmp_path / "phone.csv", t_s, accel_x_mps2=0.05 * at(t_s + 1, FINE),
+                         accel_y_mps2=0.05 * at(t_s + 2, FINE), accel_z_mps2=9.81 + at(t_s + 1, FINE))
+    assert called("extract", "--csv", phone, "--speed", "10", "--out", tmp_path).returncode == 0
+    run = tmp_path / "phone"
+    by_phone = json.loads(called("comfort", phone, "--json", "--resample").stdout)["unseen_from_hz"]
+    assert by_phone == pytest.approx(59.36 / 2, rel=1e-3)
+    for given in (run, run / "drive.csv"):
+        assert json.loads(called("comfort", given, "--json").stdout)["unseen_from_hz"] == pytest.approx(by_phone)
+    (run / "run.yaml").write_text("pass_band_hz: [0, 20]\n")
+    assert json.loads(called("comfort", run, "--json").stdout)["unseen_from_hz"] == 20
+
+
+def test_marks_of_a_drive_are_heard(tmp_path: Path) -> None:
+    z, usable = at(EVEN_S, FINE), np.ones(len(EVEN_S))
+    usable[100:400], usable[500] = 0, 2
+    path = write_record(tmp_path / "drive.csv", EVEN_S, accel_z_mps2=z, usable=usable)
+    doubts = json.loads(called("comfort", path, "--json").stdout)["doubts"]
+    assert [one["what"] for one in doubts] == ["holes", "range_end"]
+
+
+def test_a_folder_stands_for_the_file_in_it_or_is_refused_in_words(tmp_path: Path) -> None:
+    run, empty = tmp_path / "run", tmp_path / "empty"
+    run.mkdir()
+    empty.mkdir()
+    write_record(run / "drive.csv", EVEN_S, accel_z_mps2=at(EVEN_S, FINE))
+    at_m = 0.25 * np.arange(800)
+    (run / "profile.csv").write_text("distance_m,elevation_m\n" + "\n".join(
+        f"{one:.2f},{0.01 * np.sin(one):.5f}" for one in at_m))
+    for words, name in ((("comfort",), "drive.csv"), (("modes", "--method", "fft"), "drive.csv"),
+                        (("iri",), "profile.csv"), (("road", "classify"), "profile.csv")):
+        of_folder, of_file = (called(*words, place, "--json") for place in (run, run / name))
+        assert of_folder.returncode == 0, (words, of_folder.stderr)
+        assert of_folder.stdout == of_file.stdout
+        refused = called(*words, empty)
+        assert refused.returncode == 2
+        assert f"or a folder with {name}, found a folder without it" in refused.stderr

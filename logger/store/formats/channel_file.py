@@ -12,9 +12,9 @@ import numpy.typing as npt
 from logger.bounds import SIGNAL
 from logger.dsp.repeated_samples import find_repeats
 from logger.errors import BadInput
-from logger.files import read_bounded
+from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import parse_columns, place, taken
-from logger.store.formats.drive_file import DISTANCE, PLACE, SPEED, USABLE, header_of
+from logger.store.formats.drive_file import DISTANCE, DRIVE, PLACE, SPEED, USABLE, header_of
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
@@ -41,6 +41,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
+    path = file_in(path, DRIVE)
     file = str(path)
     wished = ",".join(only) if only else "CHANNEL[,CHANNEL...]"
     if no_sensors := [name for name in only if name in NOT_SENSORS]:
@@ -71,6 +72,7 @@ def is_drive(path: Path | str) -> bool:
     how = tuple(name for name in header_of(Path(path)) if name in (SPEED, DISTANCE))
     if not how:
         return False
+    path = file_in(path, DRIVE)
     table = parse_columns(read_bounded(path, MAX_BYTES), str(path),
                           lambda there: how if set(how) <= set(there) else None, ",".join(how))[1]
     return any(float(np.ptp(one) if name == DISTANCE else one.max()) > _STANDING_M

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.errors import BadInput
-from logger.files import naming, read_bounded
+from logger.files import file_in, naming, read_bounded
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
@@ -25,17 +25,16 @@ from logger.store.formats.csv_table import find_table, parse_columns, place, tak
 from logger.store.formats.excitation_file import COLUMNS as EXCITATION_COLUMNS
 from logger.store.formats.excitation_file import read_excitation
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
-from logger.store.formats.profile_file import Profile, read_profile
-from logger.store.formats.record_file import MAX_BYTES, TIME, VERTICAL, even_rate_hz
-from logger.store.formats.run_file import check_columns, read_run_facts
+from logger.store.formats.profile_file import PROFILE_NAME, Profile, read_profile
+from logger.store.formats.record_file import MAX_BYTES, TIME, USABLE, VERTICAL, even_rate_hz
+from logger.store.formats.run_file import DRIVE_NAME, check_columns, facts_beside, read_run_facts
 
 Array = npt.NDArray[np.float64]
 
-DRIVE, PROFILE, EXCITATION = "drive.csv", "profile.csv", "excitation.csv"
+DRIVE, PROFILE, EXCITATION = DRIVE_NAME, PROFILE_NAME, "excitation.csv"
 SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
-USABLE = "usable"
 _QUANTITIES = {TIME: bounds.TIME, VERTICAL: bounds.ACCELERATION, SPEED: bounds.SPEED, DISTANCE: bounds.DISTANCE,
                **dict(zip(PLACE, (bounds.LATITUDE, bounds.LONGITUDE), strict=True))}
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
@@ -112,6 +111,7 @@ def drive_in(folder: Path, timed: bool) -> Drive:
 
 def header_of(path: Path) -> tuple[str, ...]:
     """The names of a table's columns. BadInput for a file that cannot be read."""
+    path = file_in(path, DRIVE)
     return find_table(read_bounded(path, MAX_BYTES), str(path), lambda names: TIME in names and len(names) > 1).names
 
 
@@ -140,7 +140,7 @@ def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = ()) 
     """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns. Times
     and errors as in ``read_run``."""
     file, columns = read_columns(path, timed, more)
-    return replace(drive_of(path, even_rate_hz(columns[TIME], file), columns),
+    return replace(drive_of(path, even_rate_hz(columns[TIME], file), columns), facts=facts_beside(path),
                    more={name: columns[name] for name in more})
 
 
@@ -160,6 +160,7 @@ def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()
     more     columns that are read as well
     """
     needed = (COLUMNS[:2] if timed else COLUMNS) + tuple(more)
+    path = file_in(path, DRIVE)
     names, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), partial(_choose, needed=needed),
                                        _HEADER.format(",".join(needed)))
     if len(table) < 2:
@@ -179,7 +180,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for a speed below 0, and for times beyond
     1e5 s.
     """
-    header = (TIME, SPEED)
+    header, path = (TIME, SPEED), file_in(path, DRIVE)
     _, table, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path),
         lambda names: header if all(names.count(name) == 1 for name in header) else None,

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.bounds import DISTANCE, ELEVATION, MOST_SAMPLES
 from logger.errors import BadInput
-from logger.files import read_bounded
+from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
 from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
 
@@ -27,6 +27,7 @@ Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 PLACE = ("lat_deg", "lon_deg")
+PROFILE_NAME = "profile.csv"
 MAX_BYTES = 512 * 1024 * 1024
 WIDEST_BRIDGED_M = 1.0
 """A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
@@ -59,6 +60,7 @@ def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     Raises BadInput ("file:line: expected ...") for a file that is neither, for values that are missing or not finite,
     and for distances that do not grow or, without ``resample_m``, are not evenly spaced.
     """
+    path = file_in(path, PROFILE_NAME)
     data = read_bounded(path, MAX_BYTES)
     if is_erd(data):
         return _from_erd(parse_erd(data, path), str(path), resample_m)
@@ -82,6 +84,7 @@ def read_places(path: Path | str) -> tuple[Array, Array, Array]:
     Raises BadInput ("file:line: expected ...") for a profile of which fewer than two rows do, and for a place that
     cannot be.
     """
+    path = file_in(path, PROFILE_NAME)
     file = str(path)
     wanted = (COLUMNS[0], *PLACE)
     table = find_table(read_bounded(path, MAX_BYTES), file, lambda names: set(wanted) <= set(names))

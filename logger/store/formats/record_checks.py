@@ -8,8 +8,8 @@ is reported with the result.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh
 from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
 from logger.printable import counted
+from logger.runs import CLIPPED, NO_READING
 from logger.store.formats.csv_table import place
 from logger.store.formats.drive_file import SPEED
 from logger.store.formats.record_file import TIME, VERTICAL, check_grows, even_rate_hz
@@ -68,7 +69,7 @@ class Doubt:
 
     what: str
     words: str
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, float | str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """The same for a program."""
@@ -125,6 +126,9 @@ def even_record(
     repeats = find_repeats(samples)
     held = find_holds(t_s, samples) if repeats is None else np.zeros(len(samples), dtype=np.bool_)
     doubts += _hold_doubts(t_s, held, file)
+    if moving is None or moving.any():
+        driven = slice(None) if moving is None else moving
+        doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven], file)
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
         raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
@@ -157,6 +161,20 @@ def _hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
     return [Doubt("held", f"the sensor stands still on all axes for {total_s:.2g} s in {counted(len(first), 'place')}, "
                   f"the first at {begin_s[0]:.6g} s: the ride is harder than the values say",
                   {"seconds": total_s, "places": len(first)})]
+
+
+def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
+    """The same with the doubts that the marks (n,) of a drive raise, as ``logger.runs`` has them; None: there are
+    none."""
+    if usable is None:
+        return record
+    share, clipped = float((usable == NO_READING).mean()), int(np.count_nonzero(usable == CLIPPED))
+    doubts = [Doubt("holes", f"{share:.1%} of the samples are no readings, as the column usable says, and lie on "
+                    "straight lines: the ride is harder than the values say", {"share": share})] if share > _HOLES else []
+    doubts += [Doubt("range_end", f"{clipped} samples stand at an end of the sensor's range, as the column usable "
+                     "says: the ride is harder than the values say; record with a larger range", {"samples": clipped})
+               ] if clipped else []
+    return replace(record, doubts=(*record.doubts, *doubts))
 
 
 def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
@@ -242,13 +260,7 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
         if abs(gravity - _GRAVITY) < _GRAVITY_NEAR and rms < _GRAVITY_CALM:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
                            "has it: --unit g takes them as g, --unit mps2 as they are")
-    if np.ptp(counted[:, 0]) == 0.0:
-        if counted[0, 0] == 0.0:
-            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
-                           "shows some noise at least; check that it was read")
-        return [Doubt("constant", f"every sample is {counted[0, 0]:.4g} m/s2: a sensor that works shows some noise at "
-                      "least; check that it was read", {"value_mps2": float(counted[0, 0])})]
-    if moving is not None and not moving.any():
+    if np.ptp(counted[:, 0]) == 0.0 or (moving is not None and not moving.any()):
         return []
     numbers = {"rms_mps2": rms}
     if rms < _QUIET_MPS2:
@@ -256,6 +268,31 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     if rms > _LOUD_MPS2:
         return [Doubt("loud", f"{rms:.3g} m/s2 r.m.s. is more than any car has: is it in m/s2?", numbers)]
     return []
+
+
+def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools, file: str) -> list[Doubt]:
+    """Axes of samples (n, axes) that never move, or stand still for long where the others do not. BadInput where the
+    first is 0 all along."""
+    doubts = []
+    for axis, (name, values) in enumerate(zip(names, samples.T, strict=True)):
+        if np.ptp(values) == 0.0:
+            if values[0] == 0.0 and axis == 0:
+                raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
+                               "shows some noise at least; check that it was read")
+            doubts.append(Doubt("constant", f"every sample of {name} is {values[0]:.4g} m/s2: a sensor that works "
+                                "shows some noise at least; check that it was read",
+                                {"axis": name, "value_mps2": float(values[0])}))
+            continue
+        alone = find_holds(t_s, values[:, None]) & ~held if len(samples.T) > 1 else np.zeros(0, dtype=np.bool_)
+        first, end = stretches_of(alone)
+        long = t_s[end - 1] - t_s[first - 1] > WIDEST_STEP_S if len(first) else np.zeros(0, dtype=np.bool_)
+        if long.any():
+            lasts_s = float((t_s[end - 1] - t_s[first - 1])[long].sum())
+            doubts.append(Doubt("held", f"{name} alone stands still for {lasts_s:.3g} s, first at "
+                                f"{t_s[first[long][0] - 1]:.6g} s: what is said of it is too low; check that "
+                                "it was read",
+                                {"axis": name, "seconds": lasts_s}))
+    return doubts
 
 
 def end_doubts(name: str, values: Array) -> list[Doubt]:

@@ -15,13 +15,15 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.errors import BadInput
-from logger.files import read_bounded
+from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import parse_columns, place, taken
+from logger.store.formats.run_file import DRIVE_NAME
 
 Array = npt.NDArray[np.float64]
 
 TIME = "t_s"
 VERTICAL = "accel_z_mps2"
+USABLE = "usable"
 HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
 # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
@@ -71,17 +73,24 @@ def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array]]:
 
     Raises BadInput ("file:line: expected ..., found ...") but for times that are not even.
     """
+    return read_marked_columns(path)[:3]
+
+
+def read_marked_columns(path: Path | str) -> tuple[str, Array, dict[str, Array], Array | None]:
+    """As ``read_columns``, and the column ``usable`` (n,) of a drive; None where there is none."""
+    path = file_in(path, DRIVE_NAME)
     wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER)
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
+    columns = dict(zip(wanted[1:], table.T[1:], strict=True))
+    usable = columns.pop(USABLE, None)
     return file, taken(bounds.TIME, TIME, table[:, 0], file), {
-        name: taken(bounds.ACCELERATION, name, samples, file)
-        for name, samples in zip(wanted[1:], table.T[1:], strict=True)}
+        name: taken(bounds.ACCELERATION, name, samples, file) for name, samples in columns.items()}, usable
 
 
 def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
     """The columns to read; None when one of them is missing or there twice."""
-    wanted = (TIME, VERTICAL, *(name for name in HORIZONTAL if name in names))
+    wanted = (TIME, VERTICAL, *(name for name in (*HORIZONTAL, USABLE) if name in names))
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 
 

@@ -19,9 +19,10 @@ from logger.runs import BY_RECEIVER, BY_ROAD, UNKNOWN, RecordFacts, Signal
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
 RUN = "run.yaml"
+DRIVE_NAME = "drive.csv"
 
 
-_SENSOR = ("step_mps2", "range_mps2", "noise_mps2")
+_SENSOR = ("step_mps2", "range_mps2", "noise_mps2", "taken_hz")
 _RECEIVER = ("delay_s", "delay_std_s", "speed_scale", "speed_scale_std")
 _KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places", "signals")
 # What signals measure: the unit that their columns end in, and the parts that they are of.
@@ -70,6 +71,14 @@ def read_run_facts(folder: Path) -> RecordFacts:
         source=said["source"].text() if "source" in said else None,
         signals=tuple(_signal(name, node) for name, node in said["signals"].mapping().items()
                       ) if "signals" in said else ())
+
+
+def facts_beside(drive: Path | str) -> RecordFacts:
+    """What the ``run.yaml`` in the folder of a ``drive.csv``, or in a run's folder, says of that drive; of its signals,
+    which are columns of their own, nothing. Nothing of a file of another name. Errors as ``read_run_facts``."""
+    place = Path(drive)
+    folder = place if place.is_dir() else place.parent if place.name == DRIVE_NAME else None
+    return UNKNOWN if folder is None else replace(read_run_facts(folder), signals=())
 
 
 def _of_receiver(name: str, node: Node) -> float:
