@@ -170,7 +170,8 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
         return record
     share, clipped = float((usable == NO_READING).mean()), int(np.count_nonzero(usable == CLIPPED))
     doubts = [Doubt("holes", f"{share:.1%} of the samples are no readings, as the column usable says, and lie on "
-                    "straight lines: the ride is harder than the values say", {"share": share})] if share > _HOLES else []
+                    "straight lines: the ride is harder than the values say", {"share": share})]
+    doubts = doubts if share > _HOLES else []
     doubts += [Doubt("range_end", f"{clipped} samples stand at an end of the sensor's range, as the column usable "
                      "says: the ride is harder than the values say; record with a larger range", {"samples": clipped})
                ] if clipped else []
