@@ -37,6 +37,7 @@ class CombinedDrives:
 
     drives, windows       how many there are, and ``placed`` windows of a known place
     length_m              of a cell
+    above_m_per_km        from which IRI a place is rough
     passes, scatter       of the IRI, drive by drive
     iri                   means [m/km]
     a_w_mps2, a_w_std_mps2    mean of the passes, NaN: not known
@@ -52,6 +53,7 @@ class CombinedDrives:
     windows: int
     placed: int
     length_m: float
+    above_m_per_km: float
     passes: Passes
     scatter: Scatter
     iri: Means
@@ -101,9 +103,10 @@ def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_pe
     speed = means(driven, scatter_of(driven))
     place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(std), 0.0, np.nan), cells, mean)
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
-    return CombinedDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std,
-                      _at(mean.key, speed.key, speed.iri_m_per_km), *place,
-                      None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter), visits)
+    return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
+                          a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
+                          None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter),
+                          visits)
 
 
 def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:

@@ -78,13 +78,15 @@ FLAG_MEANINGS: Mapping[str, str] = {
 
 
 def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "",
-         first: Sequence[str] = (), title: tuple[str, str] | None = None) -> Html:
+         first: Sequence[str] = (), title: tuple[str, str] | None = None, marked: Sequence[int] | None = None) -> Html:
     """The page of some log files, in order of their writing, as one HTML document.
 
     base          roads that are drawn beneath, out of a file named ``base_name``
     tiles_from    address of street pictures, with {z}, {x} and {y} in it; empty: none, and no request is made
     first         sections above the map
     title         and a line under it; None: of drives, and their dates
+    marked        rows with a number on the map and in the curves, which ``first`` lists; None: the roughest places,
+                  which are listed too
     """
     records = [record for file in files for record in file.records]
     summary = summarise(records)
@@ -96,13 +98,14 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
         *first,
         track_views(records, summary, _sources(base_name, host), [date_words(summarise(one)) for one in drives]),
         _shares_section(summary),
-        _places_section(records, summary.roughest),
+        _places_section(records, summary.roughest) if marked is None else EMPTY,
         _drives_section(drives) if len(drives) > 1 else EMPTY,
         _notes_section(summary, files),
         _settings_section(files),
         windows_table(records),
         data_block("data", track_data(drives, base, places_passed(drives)) | {
-            "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
+            "places": _numbers(records, summary.roughest) if marked is None else list(marked),
+            "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
     ], style=_asset("page.css"), script='"use strict";\n' + "".join(map(_asset, SCRIPTS)), images_from=host)
@@ -143,8 +146,9 @@ def _tiles(summary: DriveSummary) -> Html:
 
 
 def _shares_section(summary: DriveSummary) -> Html:
-    return html('<section class="columns"><div><h2>Road by IRI class</h2>{}</div><div><h2>Road by comfort</h2>{}</div>'
-                "</section>", _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
+    return html('<section class="columns"><div><h2>Road by IRI (classes of ISO 8608)</h2>{}</div><div>'
+                "<h2>Road by comfort</h2>{}</div></section>",
+                _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
                 _shares(summary.comfort, COMFORT_NAMES, comfort_words))
 
 
@@ -158,7 +162,7 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
 
 
 def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
-    rows = [(html('<button type="button" data-window="{}">{}</button>', index, str(number)), str(place.drive),
+    rows = [(number_button(index, number), str(place.drive),
              _instant(place.utc_us), _geo(place), distance_words(place.along_m), iri_words(place),
              _number(place.speed_mps, 0, 3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
              " ".join(place.flags))
@@ -171,6 +175,11 @@ def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindo
         '<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + hint(
         "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
         "visit a place before judging it. Its number shows it on the map and in the curves."))
+
+
+def number_button(row: int, number: int) -> Html:
+    """The number of a place, which shows its row on the map and in the curves."""
+    return html('<button type="button" data-window="{}">{}</button>', row, str(number))
 
 
 def _numbers(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> list[int]:

@@ -14,10 +14,10 @@ from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import way_and_cell
 
 _KINDS = {"cell": Kind.COUNT, "drives": Kind.COUNT, "first_utc": Kind.TIME, "last_utc": Kind.TIME, "what": Kind.WORDS,
-          "comfort": Kind.WORDS}
+          "comfort": Kind.WORDS, "changed": Kind.WORDS}
 _CELL = ("cell", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "lat_deg", "lon_deg", "heading_deg",
          "first_utc", "last_utc", "trend_m_per_km_year", "trend_std_m_per_km_year", "trend_p_value", "change_m_per_km",
-         "change_std_m_per_km", "change_p_value", "change_false_share")
+         "change_std_m_per_km", "change_p_value", "change_false_share", "changed")
 _VISIT = ("what", "length_m", "confidence", "comfort", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2",
           "lat_deg", "lon_deg", "heading_deg", "first_utc", "last_utc")
 

@@ -11,9 +11,18 @@ from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.combined_drives import CombinedDrives, chains
 from logger.report.document import grid, hint, map_links, paragraphs, section
-from logger.report.html import Html
-from logger.report.page import page
-from logger.report.passes_text import compass, lines, visit_values
+from logger.report.html import EMPTY, Html, html
+from logger.report.page import number_button, page
+from logger.report.passes_text import (
+    MOST_VISITS,
+    change_lines,
+    changed,
+    compass,
+    largest_changes,
+    lines,
+    place_number,
+    visit_values,
+)
 from logger.report.terminal import comfort_words
 from logger.roads.iso8608 import iri_class
 from logger.store.log.log_reader import LoggedFile, utc
@@ -25,10 +34,13 @@ _GAP_M = 1.0
 def passes_page(found: CombinedDrives) -> Html:
     """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
     title = f"Road roughness, mean of {counted(found.drives, 'drive')}", _days(found)
-    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, first=(
+    order = [cell for chain in chains(found) for cell in chain.tolist()]
+    rows = [order.index(one.worst) for one in found.visits[:MOST_VISITS]]
+    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, marked=rows or None, first=(
         section("Repeated drives combined", paragraphs(lines(found)[:4]) + hint(
             "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
-            "last drive, its speed their mean.")), section("Places to visit", _visits(found))))
+            "last drive, its speed their mean.")), section("Places to visit", _visits(found, rows)),
+        section("What changed between the two periods", _changes(found))))
 
 
 def _days(found: CombinedDrives) -> str:
@@ -38,7 +50,24 @@ def _days(found: CombinedDrives) -> str:
     return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
 
 
-def _visits(found: CombinedDrives) -> Html:
+def _changes(found: CombinedDrives) -> Html:
+    if found.change is None:
+        return EMPTY
+    change, cells = found.change, np.searchsorted(found.iri.key, found.change.key)
+    rows = []
+    for one in largest_changes(change):
+        cell = int(cells[one])
+        lat_deg, lon_deg = float(found.lat_deg[cell]), float(found.lon_deg[cell])
+        rows.append((
+            place_number(found, cell), changed(change, one), _link(lat_deg, lon_deg),
+            compass(float(found.heading_deg[cell])),
+            f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
+            str(change.before[one]), str(change.after[one])))
+    heads = ("#", "It got", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
+    return paragraphs(change_lines(found)[:1]) + (grid(heads, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
+
+
+def _visits(found: CombinedDrives, marked: list[int]) -> Html:
     if not found.visits:
         return paragraphs(["No place lies above a limit with enough confidence."])
     rows = []
@@ -47,12 +76,20 @@ def _visits(found: CombinedDrives) -> Html:
         lat_deg, lon_deg = values["lat_deg"], values["lon_deg"]
         a_w = values["a_w_mps2"]
         rows.append((
-            str(number), one.kind, map_links(lat_deg, lon_deg, f"{lat_deg:.6f}, {lon_deg:.6f}"),
+            number_button(marked[number - 1], number) if number <= len(marked) else str(number), one.kind,
+            _link(lat_deg, lon_deg),
             compass(values["heading_deg"]), f"{one.length_m:.0f}",
             f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
-    return grid(("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
-                 "Perception", "Sure", "Drives"), rows, words=(0, 1, 2, 3, 7))
+    heads = ("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+             "Perception", "Sure", "Drives")
+    return html('<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 7))) + hint(
+        f"Rough: above {found.above_m_per_km:.2f} m/km. A place has its number in all tables, on the map and in the "
+        "curves.")
+
+
+def _link(lat_deg: float, lon_deg: float) -> Html:
+    return map_links(lat_deg, lon_deg, f"{lat_deg:.6f}, {lon_deg:.6f}")
 
 
 def _rows(found: CombinedDrives) -> Iterator[WindowRecord]:

@@ -14,6 +14,7 @@ from logger.report.combined_drives import CombinedDrives
 from logger.report.quantities import known
 from logger.report.terminal import comfort_words
 from logger.roads.places_to_visit import Place
+from logger.roads.repeated_drives import Changes
 from logger.store.log.log_reader import iso_utc
 from logger.units import US_PER_S
 
@@ -27,7 +28,8 @@ def lines(found: CombinedDrives) -> list[str]:
     cells = len(found.iri.key)
     if not cells:
         return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
-    return [*_summary(found), *_visits(found), *_changes(found)]
+    changes = change_lines(found)
+    return [*_summary(found), *_visits(found), *([""] if changes else []), *changes]
 
 
 def _summary(found: CombinedDrives) -> Iterator[str]:
@@ -67,26 +69,45 @@ def _visits(found: CombinedDrives) -> Iterator[str]:
         yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
 
 
-def _changes(found: CombinedDrives) -> Iterator[str]:
-    change = found.change
-    if change is None:
-        return
-    yield ""
+def change_lines(found: CombinedDrives) -> list[str]:
+    """What changed between two periods: how much of the road, and the largest changes, a line each."""
+    return [] if found.change is None else list(_changes(found, found.change))
+
+
+def _changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
     if not len(change.key):
         yield "No cell was passed in both periods: no change can be measured."
         return
-    sure = change.false_share <= SIGNIFICANT
-    worse = int((sure & (change.change_m_per_km > 0)).sum())
-    better = int(sure.sum()) - worse
+    words = [changed(change, one) for one in range(len(change.key))]
+    worse, better = words.count("worse"), words.count("better")
     yield (f"Changed between the two periods: {worse} of {counted(len(change.key), 'cell')} got worse, {better} better "
            f"(at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
     cell = np.searchsorted(found.iri.key, change.key)
-    order = np.flatnonzero(sure)[np.argsort(-np.abs(change.change_m_per_km[sure]))][:MOST_CHANGES]
-    for one in order.tolist():
-        yield (f"{found.lat_deg[cell[one]]:10.5f},{found.lon_deg[cell[one]]:10.5f} "
-               f"{compass(found.heading_deg[cell[one]]):2}  {change.change_m_per_km[one]:+6.2f} ± "
+    for one in largest_changes(change):
+        at = int(cell[one])
+        yield (f"{place_number(found, at):>3} {changed(change, one):6} {found.lat_deg[at]:10.5f},"
+               f"{found.lon_deg[at]:10.5f} {compass(found.heading_deg[at]):2}  {change.change_m_per_km[one]:+6.2f} ± "
                f"{change.change_std_m_per_km[one]:.2f} m/km, p {change.p_value[one]:.1e}, "
                f"{counted(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
+
+
+def changed(change: Changes, one: int) -> str:
+    """``worse`` or ``better``; nothing where no change is sure."""
+    if not change.false_share[one] <= SIGNIFICANT:
+        return ""
+    return "worse" if change.change_m_per_km[one] > 0 else "better"
+
+
+def largest_changes(change: Changes) -> list[int]:
+    """The largest of those that are sure, worse or better."""
+    sure = np.flatnonzero(change.false_share <= SIGNIFICANT)
+    order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
+    return list(map(int, order[:MOST_CHANGES]))
+
+
+def place_number(found: CombinedDrives, cell: int) -> str:
+    """The number of the place to visit that a cell belongs to; nothing where there is none."""
+    return next((str(number) for number, one in enumerate(found.visits, start=1) if cell in one.cells), "")
 
 
 def compass(heading_deg: float) -> str:
@@ -125,6 +146,7 @@ def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
     for name in ("change_m_per_km", "change_std_m_per_km", "p_value", "false_share"):
         values[name if name.startswith("change") else f"change_{name}"] = (
             float(getattr(change, name)[row]) if there else None)
+    values["changed"] = changed(change, row) or None if change is not None and there else None
     return values
 
 

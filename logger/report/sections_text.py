@@ -15,7 +15,6 @@ from logger.report.display_units import UNITS, DisplayUnits
 from logger.report.drive_sections import DriveSections, localized
 from logger.report.localized_text import area_lines, area_values
 from logger.report.quantities import known
-from logger.roads.iso8608 import iri_class
 from logger.roads.roughness_words import FEDERAL_WORDS
 from logger.units import FOOT_M, MILE_M
 
@@ -28,13 +27,13 @@ def lines(drives: Sequence[DriveSections], length_m: float, system: str, localiz
     units = UNITS[system]
     said = list(_summary(drives, length_m, units))
     head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
-            f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
+            f"{'std. error':>10}  {'condition':9}  {'a_w m/s2':>8} {units.speed[0]:>6}")
     for one in drives:
         said += ["", _title(one), head, *_rows(one, units)]
         if localized_m_per_km is not None:
             said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km, units)]
     return [*said, "",
-            "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313. Class: ISO 8608.",
+            "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313.",
             "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
 
 
@@ -72,8 +71,7 @@ def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[str]:
         (_, unit_m), (_, iri_scale), (_, speed_scale) = units.length, units.iri, units.speed
         yield (f"{start_m / unit_m:10.{units.length_decimals}f} {end_m / unit_m:10.{units.length_decimals}f} "
                f"{known_m / (end_m - start_m):6.0%} {_number(iri / iri_scale, units.iri_decimals):>10} "
-               f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9} "
-               f"{iri_class(iri) if isfinite(iri) else '':5}  {_number(a_w, 2):>8} "
+               f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9}  {_number(a_w, 2):>8} "
                f"{_number(speed / speed_scale, 0):>6}")
 
 
@@ -108,10 +106,9 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
     for index, word in enumerate(one.condition):
         numbers = {name: known(getattr(figures, name)[index]) for name in (
             "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps", "worst_m_per_km", "worst_at_m")}
-        iri, a_w = numbers["iri_m_per_km"], numbers["a_w_mps2"]
+        a_w = numbers["a_w_mps2"]
         yield {"distance_start_m": float(figures.edges_m[index]), "distance_end_m": float(one.ends_m[index]),
                "known_m": float(figures.known_m[index]), **numbers, "condition": word or None,
-               "iri_class": None if iri is None else iri_class(iri),
                "comfort": None if a_w is None else comfort_word(a_w)}
 
 

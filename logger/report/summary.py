@@ -24,7 +24,8 @@ IRI_CLASSES: Mapping[str, str] = {
     "A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor", "F": "extremely poor",
     "G": "extremely poor", "H": "extremely poor",
 }
-"""ISO 8608 letters, best first, in words."""
+"""ISO 8608 letters, best first, in words: of all roads, also of earth. A highway of class A may be poor by 23 CFR 490,
+so the words stand beside no agency's condition."""
 
 COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 """ISO 2631 words, best first."""
@@ -66,7 +67,7 @@ class RoughWindow:
 class DriveSummary:
     """Some rows in figures. None: not known.
 
-    start_utc_us, end_utc_us    of the first and the last row with UTC
+    start_utc_us, end_utc_us    the earliest and the latest UTC of the rows, whatever their order
     duration_s                  time inside windows; blind_s of it without speed, so without distance
     mean_iri_m_per_km           mean over the distance that has an IRI, but for windows flagged ``unsettled``
     a_w_mps2                    weighted r.m.s. acceleration over the time inside windows, but for those
@@ -97,15 +98,16 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
     distance_m = sum(lengths_m)
     blind_s = sum(record.duration_s for record in records if record.distance_end_m is None)
     duration_s = sum(record.duration_s for record in records)
-    dated = [record for record in records if record.utc_us is not None]
+    starts_us = [record.utc_us for record in records if record.utc_us is not None]
+    ends_us = [end_us for record in records if (end_us := end_utc_us(record)) is not None]
     mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True)
                      if counts(record))
     mean_square = _mean((expected_square(record), record.duration_s) for record in records if counts(record))
     return DriveSummary(
         windows=len(records),
         drives=len(split_drives(records)),
-        start_utc_us=dated[0].utc_us if dated else None,
-        end_utc_us=end_utc_us(dated[-1]) if dated else None,
+        start_utc_us=min(starts_us, default=None),
+        end_utc_us=max(ends_us, default=None),
         distance_m=distance_m,
         duration_s=duration_s,
         blind_s=blind_s,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from logger.report.summary import IRI_CLASSES, DriveSummary, RoughWindow, Share, class_limits_m_per_km
+from logger.report.summary import DriveSummary, RoughWindow, Share, class_limits_m_per_km
 from logger.store.log.log_reader import utc
 
 _BAR_CELLS = 30
@@ -22,7 +22,7 @@ def screen(summary: DriveSummary, encoding: str) -> str:
         "" if summary.mean_speed_mps is None else f"mean speed {summary.mean_speed_mps * 3.6:.0f} km/h",
     ]
     lines += [" · ".join(value for value in values if value), ""]
-    lines += ["Road roughness (IRI class)", *_bars(summary.iri_classes, class_words, drawn), ""]
+    lines += ["Road roughness (IRI, by the classes of ISO 8608)", *_bars(summary.iri_classes, class_words, drawn), ""]
     lines += ["Comfort inside (ISO 2631)", *_bars(summary.comfort, comfort_words, drawn), ""]
     lines += ["Roughest places", *_places(summary.roughest)]
     text = "\n".join(lines) + "\n"
@@ -62,7 +62,7 @@ def date_words(summary: DriveSummary) -> str:
 
 
 def class_words(letter: str) -> str:
-    """An IRI class: ``B  good, 3.05-6.09 m/km``."""
+    """An IRI class: ``B  3.05-6.09 m/km``."""
     if not letter:
         return "no value"
     lower, upper = class_limits_m_per_km(letter)
@@ -70,7 +70,7 @@ def class_words(letter: str) -> str:
         limits = f"below {upper:.2f}"
     else:
         limits = f"from {lower:.2f}" if upper is None else f"{lower:.2f}-{upper:.2f}"
-    return f"{letter}  {IRI_CLASSES[letter]}, {limits} m/km"
+    return f"{letter}  {limits} m/km"
 
 
 def comfort_words(name: str) -> str:

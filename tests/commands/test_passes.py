@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -115,3 +116,50 @@ def test_sections_of_a_route_count_by_its_measures(logs: Path, tmp_path: Path, c
 def test_a_file_that_is_no_route(logs: Path, tmp_path: Path, features: list[dict[str, object]], said: str) -> None:
     with pytest.raises(BadInput, match=said):
         main(["sections", str(logs), "--route", str(route(tmp_path, features))])
+
+
+def test_a_place_has_one_number_and_what_got_worse_is_called_so(
+    logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, table = tmp_path / "page.html", tmp_path / "means.csv"
+    assert main(["passes", str(logs), "--length", "10m", "--split", "2025-06-30", "--above", "4",
+                 "--out", str(page), "--out", str(table)]) == 0
+    text, shown = capsys.readouterr().out, page.read_text("utf-8")
+    (line,) = [one for one in text.splitlines() if "m/km, p " in one]
+    visits = text.partition("Places to visit")[2].splitlines()[2:4]
+    (bump,) = [one for one in visits if "single bump" in one]
+    assert line.split()[:2] == [bump.split()[0], "worse"]
+    worst = [one["changed"] for one in csv.DictReader(table.read_text("utf-8").splitlines())]
+    assert sorted(set(worst)) == ["", "worse"] and worst[BUMP] == "worse"
+    (row,) = re.findall(r"<tr><td>(\d+)</td><td>worse</td>.*?</tr>", shown)
+    marked = json.loads(re.findall(r'id="data">(.*?)</script>', shown)[0])["places"]
+    assert row == bump.split()[0] and marked[int(row) - 1] == BUMP
+    assert "Roughest places" not in shown  # they would be numbered otherwise
+
+
+def test_dates_follow_time_whatever_the_order_of_the_paths(logs: Path, tmp_path: Path) -> None:
+    rows = (logs / "00001-001.csv").read_text("ascii").splitlines()
+    for name, part in (("a", rows[301:]), ("b", rows[1:301])):  # the last drive before the first three
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "00001-001.csv").write_text("\n".join([rows[0], *part, ""]), "ascii")
+    page = tmp_path / "page.html"
+    assert main(["report", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(page)]) == 0
+    assert "17 May 2025, 14:02 to 15 August 2025, 14:02 UTC" in page.read_text("utf-8")
+
+
+def test_no_row_and_no_page_calls_a_road_poor_and_very_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """2.9 m/km is 184 in/mi: poor by 23 CFR 490.313, and class A of ISO 8608, which reaches 3.05."""
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    rows = [replace(row, iri_m_per_km=2.9, iri_std_m_per_km=0.05) for row in rows_of_drive(100)]
+    (folder / "00001-001.csv").write_text("\n".join([HEADER, *map(format_row, rows)]) + "\n", "ascii")
+    out, page = tmp_path / "s.csv", tmp_path / "p.html"
+    assert main(["sections", str(folder), "--length", "0.1mi", "--out", str(out), "--json"]) == 0
+    (drive,) = json.loads(capsys.readouterr().out)["drives"]
+    assert {one["condition"] for one in drive["sections"]} == {"poor"}
+    assert not any("A" in one.values() for one in [
+        *drive["sections"], *csv.DictReader(out.read_text("utf-8").splitlines())])
+    assert main(["sections", str(folder), "--length", "0.1mi"]) == 0
+    assert not [line for line in capsys.readouterr().out.splitlines() if "poor" in line.split() and "A" in line.split()]
+    assert main(["passes", str(folder), "--out", str(page)]) == 0
+    assert "rough stretch" in page.read_text("utf-8") and "very good" not in page.read_text("utf-8")
