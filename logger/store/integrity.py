@@ -175,7 +175,7 @@ def _is_part(path: Path) -> bool:
 
 
 def _is_dump(path: Path) -> bool:
-    if path.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)):
+    if (name_before(path.name) or path.name).endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)):
         return True
     with open_regular(path) as file:
         return file.read(len(_DUMP_START)) == _DUMP_START

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import select
@@ -13,6 +14,7 @@ import tty
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from drivers.accelerometers.bma220 import Bma220Decoder
 from drivers.accelerometers.pasco import PascoConfig
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, Event, open_dump
+from drivers.errors import NotPresent
 from drivers.wire_profiles import LineLayout, load_profile
 from logger.commands import hil as command
 from logger.commands import main
@@ -88,6 +91,17 @@ def test_a_port_that_holds_up_delays_one_chunk_and_not_the_next() -> None:
     assert [t_us for t_us, _ in pasco.written] == [77_030_000, 77_100_200]
     assert sent.late_ms[2] == 20.0
     assert sent.late_ms[0] == 0.2
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EPIPE, errno.ENOSPC, errno.ETIMEDOUT])
+def test_a_port_that_goes_is_named_and_is_no_closed_terminal(number: int) -> None:
+    class Gone:
+        def write(self, data: bytes) -> int:
+            raise OSError(number, f"/dev/x has gone: {os.strerror(number)}")
+
+    ports: Any = {"pasco": Gone(), "nmea": Gone()}
+    with pytest.raises(NotPresent, match=f"the nmea port has gone: /dev/x has gone: {os.strerror(number)}"):
+        send([Event(0, "nmea", b"$")], ports, lambda: 0, lambda _: None, lambda _: None)
 
 
 def test_nothing_to_send() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -246,6 +247,25 @@ def test_a_node_that_may_not_be_opened_is_named(tmp_path: Path) -> None:
     machine = fake.machine()
     fake.node.unlink()
     with pytest.raises(NotPresent, match=r"iio:device1: No such file"):
+        IioSource(fake.settings, machine).open()
+
+
+@pytest.mark.parametrize(("number", "words"), [
+    (errno.EPERM, r"device policy .*DeviceAllow=\S*iio:device1 r on two lines"), (errno.EACCES, "by a udev rule"),
+    (errno.EBUSY, "another program reads it"),
+])
+def test_a_node_that_may_not_be_read_says_who_forbids_it(
+        tmp_path: Path, number: int, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake = fake_in(tmp_path)
+    machine, opens = fake.machine(), os.open
+
+    def refuse(path: Path, *arguments: Any, **named: Any) -> int:
+        if path == fake.node:
+            raise OSError(number, os.strerror(number))
+        return opens(path, *arguments, **named)
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(NotPresent, match=words):
         IioSource(fake.settings, machine).open()
 
 

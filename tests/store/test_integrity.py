@@ -365,6 +365,12 @@ def test_command_refuses_with_status_2(tmp_path: Path) -> None:
     assert caught.value.exit_status == 2
 
 
+def test_a_recording_that_an_export_set_aside_is_checked_as_one(tmp_path: Path) -> None:
+    path = a_dump(tmp_path / "00001.dump.gz", Event(0, "nmea", b"$GP"))
+    aside = path.rename(path.with_name("00001.dump.gz.0123abcd.old"))
+    assert counts(found(aside)) == (1, 0, 0, 0)
+
+
 @pytest.fixture
 def stick(tmp_path: Path) -> Path:
     """A stick with the export of one log; gives the logger's folder on it."""

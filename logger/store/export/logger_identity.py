@@ -123,7 +123,7 @@ def _machine() -> str:
             said = path.read_bytes().strip(b"\0 \n")
         except OSError:
             continue
-        if said.strip(b"0"):
+        if said.strip(b"0") and said != b"uninitialized":  # as systemd says at the first boot
             return _digest(said)
     return ""
 
