@@ -123,7 +123,7 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
         except OSError as error:
             raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
                            "service's user or with sudo") from None
-        name = stick_name(pairing, root, identity)
+        name = stick_name(pairing, root, card, identity)
         if not by_hand:
             refuse_stranger(pairing, card, logs, name)
         try:

@@ -17,6 +17,7 @@ import hashlib
 import re
 import secrets
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from logger.errors import CheckFailed
@@ -38,6 +39,8 @@ LEAST_KEY_BYTES, MOST_KEY_BYTES = 16, 4096
 _ID_BYTES = 16
 _ID = re.compile(rb"([0-9a-f]{32})\n")
 _UNREADABLE = "unreadable"
+_MOST_LOGGERS = 1000
+"""That are looked at on a stick, which may hold names without end."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,16 @@ def trusted_sticks(pairing: Pairing, logs: DirectoryHandle) -> set[str] | None:
     return {name} if name else set()
 
 
-def stick_name(pairing: Pairing, root: DirectoryHandle, identity: str) -> str:
-    """What marks call this stick, of which only ``root`` is open; empty where nothing is known of it."""
+def stick_name(pairing: Pairing, root: DirectoryHandle, logs: DirectoryHandle, identity: str) -> str:
+    """What marks call this stick, of which only ``root`` is open; empty where nothing is known of it. The number that
+    the card remembers may also lie in the folder of another logger: the card has been put into another machine."""
     try:
         if pairing.mode == KEY_FILE:
             return _fingerprint(root.read(KEY_NAME, MOST_KEY_BYTES))
-        with root.inside(manifest.FOLDER, make=False) as common, common.inside(identity, make=False) as own:
-            return _read_id(own, STICK_NAME)
+        with root.inside(manifest.FOLDER, make=False) as common:
+            first, name = _first_stick(logs), _id_in(common, identity)
+            others = (_id_in(common, other) for other in islice(common.each_name(), _MOST_LOGGERS))
+            return first if first and name != first and first in others else name
     except OSError:
         return ""
 
@@ -112,6 +118,14 @@ def _read_id(folder: DirectoryHandle, name: str) -> str:
     except OSError:
         return ""
     return match[1].decode("ascii") if match else ""
+
+
+def _id_in(common: DirectoryHandle, logger: str) -> str:
+    try:
+        with common.inside(logger, make=False) as folder:
+            return _read_id(folder, STICK_NAME)
+    except OSError:
+        return ""
 
 
 def _own_key(path: Path) -> str:

@@ -99,6 +99,19 @@ def test_a_stick_that_lost_its_number_is_a_stranger(logs: Path, sticks: list[Pat
         plug_in(logs, sticks[0], FIRST)
 
 
+def test_a_card_that_was_put_into_another_machine_knows_its_stick(
+        logs: Path, sticks: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in(logs, sticks[0], FIRST)
+    before = own(logs, sticks[0])
+    (tmp_path / "serial").write_text("another board")
+    monkeypatch.setattr("logger.store.export.logger_identity.BOARD_SERIAL", tmp_path / "serial")
+    assert plug_in(logs, sticks[0], FIRST).copied == NAMES
+    assert own(logs, sticks[0]) != before
+    assert exported_names(logs, FIRST) == set(NAMES)
+    with pytest.raises(CheckFailed, match="not the stick"):
+        plug_in(logs, sticks[1], FIRST)
+
+
 def test_copies_made_before_there_was_a_pairing_count_once_the_paired_stick_has_them(
         logs: Path, sticks: list[Path], by_key: Pairing) -> None:
     mine, theirs = sticks
