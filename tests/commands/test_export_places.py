@@ -113,6 +113,17 @@ def test_two_cars_that_had_one_number_already_lose_nothing(
     assert exported(capsys, a, stick)["set_aside"] != []  # it is copied once more
 
 
+def test_a_copy_that_was_damaged_is_set_aside_and_not_listed(
+        tmp_path: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    drive(tmp_path / "logs", 1, 0)
+    folder = stick / "ridelog" / exported(capsys, tmp_path / "logs", stick)["logger"]
+    (folder / "00001-001.csv").write_bytes(b"worn out\n")
+    assert len(exported(capsys, tmp_path / "logs", stick)["set_aside"]) == 1
+    assert ".old" not in (folder / "manifest.sha256").read_text()
+    assert main(["verify", str(stick)]) == 0
+    capsys.readouterr()
+
+
 def test_an_older_state_of_a_log_is_no_drive_of_its_own(
         tmp_path: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
     drive(tmp_path / "logs", 1, 0)

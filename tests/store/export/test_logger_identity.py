@@ -68,10 +68,11 @@ def test_it_is_that_of_the_board(card: Path, be: Be, serial: str, machine_id: st
     assert number(card) == first
 
 
-def test_without_a_serial_number_it_is_that_of_the_machine_id(card: Path, be: Be) -> None:
-    be("", "1")
+@pytest.mark.parametrize("serial", ["", "0000000000000000"])
+def test_without_a_serial_number_it_is_that_of_the_machine_id(card: Path, be: Be, serial: str) -> None:
+    be(serial, "1")
     first = number(card)
-    be("", "2")
+    be(serial, "2")
     assert number(card) != first
     be("", "")
     assert number(card) == (card / IDENTITY_NAME).read_text().strip()  # nothing is known of the machine
@@ -86,8 +87,13 @@ def test_a_copy_beside_its_original_has_another_and_what_was_moved_has_not(card:
     assert (number(card), number(tmp_path / "copy")) == (first, second)
     card.rename(tmp_path / "moved")
     assert number(tmp_path / "moved") == first
-    (tmp_path / "link").symlink_to(tmp_path / "moved")
-    assert number(tmp_path / "link") == first
+    for name in ("link", "card"):
+        (tmp_path / name).symlink_to(tmp_path / "moved")
+        assert number(tmp_path / name) == number(tmp_path / "moved") == first
+    card.unlink()
+    (tmp_path / "moved").rename(card)
+    (tmp_path / "moved").symlink_to(card)
+    assert number(card) == first
 
 
 def test_one_that_an_older_version_made_is_taken_over(card: Path, be: Be) -> None:

@@ -57,14 +57,16 @@ def test_what_lies_in_memory_is_known_by_its_mount(tmp_path: Path, table: Table,
     assert ("every drive is lost" in memory_notice(folder)) == bool(words)
 
 
-@pytest.mark.parametrize(("room", "is_in_memory"), [
-    (SIZES["/"], False),  # that of the card, where the upper folder lies then
-    ((4096, 400_000, 100_000), True),  # less than there is memory
-    ((4096, 9_000_000, 100_000), False),
+@pytest.mark.parametrize(("card", "room", "is_in_memory"), [
+    (SIZES["/"], SIZES["/"], False),
+    ((4096, 400_000, 100_000), (4096, 400_000, 100_000), False),  # that of a small card: the upper folder lies there
+    (SIZES["/"], (4096, 400_000, 100_000), True),  # less than there is memory
+    (SIZES["/"], (4096, 9_000_000, 100_000), False),
 ])
 def test_an_overlay_whose_upper_folder_cannot_be_seen_is_known_by_its_room(
-        tmp_path: Path, table: Table, monkeypatch: pytest.MonkeyPatch, room: tuple[int, int, int],
-        is_in_memory: bool) -> None:
+        tmp_path: Path, table: Table, monkeypatch: pytest.MonkeyPatch, card: tuple[int, int, int],
+        room: tuple[int, int, int], is_in_memory: bool) -> None:
+    monkeypatch.setitem(SIZES, "/", card)
     monkeypatch.setitem(SIZES, str(tmp_path), room)
     table(f"31 30 0:40 / {tmp_path} rw - overlay overlay rw,lowerdir=/lower,upperdir=/upper/data,workdir=/upper/work")
     assert bool(why_in_memory(tmp_path)) == is_in_memory
@@ -98,6 +100,7 @@ def test_parts_of_a_disk_are_on_it_and_other_disks_are_not(
 
     assert are_on_one_disk(at("179:2"), at("179:2"))
     assert are_on_one_disk(at("179:2"), at("179:1"))
+    assert are_on_one_disk(at("0:40"), at("0:40"))
     assert not are_on_one_disk(at("179:2"), at("8:1"))
     assert not are_on_one_disk(at("0:40"), at("8:1"))
 
