@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from logger.extraction.along_track import Observations, TrackMotion
     from logger.extraction.measured_line import MeasuredLine, Pass
     from logger.extraction.registration import Predict, Registered
+    from logger.extraction.run_grid import RunGrid
     from logger.service.drive_readings import GridReadings
     from logger.store.formats.vehicle_file import Model
 
@@ -317,14 +318,15 @@ def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, mea
     fixes, along_m = fixes.part(part), along_m[part]
     ahead_m = recorded.config.gps.antenna_behind_front_axle_m
     places = Observations(fixes.time_s, along_m + ahead_m, np.full(len(along_m), GPS_PLACE_M))
-    readings = time_s, accel, usable = _readings(recorded, fixes)
-    if len(time_s) < 2:
+    grid, accel, usable = readings = _readings(recorded, fixes)
+    if len(accel) < 2:
         return None
     track = drive_file.track_of(measured.profile)
-    found = registered(_speeds(fixes, recorded.config), places, time_s, np.where(usable > 0, accel, 0.0), RATE_HZ,
-                       track, _predictor(recorded, time_s, track))
+    found = registered(_speeds(fixes, recorded.config), places, grid.taken_s, np.where(usable > 0, accel, 0.0), RATE_HZ,
+                       track, _predictor(recorded, grid.taken_s, track))
     drive = _drive(readings, fixes, found.motion, registered=found)
-    inside = (drive.distance_m >= track.start_m) & (drive.distance_m <= track.end_m)
+    on = np.flatnonzero((drive.distance_m >= track.start_m) & (drive.distance_m <= track.end_m))
+    inside = slice(on[0], on[-1] + 1) if len(on) else slice(0)
     names = ("time_s", "accel_mps2", "usable", "speed_mps", "distance_m", "lat_deg", "lon_deg")
     return replace(drive, **{name: getattr(drive, name)[inside] for name in names})
 
@@ -344,24 +346,30 @@ def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
     return predict
 
 
-def _drive(readings: tuple[Array, Array, Array], fixes: Fixes, motion: TrackMotion, ahead_m: float = 0.0,
+def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMotion, ahead_m: float = 0.0,
            registered: Registered | None = None) -> _Drive:
     """Readings as ``_readings`` gives them, with their motion; the front tires are so far ahead of it [m]."""
-    time_s, accel, usable = readings
-    lon_deg = np.interp(time_s, fixes.time_s, np.unwrap(fixes.lon_deg, period=360.0))
-    return _Drive(time_s, accel, usable, motion.speed_mps(time_s), motion.distance_m(time_s) + ahead_m,
-                  np.interp(time_s, fixes.time_s, fixes.lat_deg), (lon_deg + 180.0) % 360.0 - 180.0, registered)
+    grid, accel, usable = readings
+    at_s = grid.taken_s
+    lon_deg = np.interp(at_s, fixes.time_s, np.unwrap(fixes.lon_deg, period=360.0))
+    return _Drive(grid.time_s, accel, usable, motion.speed_mps(at_s), motion.distance_m(at_s) + ahead_m,
+                  np.interp(at_s, fixes.time_s, fixes.lat_deg), (lon_deg + 180.0) % 360.0 - 180.0, registered)
 
 
-def _readings(recorded: Recorded, fixes: Fixes) -> tuple[Array, Array, Array]:
-    """Times, accelerations without gravity and offset, and how usable they are, (n,) each, within the fixes."""
+def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
+    """Samples on the grid of a run, within the fixes: accelerations without gravity and offset, and how usable they
+    are, (n,) each."""
+    from logger.extraction.run_grid import run_grid
+
     readings = recorded.readings
     inside = (readings.time_s >= fixes.time_s[0]) & (readings.time_s <= fixes.time_s[-1])
     present, clipped = readings.present[inside], readings.clipped[inside]
     accel = readings.accel_mps2[inside]
     whole = present & ~clipped
     usable = np.where(present, np.where(clipped, CLIPPED, READING), NO_READING)
-    return readings.time_s[inside], accel - (accel[whole].mean() if whole.any() else 0.0), usable
+    accel = accel - (accel[whole].mean() if whole.any() else 0.0)
+    grid = run_grid(readings.time_s[inside], RATE_HZ)
+    return grid, grid.laid(accel), np.where(grid.row >= 0, usable[grid.row], NO_READING)
 
 
 # --- files ---

@@ -39,6 +39,7 @@ _QUANTITIES = {TIME: bounds.TIME, VERTICAL: bounds.ACCELERATION, SPEED: bounds.S
                **dict(zip(PLACE, (bounds.LATITUDE, bounds.LONGITUDE), strict=True))}
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
 _LINES_AT_ONCE = 50_000
+_TIME_FORM = "%.13g"  # hundredths of a second, also of a clock that has run since 1970
 _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 
 
@@ -228,7 +229,7 @@ def write_excitation(path: Path, excitation: Excitation) -> None:
 
 
 def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
-    line = ",".join([form] * len(names)) + "\n"
+    line = ",".join(_TIME_FORM if name == TIME else form for name in names) + "\n"
     with naming(path), path.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(names) + "\n")
         for first in range(0, len(table), _LINES_AT_ONCE):
