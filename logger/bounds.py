@@ -55,6 +55,10 @@ quietest ground moves (J. Peterson, USGS 93-322, 1993: 6e-10 m/s2 per root hertz
 SPEED = Quantity("m/s", 150.0, 1e-9)
 DISTANCE = Quantity("m", 1e9, 1e-9)
 ELEVATION = Quantity("m", 1e4, 1e-12)
+DELAY = Quantity("s", 1000.0, 1e-6)
+"""Of a receiver or a recorder against another."""
+SCALE = Quantity("", 1000.0, 0.001)
+"""Of one signal over another: a unit that was mistaken is a thousand."""
 LATITUDE, LONGITUDE = Quantity("degrees", 90.0, 0.0), Quantity("degrees", 360.0, 0.0)
 SIGNAL = Quantity("", 1e12, 1e-30)
 """Of any sensor, in any unit: beyond, squares lose their digits, or are lost."""

@@ -21,12 +21,13 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from ..support.fuzz.command_targets import COMMAND_TARGETS
 from ..support.fuzz.field_targets import FIELD_TARGETS
 from ..support.fuzz.mutation import Counts, Tally, fuzz, read_counts
 from ..support.fuzz.targets import TARGETS as BYTE_TARGETS
 from ..support.fuzz.targets import Workshop
 
-TARGETS = {**BYTE_TARGETS, **FIELD_TARGETS}
+TARGETS = {**BYTE_TARGETS, **FIELD_TARGETS, **COMMAND_TARGETS}
 ROOT = Path(__file__).resolve().parents[2]
 AT_ONCE = 50_000
 """So many inputs a reader gets in one process; then it is the next reader's turn."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from logger import bounds
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.runs import BY_RECEIVER, BY_ROAD, UNKNOWN, RecordFacts, Signal
@@ -60,11 +61,11 @@ def read_run_facts(folder: Path) -> RecordFacts:
     sensor, receiver = (said[key].mapping(optional=names) if key in said else {}
                         for key, names in (("sensor", _SENSOR), ("receiver", _RECEIVER)))
     places = said["places"].mapping(("by",), ("vehicle",)) if "places" in said else {}
-    numbers = {**{name: node.number(above=0) for name, node in sensor.items()},
+    numbers = {**{name: _within(node, bounds.ACCELERATION) for name, node in sensor.items()},
                **{name: _of_receiver(name, node) for name, node in receiver.items()}}
     return replace(
         UNKNOWN, **numbers,
-        place_std_m=said["place_std_m"].number(0) if "place_std_m" in said else None,
+        place_std_m=said["place_std_m"].number(0, bounds.DISTANCE.largest) if "place_std_m" in said else None,
         pass_band_hz=_band(said["pass_band_hz"]) if "pass_band_hz" in said else None,
         places_by=places["by"].choice(BY_ROAD, BY_RECEIVER) if places else None,
         vehicle=places["vehicle"].text() if "vehicle" in places else None,
@@ -83,9 +84,15 @@ def facts_beside(drive: Path | str) -> RecordFacts:
 
 def _of_receiver(name: str, node: Node) -> float:
     """A delay may have either sign, as the recorder may be the late one; a factor is above 0, an error not below."""
-    if name.endswith(("_std", "_std_s")):
-        return node.number(0)
-    return node.number(above=0) if name == "speed_scale" else node.number()
+    if name == "speed_scale":
+        return _within(node, bounds.SCALE)
+    most = bounds.SCALE.largest if name == "speed_scale_std" else bounds.DELAY.largest
+    return node.number(-most if name == "delay_s" else 0.0, most)
+
+
+def _within(node: Node, quantity: bounds.Quantity) -> float:
+    """A number above 0 as large as such a quantity can be."""
+    return node.number(quantity.least, quantity.largest)
 
 
 def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]) -> None:
@@ -125,7 +132,7 @@ def _signal_keys(one: Signal) -> dict[str, object]:
 
 def _band(node: Node) -> tuple[float, float]:
     ends = node.items()
-    if len(ends) != 2 or not (low := ends[0].number(0)) < (high := ends[1].number()):
+    if len(ends) != 2 or not (low := ends[0].number(0)) < (high := ends[1].number(high=bounds.FASTEST_HZ)):
         raise node.wrong("two frequencies, the lower one first [Hz]")
     return low, high
 

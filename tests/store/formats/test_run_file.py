@@ -40,11 +40,14 @@ def test_a_folder_without_it_says_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("text", "complaint"), [
     ("sensor: {step: 0.1}\n", ":1: expected one of the keys step_mps2"),
-    ("source: a\nsensor: {step_mps2: 0}\n", ":2: expected a number greater than 0"),
+    ("source: a\nsensor: {step_mps2: 0}\n", ":2: expected a number from 1e-09 to 1e.06"),
     ("pass_band_hz: [25, 0.5]\n", ":1: expected two frequencies"),
     ("place_std_m: -1\n", ":1: expected a number"),
     ("receiver: {delay_s: 0.2,\n  delay_std_s: -0.1}\n", ":2: expected a number"),
-    ("receiver: {speed_scale: 0}\n", ":1: expected a number greater than 0"),
+    ("receiver: {speed_scale: 0}\n", ":1: expected a number from 0.001 to 1000"),
+    ("sensor: {noise_mps2: 1e-320}\n", ":1: expected a number from"),
+    ("sensor: {range_mps2: 1e158}\n", ":1: expected a number from"),
+    ("receiver: {delay_s: 1e9}\n", ":1: expected a number from"),
     ("receiver: {speed_scale_std: -3}\n", ":1: expected a number"),
     ("places: {by: guess}\n", ":1: expected one of road, receiver"),
     ("signals:\n  a_mps2: {measures: sound}\n", ":2: expected one of acceleration, travel, pitch_rate"),

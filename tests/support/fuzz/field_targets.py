@@ -52,7 +52,7 @@ def _finite(*arrays: object) -> None:
         promise(one is None or bool(np.isfinite(np.asarray(one, dtype=float)).all()), "a number that is none")
 
 
-def _table(header: str, *columns: np.ndarray, form: str = "%.6g", delimiter: str = ",") -> bytes:
+def table(header: str, *columns: np.ndarray, form: str = "%.6g", delimiter: str = ",") -> bytes:
     rows = [delimiter.join(form % one for one in row) for row in zip(*columns, strict=True)]
     return ("\n".join([header, *rows]) + "\n").encode()
 
@@ -65,10 +65,10 @@ _NOISE = _RNG.standard_normal(150)
 def checked_record(folder: Path) -> Target:
     """Records and drives, judged and laid on an even grid, as commands ask for it."""
     file = _File(folder, "record.csv")
-    plain = _table("t_s,accel_z_mps2,accel_x_mps2,speed_mps,distance_m", _T, _NOISE, 0.3 * _NOISE[::-1], 15 + 0 * _T,
+    plain = table("t_s,accel_z_mps2,accel_x_mps2,speed_mps,distance_m", _T, _NOISE, 0.3 * _NOISE[::-1], 15 + 0 * _T,
                    15 * _T)
-    uneven = _table("t_s,accel_z_mps2", np.sort(_T + 0.004 * _RNG.random(150)), 9.81 + _NOISE)
-    held = _table("t_s,accel_z_mps2", _T, np.repeat(_NOISE[::2], 2))
+    uneven = table("t_s,accel_z_mps2", np.sort(_T + 0.004 * _RNG.random(150)), 9.81 + _NOISE)
+    held = table("t_s,accel_z_mps2", _T, np.repeat(_NOISE[::2], 2))
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         path = file.hold(data)
@@ -87,9 +87,9 @@ def checked_record(folder: Path) -> Target:
 
 def run_folder(folder: Path) -> Target:
     """A run's folder, in each file of which fields are changed."""
-    road = _table("distance_m,elevation_m,elevation_right_m,lat_deg,lon_deg", 0.25 * np.arange(60), 0.01 * _NOISE[:60],
+    road = table("distance_m,elevation_m,elevation_right_m,lat_deg,lon_deg", 0.25 * np.arange(60), 0.01 * _NOISE[:60],
                   0.01 * _NOISE[60:120], 46.5 + 1e-6 * np.arange(60), 6.5 + 0 * _T[:60], form="%.9g")
-    drive = _table("t_s,accel_z_mps2,speed_mps,distance_m,lat_deg,lon_deg,usable,pitch_rad_per_s", _T[:60], _NOISE[:60],
+    drive = table("t_s,accel_z_mps2,speed_mps,distance_m,lat_deg,lon_deg,usable,pitch_rad_per_s", _T[:60], _NOISE[:60],
                    15 + 0 * _T[:60], 15 * _T[:60], 46.5 + 0 * _T[:60], 6.5 + 0 * _T[:60], np.ones(60), _NOISE[60:120])
     facts = (b"sensor: {step_mps2: 0.6129, range_mps2: 19.6, noise_mps2: 0.05}\nplace_std_m: 0.1\n"
              b"pass_band_hz: [0, 38]\nsource: x.dump\nreceiver: {delay_s: 0.2, delay_std_s: 0.01, speed_scale: 1.01,\n"
@@ -122,8 +122,8 @@ def profile(folder: Path) -> Target:
     """Profiles, also resampled."""
     file = _File(folder, "profile.csv")
     x = 0.25 * np.arange(60)
-    examples = [_table("distance_m,elevation_m", x, 0.01 * _NOISE[:60]),
-                _table("distance_m,elevation_m,elevation_right_m", x, 0.01 * _NOISE[:60], 0.02 * _NOISE[:60])]
+    examples = [table("distance_m,elevation_m", x, 0.01 * _NOISE[:60]),
+                table("distance_m,elevation_m,elevation_right_m", x, 0.01 * _NOISE[:60], 0.02 * _NOISE[:60])]
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         found = read_profile(file.hold(data), rng.choice((None, None, 0.1, 0.001, 1.0)))
@@ -136,8 +136,8 @@ def profile(folder: Path) -> Target:
 def timed(folder: Path) -> Target:
     """Excitations and speed files."""
     file = _File(folder, "excitation.csv")
-    both = _table("t_s,elevation_m,elevation_rear_m", _T, 0.01 * _NOISE, 0.02 * _NOISE)
-    speeds = _table("t_s,speed_mps", np.arange(20.0), 10 + np.arange(20.0))
+    both = table("t_s,elevation_m,elevation_rear_m", _T, 0.01 * _NOISE, 0.02 * _NOISE)
+    speeds = table("t_s,speed_mps", np.arange(20.0), 10 + np.arange(20.0))
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         path = file.hold(data)
@@ -157,12 +157,12 @@ def phone(folder: Path) -> Target:
     t = np.sort(np.arange(1200) / 104 + 0.001 * _RNG.random(1200))
     force = 0.5 * _RNG.standard_normal((1200, 3)) + [0, 0, 9.81]
     k = np.arange(12.0)
-    one = _table("time,ax,ay,az", t, *force.T)
-    ridelog = _table("t_s,accel_x_mps2,accel_y_mps2,accel_z_mps2,lat_deg,lon_deg,speed_mps", t, *force.T,
+    one = table("time,ax,ay,az", t, *force.T)
+    ridelog = table("t_s,accel_x_mps2,accel_y_mps2,accel_z_mps2,lat_deg,lon_deg,speed_mps", t, *force.T,
                      46.5 + 1e-4 * np.floor(t), 6.5 + 0 * t, 11.1 + 0 * t, form="%.9g")
-    semicolons = _table("Time (s);Acceleration x (m/s^2);Acceleration y (m/s^2);Acceleration z (m/s^2)", t, *force.T,
+    semicolons = table("Time (s);Acceleration x (m/s^2);Acceleration y (m/s^2);Acceleration z (m/s^2)", t, *force.T,
                         delimiter=";").replace(b".", b",")
-    fixes = _table("t_s,lat_deg,lon_deg,speed_mps", k, 46.5 + 1e-4 * k, 6.5 + 0 * k, 11.1 + 0 * k, form="%.9g")
+    fixes = table("t_s,lat_deg,lon_deg,speed_mps", k, 46.5 + 1e-4 * k, 6.5 + 0 * k, 11.1 + 0 * k, form="%.9g")
     columns = "t=time:s,x=ax:m/s2,y=ay:m/s2,z=az:m/s2"
 
     def read(data: bytes, rng: random.Random) -> Hashable:
@@ -304,7 +304,7 @@ def _small(name: str, path: Path) -> Hashable:
 def semicolons(folder: Path) -> Target:
     """Tables of a road authority."""
     file = _File(folder, "road.csv")
-    text = _table("Meter;IRI h;IRI v;Rut", 20.0 * np.arange(12), 2 + 0 * _T[:12], 2.5 + 0 * _T[:12], _NOISE[:12],
+    text = table("Meter;IRI h;IRI v;Rut", 20.0 * np.arange(12), 2 + 0 * _T[:12], 2.5 + 0 * _T[:12], _NOISE[:12],
                   delimiter=";")
 
     def read(data: bytes, rng: random.Random) -> Hashable:
@@ -373,7 +373,7 @@ def _also(make: Callable[[Path], Target], name: str, damage: fields.Damage) -> C
     return lambda folder: replace(make(folder), name=name, damage=damage)
 
 
-def _dump_lines(rng: random.Random, data: bytes) -> bytes:
+def dump_lines(rng: random.Random, data: bytes) -> bytes:
     """Times, sources and bytes of a dump, and the words of its header."""
     if data[:2] == b"\x1f\x8b":
         return data
@@ -405,6 +405,6 @@ FIELD_TARGETS: dict[str, Callable[[Path], Target]] = {
     "fields:mat": mat,
     "fields:manifest": manifests,
     "fields:nmea": _also(lambda folder: targets.nmea(), "nmea fields", fields.tables(",")),
-    "fields:dump": _also(targets.dump, "dump fields", _dump_lines),
+    "fields:dump": _also(targets.dump, "dump fields", dump_lines),
     "fields:segment_log": _also(targets.segment_log, "log fields", fields.tables()),
 }
