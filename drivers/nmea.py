@@ -7,16 +7,17 @@ one fix come one after the other in any order.
 The solution: ``drivers.nmea_sentences`` says what one sentence says; ``NmeaDecoder`` puts sentences of one time
 together into a ``Fix`` and decides what to believe:
 
-Validity. A fix is valid when all of RMC and GGA that the epoch holds, at least one of them, vouch for it:
-RMC by status A with a mode A, D, F, P or R, or no mode letter (before NMEA 2.3, or empty), GGA by quality 1 to 5;
-and a position is there. Modes E (dead reckoning), S (simulator), M (manual), N, V and any other are no fix. VTG with
+Validity. A fix is valid when all of RMC and GGA that the epoch holds vouch for it, or GLL in one that holds neither:
+RMC and GLL by status A with a mode A, D, F, P or R, or no mode letter (before NMEA 2.3, or empty), GGA by quality 1 to
+5; and a position is there. Modes E (dead reckoning), S (simulator), M (manual), N, V and any other are no fix. VTG with
 such a mode gives no speed. The navigation status of NMEA 4.1 says V on many receivers that have a fix; it is not
 asked. From an epoch that is not valid neither position, speed nor time is taken.
 
-Epochs. RMC and GGA with one time make an epoch, VTG and GSA join the one that is open, and ZDA is asked for the date
-alone. The epoch's arrival is that of its first RMC or GGA. It closes when an RMC or GGA of another time arrives.
-Without a time, or without a fix, a second sentence of the same kind opens the next epoch. Of two valid sentences of
-one kind and one time (several talkers) the first counts.
+Epochs. RMC, GGA and GLL with one time make an epoch, GSA joins the one that is open, and ZDA is asked for the date
+alone. VTG names no time: it belongs to the epoch that it came closer to. The epoch's arrival is that of its first RMC,
+GGA or GLL. It closes when an RMC or GGA of another time arrives, or a GLL of a later one. Without a time, or without a
+fix, a second sentence of the same kind opens the next epoch. Of two valid sentences of one kind and one time the first
+counts, where they are of several talkers: of one talker the second is another epoch, whose time stood.
 
 Dates come from RMC, else ZDA, else from the last date known, counted on by arrival time. Illegal dates, dates before
 ``earliest_utc_us`` and those after the last that an RMC can name are refused: the fix has no UTC then but keeps the
@@ -28,14 +29,16 @@ time passed, is put right.
 from __future__ import annotations
 
 import datetime
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from drivers.framing import Arrivals, NmeaFramer
+from drivers.framing import Arrivals, Frame, NmeaFramer
+from drivers.line_load import LineLoad
 from drivers.nmea_sentences import (
     EPOCH_ORDINAL,
     SECOND_US,
     Checksum,
     Gga,
+    Gll,
     Gsa,
     MalformedError,
     Rmc,
@@ -62,6 +65,7 @@ def midnight_utc_us(day: datetime.date) -> int:
 
 
 LATEST_UTC_US = midnight_utc_us(datetime.date(2069, 1, 1))
+USUAL_BAUD = 9600
 RELEASE_UTC_US = midnight_utc_us(datetime.date(2026, 1, 1))
 
 
@@ -93,24 +97,43 @@ class _Epoch:
 
     t_us: int
     time_of_day_us: int | None
+    may_wait: bool
     rmc: Rmc | None = None
     gga: Gga | None = None
+    gll: Gll | None = None
     vtg: Vtg | None = None
     gsa: Gsa | None = None
+    placed_us: int = 0
+    talkers: set[tuple[type[Sentence], bytes]] = field(default_factory=set)
 
-    def takes(self, sentence: Rmc | Gga) -> bool:
+    def takes(self, sentence: Rmc | Gga | Gll, talker: bytes) -> bool:
         """Does the sentence belong here, or does it open the next epoch?"""
-        if sentence.time_of_day_us != self.time_of_day_us:
+        time_us = sentence.time_of_day_us
+        if isinstance(sentence, Gll) and (self.rmc or self.gga):
+            # Beside the others it tells nothing new, unless it comes more often; some receivers send it a time late.
+            ahead_us = ((time_us or 0) - (self.time_of_day_us or 0)) % DAY_US
+            return time_us is None or self.time_of_day_us is None or not 0 < ahead_us < DAY_US // 2
+        if time_us != self.time_of_day_us:
             return False
-        same_kind = self.rmc if isinstance(sentence, Rmc) else self.gga
-        return same_kind is None or (self.time_of_day_us is not None and same_kind.vouches)
+        match sentence:
+            case Rmc():
+                same_kind: Rmc | Gga | Gll | None = self.rmc
+            case Gga():
+                same_kind = self.gga
+            case Gll():
+                same_kind = self.gll
+        if same_kind is None:
+            return True
+        return time_us is not None and same_kind.vouches and (type(sentence), talker) not in self.talkers
 
-    def add(self, sentence: Rmc | Gga | Vtg | Gsa) -> None:
+    def add(self, sentence: Rmc | Gga | Gll | Vtg | Gsa) -> None:
         match sentence:
             case Rmc():
                 self.rmc = self.rmc or sentence
             case Gga():
                 self.gga = self.gga or sentence
+            case Gll():
+                self.gll = self.gll or sentence
             case Vtg():
                 self.vtg = self.vtg or sentence
             case Gsa():
@@ -118,11 +141,12 @@ class _Epoch:
 
     def valid(self) -> bool:
         """The validity rule of the module."""
-        return all(s.vouches and s.lat_deg is not None for s in (self.rmc, self.gga) if s is not None)
+        asked = [one for one in (self.rmc, self.gga) if one is not None] or [self.gll]
+        return all(one is not None and one.vouches and one.lat_deg is not None for one in asked)
 
     def fix(self, utc_us: int | None) -> Fix:
         """The epoch as a valid fix."""
-        position = self.rmc or self.gga
+        position = self.rmc or self.gga or self.gll
         assert position is not None
         speed_mps = self.rmc.speed_mps if self.rmc else None
         course_deg = self.rmc.course_deg if self.rmc else None
@@ -141,6 +165,7 @@ class _Epoch:
             altitude_m=self.gga.altitude_m if self.gga else None,
             satellites=self.satellites(),
             hdop=self.hdop(),
+            may_wait=self.may_wait,
         )
 
     def no_fix(self) -> Fix:
@@ -167,9 +192,10 @@ class NmeaDecoder:
 
     week_rollovers     1024-week turns by which the receiver is known to be late (old firmware); 0 for a sound one
     earliest_utc_us    dates before this are refused [us since 1970-01-01]; the default is this software's release
+    baud               of its line
     """
 
-    def __init__(self, week_rollovers: int = 0, earliest_utc_us: int = RELEASE_UTC_US) -> None:
+    def __init__(self, week_rollovers: int = 0, earliest_utc_us: int = RELEASE_UTC_US, baud: int = USUAL_BAUD) -> None:
         self._framer = NmeaFramer()
         self._arrivals = Arrivals()
         self._added_us = week_rollovers * ROLLOVER_DAYS * DAY_US
@@ -178,6 +204,9 @@ class NmeaDecoder:
         self._malformed = 0
         self._refused_dates = 0
         self._epoch: _Epoch | None = None
+        self._epoch_at: tuple[int, int] | None = None
+        self._loose_vtg: tuple[int, Vtg] | None = None
+        self.line = LineLoad(baud)
         self._zda: tuple[int, Zda] | None = None
         self._known: tuple[int, int] | None = None
         self._too_early_us: int | None = None
@@ -213,11 +242,12 @@ class NmeaDecoder:
     def feed(self, t_us: int, data: bytes) -> list[Fix]:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]; return the fixes that are complete."""
         self._arrivals.note(t_us, len(data))
+        self.line.note(t_us, len(data))
         fixes: list[Fix] = []
         for frame in self._framer.feed(data):
             sentence = self._read(frame.data)
             if sentence is not None:
-                fixes += self._place(sentence, self._arrivals.at(frame.start))
+                fixes += self._place(sentence, frame)
         self._arrivals.forget(self._framer.position)
         return fixes
 
@@ -234,17 +264,38 @@ class NmeaDecoder:
             self._malformed += 1
             return None
 
-    def _place(self, sentence: Sentence, t_us: int) -> list[Fix]:
+    def _place(self, sentence: Sentence, frame: Frame) -> list[Fix]:
         """Put a sentence where it belongs; return the fix that it closes, if any."""
+        t_us, talker = self._arrivals.at(frame.start), frame.data[1:3]
         if isinstance(sentence, Zda):
             self._zda = (t_us, sentence)
             return []
         closed: list[Fix] = []
-        if isinstance(sentence, Rmc | Gga) and not (self._epoch and self._epoch.takes(sentence)):
-            closed = self._close()
-            self._epoch = _Epoch(t_us, sentence.time_of_day_us)
+        if isinstance(sentence, Vtg):
+            self._loose_vtg = t_us, sentence
+        elif isinstance(sentence, Rmc | Gga | Gll):
+            if self._epoch is None or not self._epoch.takes(sentence, talker):
+                closed = self._open(sentence.time_of_day_us, frame.start, t_us)
+            assert self._epoch is not None
+            self._epoch.placed_us, self._loose_vtg = t_us, None
+            self._epoch.talkers.add((type(sentence), talker))
         if self._epoch is not None:
             self._epoch.add(sentence)
+        return closed
+
+    def _open(self, time_of_day_us: int | None, at: int, t_us: int) -> list[Fix]:
+        """Begin an epoch with the sentence at a stream offset; return the fix of the one before."""
+        begun, before = _Epoch(t_us, time_of_day_us, self.line.may_wait), self._epoch
+        if before is not None and self._loose_vtg is not None:
+            vtg_us, vtg = self._loose_vtg
+            if t_us - vtg_us < vtg_us - before.placed_us:
+                begun.vtg, before.vtg = vtg, None if before.vtg is vtg else before.vtg
+        if time_of_day_us is not None:
+            if self._epoch_at is not None and 0 < (for_us := time_of_day_us - self._epoch_at[1]) < MINUTE_US:
+                self.line.needs(at - self._epoch_at[0], for_us)
+            self._epoch_at = at, time_of_day_us
+        closed = self._close()
+        self._epoch = begun
         return closed
 
     def _close(self) -> list[Fix]:

@@ -60,6 +60,15 @@ class Gga(NamedTuple):
     altitude_m: float | None
 
 
+class Gll(NamedTuple):
+    """Geographic position. ``vouches`` as in ``Rmc``."""
+
+    time_of_day_us: int | None
+    vouches: bool
+    lat_deg: float | None
+    lon_deg: float | None
+
+
 class Vtg(NamedTuple):
     """Course and speed over ground. ``vouches``: the mode speaks for a fix."""
 
@@ -85,7 +94,7 @@ class Zda(NamedTuple):
     illegal_date: bool
 
 
-Sentence = Rmc | Gga | Vtg | Gsa | Zda
+Sentence = Rmc | Gga | Gll | Vtg | Gsa | Zda
 
 
 class Checksum(Enum):
@@ -134,12 +143,23 @@ def parse_sentence(sentence: bytes) -> Sentence | None:
 def parse_checked(sentence: bytes) -> Sentence | None:
     """What a sentence with the right checksum says; None for one of another kind.
 
-    Proprietary sentences (``$P...``) are of another kind whatever their last letters. Raises ``MalformedError``.
+    Proprietary sentences (``$P...``) are of another kind whatever their last letters. What fills the fields of one
+    that says itself that there is no fix is the maker's own, and may be anything. Raises ``MalformedError``.
     """
     if not sentence[1:6].isalnum() or sentence[6:7] != b"," or sentence[1:2] == b"P":
         return None
-    parser = _PARSERS.get(sentence[3:6])
-    return parser(sentence[7 : sentence.rindex(b"*")].split(b",")) if parser else None
+    kind = sentence[3:6]
+    parser = _PARSERS.get(kind)
+    if parser is None:
+        return None
+    fields = sentence[7 : sentence.rindex(b"*")].split(b",")
+    try:
+        return parser(fields)
+    except MalformedError:
+        place, words, nothing = _NO_FIX.get(kind, (0, (), None))
+        if nothing is None or len(fields) <= place or fields[place] not in words:
+            raise
+        return nothing
 
 
 def _rmc(fields: list[bytes]) -> Rmc:
@@ -169,6 +189,13 @@ def _gga(fields: list[bytes]) -> Gga:
         _dop(fields[7]),
         _number(fields[8], ALTITUDE_M_MIN, ALTITUDE_M_MAX),
     )
+
+
+def _gll(fields: list[bytes]) -> Gll:
+    """lat, N/S, lon, E/W, time, A/V, [mode]"""
+    _expect(6 <= len(fields) <= 7 and fields[5] in (b"A", b"V", b""))
+    mode = fields[6] if len(fields) > 6 else b""
+    return Gll(_time_of_day_us(fields[4]), fields[5] == b"A" and mode in MODES_WITH_FIX, *_position(fields[0:4]))
 
 
 def _vtg(fields: list[bytes]) -> Vtg:
@@ -204,10 +231,18 @@ def _zda(fields: list[bytes]) -> Zda:
 _PARSERS: dict[bytes, Callable[[list[bytes]], Sentence]] = {
     b"RMC": _rmc,
     b"GGA": _gga,
+    b"GLL": _gll,
     b"VTG": _vtg,
     b"GSA": _gsa,
     b"ZDA": _zda,
 }
+
+_NO_FIX: dict[bytes, tuple[int, tuple[bytes, ...], Sentence]] = {
+    b"RMC": (1, (b"V", b""), Rmc(None, False, None, None, None, None, None, False)),
+    b"GGA": (5, (b"0", b""), Gga(None, False, None, None, None, None, None)),
+    b"GLL": (5, (b"V", b""), Gll(None, False, None, None)),
+}
+"""The field in which such a sentence says that there is no fix, the words for it, and what it says then."""
 
 
 def _expect(right: bool) -> None:

@@ -41,6 +41,7 @@ class Fix:
     valid             the receiver vouches for position and speed (rule in ``drivers.nmea``)
     utc_us            time of the fix, microseconds since 1970-01-01 UTC; None while the date is unknown or refused
     time_of_day_us    time of the fix within its UTC day [us]; None when not said
+    may_wait          its line has not paused in the seconds before: it may come late by what waits to be sent
     """
 
     t_us: int
@@ -54,3 +55,4 @@ class Fix:
     altitude_m: float | None
     satellites: int | None
     hdop: float | None
+    may_wait: bool = False

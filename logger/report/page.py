@@ -64,6 +64,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "clipped": "the accelerometer stood at the end of its range: the road is at least this rough",
     "frozen": "the readings of the accelerometer had not changed for half a minute of driving: no figures",
     "repeated": "the accelerometer, or what brings its samples, gave each more than once: no figures",
+    "gps_late": "the fixes waited on a full line, nobody knows how long: place, speed and time may be seconds late",
     "speed_doubtful": "the speed and the places of the GPS disagree: no IRI",
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",

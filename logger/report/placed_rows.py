@@ -11,14 +11,14 @@ from logger.records import WindowRecord
 from logger.roads.road_network import Trace
 from logger.units import US_PER_S
 
-_NOT_PLACED = "gps_lost"
+_NOT_PLACED = frozenset(("gps_lost", "gps_late"))
 
 
 def placed(one: WindowRecord) -> bool:
     """Whether a row has a place that the receiver gave, and a length."""
     return (one.lat_deg is not None and one.lon_deg is not None and one.distance_start_m is not None
             and one.distance_end_m is not None and one.distance_end_m > one.distance_start_m
-            and _NOT_PLACED not in one.flags)
+            and _NOT_PLACED.isdisjoint(one.flags))
 
 
 def trace_of(drive: Sequence[WindowRecord]) -> Trace:

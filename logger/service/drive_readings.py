@@ -69,7 +69,7 @@ class DriveReadings:
         for fix in fixes:
             timed = self.timebase.place(fix)
             self.speed_check.take(timed)
-            if fix.valid and fix.speed_mps is not None:
+            if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
                 self.alignment.take_fix(timed.t_us / US_PER_S + self._latency_s, fix.speed_mps)
         self.fixes += fixes
         self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)

@@ -86,6 +86,7 @@ class EventCore:
         t_us, source, data = event
         if self._next_step_us is None:
             self._next_step_us = t_us + STEP_US
+            self._gps.line.begin(t_us)
         elif t_us >= self._next_step_us:
             self.advance(t_us)
         self._last_event_us = t_us

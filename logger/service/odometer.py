@@ -2,7 +2,7 @@
 
 A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line,
 so the distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not
-bridged: what lies in it has no distance. Below a threshold speed the car counts as standing, so that the noise
+bridged: what lies in it has no distance. Lost is what the receiver's own rhythm would have brought. Below a threshold speed the car counts as standing, so that the noise
 of a receiver at rest does not make distance.
 
 The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and
@@ -17,10 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.geodesy import ground_distance_m
+from logger.service.rhythm import Rhythm
 from logger.service.timebase import TimedFix
 from logger.units import US_PER_S
 
 NORMAL_INTERVAL_US = 1_500_000
+"""What is known as well between fixes of a receiver that sends more often: one of five a second may be missing."""
+NORMAL_SHARE = 1.5
+"""Of a receiver's rhythm: half of it is more than any wait, and less than a lost fix."""
+SLOWEST_RHYTHM_US = 5_000_000
 ACCELERATION_LIMIT_MPS2 = 15.0
 PLACE_JUMP_M = 80.0
 REJECTED_IN_A_ROW = 3
@@ -56,6 +61,7 @@ class Odometer:
         self._lon_deg: list[float] = []
         self._leg: list[int] = []
         self._rejected = 0
+        self._rhythm = Rhythm()
         self.rejected_fixes = 0
         self.fixes_without_speed = 0
 
@@ -65,6 +71,12 @@ class Odometer:
         return self._t_us[-1] if self._t_us else None
 
     @property
+    def _normal_us(self) -> float:
+        """The longest interval between two fixes in which none was lost [us]."""
+        rhythm_us = min(self._rhythm.usual_us or 0, SLOWEST_RHYTHM_US)
+        return max(NORMAL_INTERVAL_US, NORMAL_SHARE * rhythm_us)
+
+    @property
     def total_m(self) -> float:
         """Distance travelled with known speed so far [m]."""
         return self._distance_m[-1] if self._distance_m else 0.0
@@ -72,10 +84,12 @@ class Odometer:
     def add(self, timed: TimedFix) -> None:
         """Take a fix. Invalid ones, ones without a speed and wild ones are passed over."""
         fix = timed.fix
-        if not fix.valid or fix.lat_deg is None or fix.lon_deg is None:
-            return
-        if fix.speed_mps is None:
+        is_placed = fix.valid and fix.lat_deg is not None and fix.lon_deg is not None
+        if is_placed and fix.speed_mps is None:
             self.fixes_without_speed += 1
+            return
+        self._rhythm.take(timed.t_us)
+        if not is_placed or fix.speed_mps is None or fix.lat_deg is None or fix.lon_deg is None:
             return
         if self._t_us and timed.t_us <= self._t_us[-1]:
             return
@@ -115,7 +129,7 @@ class Odometer:
         slope_mps2 = (speeds[high] - speeds[low]) / (span_us / US_PER_S)
         distance_m = np.array(self._distance_m)[low] + into_s * (speeds[low] + 0.5 * slope_mps2 * into_s)
         speed_mps = np.where(known, speeds[low] + slope_mps2 * into_s, np.nan)
-        return Travel(distance_m, speed_mps, known, known & (span_us > NORMAL_INTERVAL_US), leg[low])
+        return Travel(distance_m, speed_mps, known, known & (span_us > self._normal_us), leg[low])
 
     def place(self, distance_m: float, leg: int) -> tuple[float, float] | None:
         """Latitude and longitude [deg] at a travelled distance of a leg; None when it is not between knots."""
@@ -155,7 +169,7 @@ class Odometer:
         if not self._t_us:
             return 0.0, 0
         gap_us = t_us - self._t_us[-1]
-        if gap_us > self._bridge_us or not plausible:
+        if gap_us > max(self._bridge_us, self._normal_us) or not plausible:
             return self._distance_m[-1], self._leg[-1] + 1
         mean_mps = 0.5 * (self._speed_mps[-1] + speed_mps)
         return self._distance_m[-1] + mean_mps * gap_us / US_PER_S, self._leg[-1]

@@ -121,7 +121,7 @@ class Pipeline:
             timed = self.timebase.place(fix)
             self.odometer.add(timed)
             self.speed_check.take(timed)
-            if fix.valid and fix.speed_mps is not None:
+            if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
                 self.alignment.take_fix(timed.t_us / US_PER_S + self._settings.latency_s, fix.speed_mps)
         self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
         self.stillness.take(block, fixes)
@@ -254,6 +254,9 @@ class Pipeline:
                 window = window.without_figures()
         if window.start_m is not None and self.speed_check.covers(window.t_us, end_us):
             flags.add("speed_doubtful")
+        unsure_us = self.timebase.unsure_until_us
+        if window.start_m is not None and unsure_us is not None and window.t_us <= unsure_us:
+            flags.add("gps_late")
         if flags & {"frozen", "repeated", "speed_doubtful"}:
             estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan, ride=NO_FIGURES)
         if estimate is not None:
@@ -279,7 +282,7 @@ class Pipeline:
             lon_deg=place[1] if place else None,
             speed_mps=_known(window.speed_mps),
             iri_m_per_km=iri,
-            iri_std_m_per_km=_iri_std(estimate, "gps_lost" in flags) if estimate is not None else None,
+            iri_std_m_per_km=_iri_std(estimate, bool(flags & {"gps_lost", "gps_late"})) if estimate is not None else None,
             iri_rms_m_per_km=self._iri_by_rms(window, flags),
             a_w_mps2=_known(ride.a_w.value),
             mtvv_mps2=_known(ride.mtvv.value),
@@ -322,9 +325,10 @@ class Pipeline:
         return self.odometer.place(0.5 * (window.start_m + window.end_m), window.leg)
 
 
-def _iri_std(estimate: WindowEstimate, is_bridged: bool) -> float | None:
-    """Standard error of the IRI [m/km], with what it costs to carry the speed through a loss of fix."""
-    bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_bridged else 0.0
+def _iri_std(estimate: WindowEstimate, is_guessed: bool) -> float | None:
+    """Standard error of the IRI [m/km], with what it costs to carry the speed through a loss of fix, or to have that of
+    some seconds before."""
+    bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_guessed else 0.0
     return _known(hypot(estimate.iri_std_m_per_km, bridging))
 
 

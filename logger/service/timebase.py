@@ -1,29 +1,44 @@
 """Monotonic time to UTC, from GPS fixes alone.
 
 A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of
-a fix, but the sentence arrives late, by an amount that wobbles. Arrival minus fix time therefore scatters above
-a floor; the floor over the last minutes is the clock difference plus the shortest latency, and the shortest
-latency is a setting (only a pulse-per-second wire could measure it).
+a fix, but the sentence arrives late, by an amount that wobbles, or that grows for minutes where the line is too slow for
+what is sent. It never arrives early: arrival minus fix time has a floor, which is the clock difference plus the shortest
+latency, and the shortest latency is a setting (only a pulse-per-second wire could measure it). The floor is the lowest
+that was seen, raised by no more than two clocks drift apart (the lower envelope of one-way delays [1]); by it each fix is
+placed at the time that it names, however late it comes.
+
+The receiver's own clock may jump (leap seconds that it learns late): then arrivals keep the rhythm and its times do not.
+Where a fix is late its times keep the rhythm and the arrivals do not. A jump that lasts for some fixes is taken over.
+After a loss of fix neither shows; then what lasts for half a minute is a jump, unless the line is full. A fix that comes
+earlier than the floor shows a jump, or that all before were late.
+
+A line that has been full since the start has not shown its floor: until it pauses the times are not certain.
 
 Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the
 date. UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of the
-time of day that lasts (a leap second) is taken over after as many fixes, one of the date (a receiver that jumps by a
-week, or corrects one) after half a minute: nobody drives into another week, and most such jumps are soon taken back.
+date (a receiver that jumps by a week, or corrects one) is taken over after half a minute: nobody drives into another
+week, and most such jumps are soon taken back.
+
+[1] S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM 1999.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 from drivers.readings import Fix
+from logger.service.rhythm import Rhythm
 from logger.units import US_PER_S
 
 DAY_US = 86_400 * US_PER_S
-FLOOR_FIXES = 120
 AGREEING_FIXES = 3
-OTHER_DATE_US = 30 * US_PER_S
+LASTING_US = 30 * US_PER_S
 JUMP_US = 700_000  # below the one second of a leap second that the receiver learns late
+DRIFT = 10_000
+"""A part in so many: a quartz clock of a small computer is right to 50 parts in a million, warm or cold; twice that."""
+NOTABLE_US = 100_000
+"""What is less late than this is not worth a word; so much lower than the floor a fix has to be twice in a row: a time
+with a damaged digit passes an 8-bit check now and then."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +49,40 @@ class TimedFix:
     fix: Fix
 
 
+@dataclass
+class _Stray:
+    """Fixes in a row that are as much later or earlier than the floor: since when [us], and how many.
+
+    is_jump   the receiver's clock has jumped; else they are late, or it is not known yet
+    """
+
+    lag_us: int
+    since_us: int
+    is_jump: bool
+    fixes: int = 0
+
+
 class Timebase:
     """Follows the difference between the monotonic clock and GPS time.
 
-    latency_s    shortest delay between the instant of a fix and the arrival of its first byte [s]
+    latency_s       shortest delay between the instant of a fix and the arrival of its first byte [s]
+    late_us         how much later than that the last fix came [us]
+    unsure_until_us up to here fixes may be placed too late, as their line had not paused yet [us]; None: none is
     """
 
     def __init__(self, latency_s: float) -> None:
         self._latency_us = round(latency_s * US_PER_S)
-        self._lags_us: deque[int] = deque(maxlen=FLOOR_FIXES)
         self._floor_us: int | None = None
-        self._strays_us: list[int] = []
+        self._floor_t_us = 0
+        self._last: tuple[int, int] | None = None
+        self._rhythm = Rhythm()
+        self._stray: _Stray | None = None
         self._date_us: int | None = None
         self._date_vote: tuple[int, int, int] | None = None
+        self._has_paused = False
+        self._was_low = False
+        self.unsure_until_us: int | None = None
+        self.late_us = 0
         self.time_jumps = 0
 
     def place(self, fix: Fix) -> TimedFix:
@@ -54,19 +90,37 @@ class Timebase:
         if fix.time_of_day_us is None:
             return TimedFix(fix.t_us - self._latency_us, fix)
         lag_us = self._lag_us(fix.t_us, fix.time_of_day_us)
-        if self._is_stray(lag_us):
+        jumped = self._has_jumped(fix, lag_us)
+        self._last = fix.t_us, fix.t_us - lag_us
+        if jumped:
             return TimedFix(fix.t_us - self._latency_us, fix)
-        self._lags_us.append(lag_us)
-        self._floor_us = min(self._lags_us)
+        self._lower(fix, lag_us)
+        assert self._floor_us is not None
         if fix.utc_us is not None and fix.valid:
             self._vote_for_date(fix.t_us, fix.t_us - lag_us, fix.utc_us)
-        return TimedFix(fix.t_us - lag_us + self._floor_us - self._latency_us, fix)
+        self.late_us = lag_us - self._floor_us
+        t_us = fix.t_us - self.late_us - self._latency_us
+        if not self._has_paused:
+            self.unsure_until_us = t_us
+        return TimedFix(t_us, fix)
 
     def utc_offset_us(self) -> int | None:
         """UTC minus monotonic time [us]; None while the date is unknown."""
         if self._date_us is None or self._floor_us is None:
             return None
         return self._date_us - self._floor_us + self._latency_us
+
+    def _lower(self, fix: Fix, lag_us: int) -> None:
+        """The floor after the next fix."""
+        before_us = self._floor_us if self._floor_us is not None else lag_us
+        drift_us = 0 if fix.may_wait or self._floor_us is None else (fix.t_us - self._floor_t_us) // DRIFT
+        was_low, self._was_low = self._was_low, before_us - lag_us > NOTABLE_US
+        self._floor_us = before_us + drift_us if self._was_low and not was_low else min(before_us + drift_us, lag_us)
+        self._floor_t_us = fix.t_us
+        if not self._has_paused and not fix.may_wait and not self._was_low:
+            self._has_paused = True
+            if before_us - self._floor_us <= NOTABLE_US:
+                self.unsure_until_us = None
 
     def _lag_us(self, t_us: int, time_of_day_us: int) -> int:
         """Arrival minus fix time, on the day that keeps it nearest to the floor."""
@@ -76,18 +130,27 @@ class Timebase:
         days = round((lag_us - self._floor_us) / DAY_US)
         return lag_us - days * DAY_US
 
-    def _is_stray(self, lag_us: int) -> bool:
-        """True for a fix whose time does not fit the others; enough strays that agree become the new floor."""
-        if self._floor_us is None or abs(lag_us - self._floor_us) <= JUMP_US:
-            self._strays_us.clear()
+    def _has_jumped(self, fix: Fix, lag_us: int) -> bool:
+        """True for a fix whose own time does not fit the others; enough that agree become the new floor."""
+        floor_us, last = self._floor_us, self._last
+        usual_us, own_us = self._rhythm.usual_us, fix.t_us - lag_us
+        self._rhythm.take(own_us)
+        if floor_us is None or last is None or abs(lag_us - floor_us) <= JUMP_US:
+            self._stray = None
             return False
-        if self._strays_us and abs(lag_us - self._strays_us[-1]) > JUMP_US:
-            self._strays_us.clear()
-        self._strays_us.append(lag_us)
-        if len(self._strays_us) < AGREEING_FIXES:
-            return True
-        self._lags_us.clear()
-        self._strays_us.clear()
+        passed_us, own_passed_us = fix.t_us - last[0], own_us - last[1]
+        stray = self._stray
+        if stray is None or abs(lag_us - stray.lag_us) > JUMP_US:
+            if lag_us > floor_us and passed_us - own_passed_us <= JUMP_US:
+                self._stray = None  # later by and by, or less late than before, as some were lost that waited: no jump
+                return False
+            keeps_rhythm = usual_us is not None and abs(passed_us - usual_us) < abs(own_passed_us - usual_us)
+            stray = self._stray = _Stray(lag_us, fix.t_us, lag_us < floor_us or keeps_rhythm)
+        stray.fixes += 1
+        lasts = fix.t_us - stray.since_us >= LASTING_US and not fix.may_wait
+        if stray.fixes < AGREEING_FIXES if stray.is_jump else not lasts:
+            return stray.is_jump
+        self._floor_us, self._floor_t_us, self._stray = lag_us, fix.t_us, None
         self.time_jumps += 1
         return False
 
@@ -101,7 +164,7 @@ class Timebase:
         if voted_us != date_us:
             votes, since_us = 0, t_us
         self._date_vote = date_us, votes + 1, since_us
-        if votes + 1 < AGREEING_FIXES or (self._date_us is not None and t_us - since_us < OTHER_DATE_US):
+        if votes + 1 < AGREEING_FIXES or (self._date_us is not None and t_us - since_us < LASTING_US):
             return
         self.time_jumps += self._date_us is not None
         self._date_us = date_us

@@ -98,7 +98,8 @@ def _thinned(reading: Sensor, count: int) -> Sensor:
 
 def gps_decoder(config: Config) -> NmeaDecoder:
     """Decoder of the receiver's sentences."""
-    return NmeaDecoder(config.gps.week_rollovers, midnight_utc_us(date.fromisoformat(config.gps.earliest_date)))
+    earliest_us = midnight_utc_us(date.fromisoformat(config.gps.earliest_date))
+    return NmeaDecoder(config.gps.week_rollovers, earliest_us, config.gps.baud)
 
 
 def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None) -> Pipeline:
