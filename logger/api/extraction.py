@@ -73,7 +73,7 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
         player.play(reader)
     receiver = known if known.std_s == 0.0 else combined(known, kept.alignment.estimate())
     receiver = replace(receiver, delay_s=max(0.0, receiver.delay_s))
-    recorded = Recorded(kept.readings(), _fixes(kept, receiver.delay_s), config, read_model(config.vehicle),
+    recorded = Recorded(kept.readings(), _fixes(kept, receiver.delay_s - known.delay_s), config, read_model(config.vehicle),
                         _facts(sensor, config), receiver, reader.torn_tail)
     return recorded, len(kept.fixes)
 
@@ -108,13 +108,14 @@ class _NoRows:
         """Nothing."""
 
 
-def _fixes(kept: Any, delay_s: float) -> Fixes:
+def _fixes(kept: Any, later_s: float) -> Fixes:
+    """Fixes of a drive, ``later_s`` earlier than they were placed on the way [s]."""
     from logger.extraction.fix_times import fix_times_s
 
-    whole = [one for one in kept.fixes if one.valid and one.speed_mps is not None and one.lat_deg is not None
-             and one.lon_deg is not None]
-    arrival_s, named_s, speed_mps, lat_deg, lon_deg = np.array([
-        (one.t_us / US_PER_S, np.nan if one.time_of_day_us is None else one.time_of_day_us / US_PER_S, one.speed_mps,
-         one.lat_deg, one.lon_deg) for one in whole], dtype=float).reshape(-1, 5).T
-    time_s = fix_times_s(arrival_s, named_s, delay_s)
+    whole = [timed for timed in kept.fixes if timed.fix.valid and timed.fix.speed_mps is not None
+             and timed.fix.lat_deg is not None and timed.fix.lon_deg is not None]
+    placed_s, named_s, speed_mps, lat_deg, lon_deg = np.array([
+        (timed.t_us / US_PER_S, np.nan if timed.fix.time_of_day_us is None else timed.fix.time_of_day_us / US_PER_S,
+         timed.fix.speed_mps, timed.fix.lat_deg, timed.fix.lon_deg) for timed in whole], dtype=float).reshape(-1, 5).T
+    time_s = fix_times_s(placed_s, named_s) - later_s
     return Fixes(time_s, speed_mps, lat_deg, lon_deg).part(apart(time_s))

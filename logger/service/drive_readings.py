@@ -19,7 +19,7 @@ from logger.service.frozen_sensor import Stillness
 from logger.service.repetition import Repetition
 from logger.service.signal_chain import SignalChain
 from logger.service.speed_check import SpeedCheck
-from logger.service.timebase import Timebase
+from logger.service.timebase import Timebase, TimedFix
 from logger.units import US_PER_S
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ class DriveReadings:
         self._fresh: list[GridSamples] = []
         self._start_us: int | None = None
         self._stillness = Stillness()
-        self.fixes: list[Fix] = []
+        self.fixes: list[TimedFix] = []
         self.alignment = alignment
         self.repetition = Repetition()
         self.speed_check = SpeedCheck()
@@ -68,10 +68,10 @@ class DriveReadings:
             self._start_us = now_us
         for fix in fixes:
             timed = self.timebase.place(fix)
+            self.fixes.append(timed)
             self.speed_check.take(timed)
             if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
                 self.alignment.take_fix(timed.t_us / US_PER_S + self._latency_s, fix.speed_mps)
-        self.fixes += fixes
         self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
         self._stillness.take(block, fixes)
         self.repetition.take(block)

@@ -16,6 +16,7 @@ from drivers.dump import DumpHeader
 from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
 from drivers.recorded_words import RecordedWords
+from drivers.settings import BAUDS
 from logger.comfort.noise_floor import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
@@ -216,8 +217,9 @@ def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNois
 
 
 def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
-    """Settings for a replay. What is in the bytes (driver, range, oversampling) is always the recording's; the rest is
-    that of the settings ``given``, or without them the defaults with what the recording's header says.
+    """Settings for a replay. What is in the bytes (driver, range, oversampling, baud rate) is always the
+    recording's; the rest is that of the settings ``given``, or without them the defaults with what the recording's
+    header says.
 
     Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """
@@ -232,11 +234,13 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
         settings = kind.recorded(said, sections[kind.name], is_given=given is not None)
         sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings}, noise_mps2)
         instrument(sensor)
+        baud = round(RecordedWords(header.gps).number("baud", config.gps.baud, min(BAUDS.numbers), max(BAUDS.numbers)))
         if given is None and vehicle is None:
             vehicle = said.name("vehicle", "", vehicle_names(), "--vehicle FILE.yaml or ")
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
-    return replace(config, accelerometer=sensor, vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
+    return replace(config, accelerometer=sensor, gps=replace(config.gps, baud=baud),
+                   vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
 
 
 def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> Belief:

@@ -38,7 +38,7 @@ from logger.service.status import ServiceStatus
 from logger.service.status_reporter import StatusReporter
 from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
-from logger.service.timebase import OTHER_DATE_US
+from logger.service.timebase import LASTING_US
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
@@ -538,8 +538,8 @@ def date_jumps_for_good(folder: Path, jump: timedelta) -> Found:
                                                                             strict=True) if old.utc_us is not None]
     assert {by for _, by in moved} == {0, week_us}
     first_us = min(t_us for t_us, by in moved if by)
-    assert first_us + 30_000_000 > 15_000_000 + OTHER_DATE_US
-    assert first_us < 30_000_000 + OTHER_DATE_US + 2_000_000
+    assert first_us + 30_000_000 > 15_000_000 + LASTING_US
+    assert first_us < 30_000_000 + LASTING_US + 2_000_000
     assert jumps == 1
     return found(after_s=first_us / 1e6 - 30)
 
