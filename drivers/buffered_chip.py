@@ -21,7 +21,7 @@ from drivers.dated_samples import DatedSamples, Samples
 from drivers.errors import BadReply
 from drivers.machine import Machine
 from drivers.ports import I2cBus
-from drivers.readings import AccelerationBlock
+from drivers.readings import UNREAD_CHIP, AccelerationBlock
 from drivers.registers import Field, Register
 from drivers.sources import US_PER_S, ChipSource, Scattered
 
@@ -130,6 +130,8 @@ class BufferedDecoder(ABC):
     def note(self) -> str:
         """How the samples come; empty: as they should."""
         return self._samples.note
+
+    unread = UNREAD_CHIP
 
     @property
     def counts(self) -> dict[str, int]:

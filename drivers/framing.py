@@ -180,14 +180,14 @@ class NmeaFramer(_Framer):
         if payload <= UBX_PAYLOAD_BYTES_MAX:
             if len(buffer) < at + size:
                 return 0
-            if _fletcher8(buffer[at + 2 : at + size - 2]) == buffer[at + size - 2 : at + size]:
+            if fletcher8(buffer[at + 2 : at + size - 2]) == buffer[at + size - 2 : at + size]:
                 self.ubx_frames += 1
                 return size
         self._drop(1)
         return 1
 
 
-def _fletcher8(data: bytes) -> bytes:
+def fletcher8(data: bytes) -> bytes:
     """The two check bytes of a UBX frame: the sum of the bytes and the sum of those running sums, modulo 256."""
     return bytes((sum(data) & 0xFF, sum(accumulate(data)) & 0xFF))
 

@@ -5,8 +5,9 @@ what waits there. Solution: a buffer that is not empty leaves its line no pause.
 nothing waits; of one that has not, something may.
 
 A line carries a tenth of its baud rate in bytes a second (a start and a stop bit each). Its true rate differs by what
-two quartz clocks and their dividers do (``TOLERANCE``), and a look at it is late by what gathers bytes: the host's sleep
-between two looks and a USB adapter (``LOOK_S``). What brings more bytes than that has no such line: a receiver on USB.
+two quartz clocks and their dividers do (``TOLERANCE``), and a look at it is late by what gathers bytes: the host's
+sleep between two looks and a USB adapter (``LOOK_S``). What brings more bytes than that has no such line: a receiver on
+USB.
 """
 
 from __future__ import annotations

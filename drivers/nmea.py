@@ -49,6 +49,7 @@ from drivers.nmea_sentences import (
     parse_checked,
 )
 from drivers.readings import Fix
+from drivers.wire_contents import RECEIVER, RecentBytes
 
 MINUTE_US = 60 * SECOND_US
 DAY_US = 86_400 * SECOND_US
@@ -181,6 +182,14 @@ class _Epoch:
         return self.gsa.hdop if self.gsa else None
 
 
+TELLING_FIXES = 10
+_MISSING = {
+    "speed": ("no row has a distance", "RMC or VTG sentences too"),
+    "date": ("no row has a time", "RMC with its date, or ZDA sentences too"),
+}
+"""What so many fixes in a row may lack, what that does, and what brings it."""
+
+
 def _words_of(day: int) -> str:
     """A date for people; ``day`` counts from 1970-01-01."""
     date = datetime.date.fromordinal(EPOCH_ORDINAL + day)
@@ -210,10 +219,20 @@ class NmeaDecoder:
         self._zda: tuple[int, Zda] | None = None
         self._known: tuple[int, int] | None = None
         self._too_early_us: int | None = None
+        self._recent = RecentBytes()
+        self._fixes_without = dict.fromkeys(_MISSING, 0)
+
+    @property
+    def unread(self) -> str:
+        """What arrives and what to do, where nothing of it becomes a fix."""
+        return self._recent.advice(RECEIVER, "NMEA sentences with a checksum ($GPRMC,...*hh) are")
 
     @property
     def doubt(self) -> str:
-        """What is wrong with the dates, and what to do; empty: nothing."""
+        """What is missing in the fixes that come or wrong with their dates, and what to do; empty: nothing."""
+        for what, (harm, sentences) in _MISSING.items():
+            if self._fixes_without[what] >= TELLING_FIXES:
+                return f"it sends {self._recent.sentence_kinds()}, but no {what}, so {harm}: have it send {sentences}"
         if self._too_early_us is None:
             return ""
         day = self._too_early_us // DAY_US
@@ -243,6 +262,7 @@ class NmeaDecoder:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]; return the fixes that are complete."""
         self._arrivals.note(t_us, len(data))
         self.line.note(t_us, len(data))
+        self._recent.note(data)
         fixes: list[Fix] = []
         for frame in self._framer.feed(data):
             sentence = self._read(frame.data)
@@ -303,7 +323,14 @@ class NmeaDecoder:
         if epoch is None:
             return []
         self._epoch, self._zda = None, None
-        return [epoch.fix(self._utc_us(epoch, zda))] if epoch.valid() else [epoch.no_fix()]
+        if not epoch.valid():
+            return [epoch.no_fix()]
+        refused = self._refused_dates
+        fix = epoch.fix(self._utc_us(epoch, zda))
+        is_dated = fix.utc_us is not None or self._refused_dates > refused
+        for what, is_there in (("speed", fix.speed_mps is not None), ("date", is_dated)):
+            self._fixes_without[what] = 0 if is_there else self._fixes_without[what] + 1
+        return [fix]
 
     def _utc_us(self, epoch: _Epoch, zda: tuple[int, Zda] | None) -> int | None:
         """UTC of a valid epoch, by the first date that is not refused, else by the last date known."""

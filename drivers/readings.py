@@ -13,6 +13,9 @@ import numpy.typing as npt
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
+UNREAD_CHIP = "readings arrive, but none that can be used: check the wires of its bus, and its supply"
+"""What to do where a chip's bytes become no samples: there is no other language that they could be in."""
+
 
 @dataclass(frozen=True)
 class AccelerationBlock:

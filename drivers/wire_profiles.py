@@ -68,6 +68,11 @@ class FrameLayout:
     upright_axis: int | None
     calibration: Calibration
 
+    @property
+    def words(self) -> str:
+        """What comes, for people."""
+        return f"frames of {self.length_bytes} bytes"
+
     def counts(self, frames: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
         """(..., length) bytes to (..., 3) counts of X, Y, Z."""
         columns = [offset + byte for offset in self.offsets for byte in (0, 1)]
@@ -94,6 +99,12 @@ class LineLayout:
 
     unit_mps2: float
     range_units: float
+
+    @property
+    def words(self) -> str:
+        """What comes, for people."""
+        unit = next(name for name, unit_mps2 in UNITS_MPS2.items() if unit_mps2 == self.unit_mps2)
+        return f"lines x,y,z in {unit} (three numbers, two commas, nothing else)"
 
 
 @dataclass(frozen=True)

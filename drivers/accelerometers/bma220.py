@@ -49,7 +49,7 @@ from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
-from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.readings import STANDARD_GRAVITY_MPS2, UNREAD_CHIP, AccelerationBlock
 from drivers.recorded_words import RecordedWords
 from drivers.registers import ToggleRegister
 from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
@@ -222,6 +222,8 @@ class Bma220Decoder:
         self._t_us = array("q")
         self._data = bytearray()
         self._last = b""
+
+    unread = UNREAD_CHIP
 
     @property
     def counts(self) -> dict[str, int]:

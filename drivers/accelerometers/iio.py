@@ -31,7 +31,7 @@ from drivers.dated_samples import DatedSamples, Samples
 from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.events import Event
 from drivers.machine import Machine
-from drivers.readings import AccelerationBlock
+from drivers.readings import UNREAD_CHIP, AccelerationBlock
 from drivers.recorded_words import RecordedWords
 from drivers.settings import Decimal, Kind, OrNone, Text, Whole
 from drivers.sources import US_PER_S, Deadlines, SerialSource, Source
@@ -209,6 +209,8 @@ class IioDecoder:
     def note(self) -> str:
         """How the samples come; empty: as they should."""
         return self._dated.note if self._dated is not None else ""
+
+    unread = UNREAD_CHIP
 
     @property
     def counts(self) -> dict[str, int]:

@@ -27,6 +27,7 @@ from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
 from drivers.recorded_words import RecordedWords
 from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
+from drivers.wire_contents import SENSOR, RecentBytes
 from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile, shipped_profiles
 
 NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
@@ -149,6 +150,7 @@ class PascoDecoder:
         self._clock = self._samples.clock
         self._arrivals = Arrivals()
         self._chunks: list[bytes] = []
+        self._recent = RecentBytes()
 
     name = "pasco"
 
@@ -174,6 +176,11 @@ class PascoDecoder:
         return self._samples.note
 
     @property
+    def unread(self) -> str:
+        """What arrives and what to do, where nothing of it becomes a sample."""
+        return self._recent.advice(SENSOR, f"by the profile {self._profile.name}, {self._profile.layout.words} are")
+
+    @property
     def counters(self) -> PascoCounters:
         """What came in so far and was taken."""
         samples, clock = self._samples, self._clock
@@ -189,6 +196,7 @@ class PascoDecoder:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]."""
         self._arrivals.note(t_us, len(data))
         self._chunks.append(data)
+        self._recent.note(data)
 
     def flush(self) -> None:
         """No more bytes will come: the next ``take`` gives all."""

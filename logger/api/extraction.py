@@ -73,8 +73,9 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
         player.play(reader)
     receiver = known if known.std_s == 0.0 else combined(known, kept.alignment.estimate())
     receiver = replace(receiver, delay_s=max(0.0, receiver.delay_s))
-    recorded = Recorded(kept.readings(), _fixes(kept, receiver.delay_s - known.delay_s), config, read_model(config.vehicle),
-                        _facts(sensor, config), receiver, reader.torn_tail)
+    fixes = _fixes(kept, receiver.delay_s - known.delay_s)
+    recorded = Recorded(kept.readings(), fixes, config, read_model(config.vehicle), _facts(sensor, config), receiver,
+                        reader.torn_tail)
     return recorded, len(kept.fixes)
 
 

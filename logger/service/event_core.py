@@ -19,12 +19,12 @@ from drivers.readings import AccelerationBlock, Fix
 from logger.records import WindowRecord
 from logger.service.repetition import Repetition
 from logger.service.speed_check import SpeedCheck
-from logger.service.timebase import Timebase
+from logger.service.timebase import JUMP_US, Timebase
 from logger.store.log.log_writer import ClockMap
+from logger.units import US_PER_S
 
 STEP_US = 500_000
 IDLE_US = 120_000_000
-TELLING_FIXES = 10
 STEP_BYTES = 1_000_000
 """More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
 
@@ -72,7 +72,6 @@ class EventCore:
         self._step_bytes = 0
         self._drive = pipeline.drive
         self._offset_us: int | None = None
-        self._fixes_without_speed = 0
         self.rows = 0
         self.samples = 0
         self.fixes = 0
@@ -158,15 +157,37 @@ class EventCore:
         return self._accelerometer.note
 
     @property
+    def accelerometer_unread(self) -> str:
+        """What arrives and what to do, where bytes arrive and no sample comes of them."""
+        return self._accelerometer.unread
+
+    @property
+    def gps_unread(self) -> str:
+        """The same of fixes."""
+        return self._gps.unread
+
+    @property
     def gps_doubt(self) -> str:
         """What is wrong with the fixes that come; empty: nothing."""
-        fix = self.last_fix
-        if fix is None or not fix.valid:
+        if self.last_fix is None or not self.last_fix.valid:
             return ""
-        if fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
-            return ("it sends positions but no speed, so no row has a distance: have it send RMC or VTG sentences, "
-                    "not GGA alone")
-        return self._pipeline.speed_check.doubt or self._gps.doubt
+        return self._gps.doubt or self._lateness() or self._pipeline.speed_check.doubt
+
+    def _lateness(self) -> str:
+        """That fixes come late, why, and what to do; empty: they do not."""
+        line, timebase = self._gps.line, self._pipeline.timebase
+        late = f"its fixes come {timebase.late_us / US_PER_S:.1f} s late"
+        if timebase.unsure_until_us is not None:
+            late = "nobody knows how late its fixes come, and their rows are flagged gps_late"
+        elif timebase.late_us > JUMP_US:
+            late += " (rows go by the times that they name)"
+        if line.is_full:
+            needs = f", and it has {line.needs_bytes_per_s:.0f} to send" if line.needs_bytes_per_s else ""
+            return (f"its line is full: it carries {line.bytes_per_s:.0f} bytes a second{needs}, so {late}. Raise the "
+                    "baud rate, in the receiver and in the settings, or have it send less: RMC and GGA are enough")
+        if timebase.unsure_until_us is not None or timebase.late_us <= JUMP_US:
+            return ""
+        return f"{late}: something on the way keeps them. Have it send less: RMC and GGA are enough"
 
     def _take_block(self) -> AccelerationBlock:
         block = self._accelerometer.take()
@@ -180,9 +201,6 @@ class EventCore:
         if fixes:
             self.fixes += len(fixes)
             self.last_fix = fixes[-1]
-        for fix in fixes:
-            if fix.valid:
-                self._fixes_without_speed = self._fixes_without_speed + 1 if fix.speed_mps is None else 0
         return fixes
 
     def _write(self, records: list[WindowRecord]) -> None:

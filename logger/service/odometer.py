@@ -1,12 +1,12 @@
 """Speed, travelled distance and place of the car between GPS fixes.
 
-A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line,
-so the distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not
-bridged: what lies in it has no distance. Lost is what the receiver's own rhythm would have brought. Below a threshold speed the car counts as standing, so that the noise
-of a receiver at rest does not make distance.
+A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line, so the
+distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not bridged: what lies
+in it has no distance. Lost is what the receiver's own rhythm would have brought. Below a threshold speed the car counts
+as standing, so that the noise of a receiver at rest does not make distance.
 
-The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and
-`legs` distinguishes such stretches.
+The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and `legs`
+distinguishes such stretches.
 """
 
 from __future__ import annotations

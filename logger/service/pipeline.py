@@ -282,7 +282,7 @@ class Pipeline:
             lon_deg=place[1] if place else None,
             speed_mps=_known(window.speed_mps),
             iri_m_per_km=iri,
-            iri_std_m_per_km=_iri_std(estimate, bool(flags & {"gps_lost", "gps_late"})) if estimate is not None else None,
+            iri_std_m_per_km=None if estimate is None else _iri_std(estimate, bool(flags & {"gps_lost", "gps_late"})),
             iri_rms_m_per_km=self._iri_by_rms(window, flags),
             a_w_mps2=_known(ride.a_w.value),
             mtvv_mps2=_known(ride.mtvv.value),

@@ -1,8 +1,8 @@
 """How often a receiver sends.
 
 Problem: one fix a second is usual, but receivers send from ten times a second to once in five seconds, and one that
-sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learnt as it comes. Losses make
-intervals longer, never shorter, so it is the lower quartile of the last ones.
+sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learnt as it comes. Losses
+make intervals longer, never shorter, so it is the lower quartile of the last ones.
 """
 
 from __future__ import annotations

@@ -164,12 +164,16 @@ class StatusReporter:
 
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""
-        doubt = self._progress[name].look(now_us, state == "ok", readings)
-        reported = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
+        is_accelerometer = name == "accelerometer"
+        unread_s = self._progress[name].unread_s(now_us, state == "ok", readings)
+        reported = self._core.accelerometer_doubt if is_accelerometer else self._core.gps_doubt
         if state == "ok" and reported:
             return reported
-        if doubt or state != "ok" or name != "accelerometer":
-            return doubt
+        if unread_s >= UNREADABLE_S:
+            unread = self._core.accelerometer_unread if is_accelerometer else self._core.gps_unread
+            return f"for {unread_s:.0f} s: {unread}"
+        if state != "ok" or not is_accelerometer:
+            return None
         frozen_s = self._pipeline.stillness.frozen_s
         return _frozen(frozen_s) if frozen_s else self._gravity_advice
 
@@ -201,21 +205,17 @@ class StatusReporter:
 
 
 class ReadingProgress:
-    """Do the bytes that arrive become readings? ``look`` gives what is wrong, or None."""
+    """Do the bytes that arrive become readings?"""
 
     def __init__(self) -> None:
         self._readings = 0
         self._since_us: int | None = None
 
-    def look(self, now_us: int, speaks: bool, readings: int) -> str | None:
-        """``speaks``: bytes arrive. ``readings``: how many there have been so far."""
+    def unread_s(self, now_us: int, speaks: bool, readings: int) -> float:
+        """For how long none has [s]. ``speaks``: bytes arrive. ``readings``: how many there have been so far."""
         if not speaks or readings != self._readings or self._since_us is None:
             self._since_us, self._readings = now_us, readings
-        silent_s = (now_us - self._since_us) / US_PER_S
-        if silent_s < UNREADABLE_S:
-            return None
-        return (f"bytes arrive, but none that can be read for {silent_s:.0f} s: check the baud rate in the settings, "
-                "and that no other device is on this port")
+        return (now_us - self._since_us) / US_PER_S
 
 
 def _frozen(seconds: float) -> str:

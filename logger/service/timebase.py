@@ -1,25 +1,26 @@
 """Monotonic time to UTC, from GPS fixes alone.
 
-A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of
-a fix, but the sentence arrives late, by an amount that wobbles, or that grows for minutes where the line is too slow for
-what is sent. It never arrives early: arrival minus fix time has a floor, which is the clock difference plus the shortest
+A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of a fix,
+but the sentence arrives late, by an amount that wobbles, or that grows for minutes where the line is too slow for what
+is sent. It never arrives early: arrival minus fix time has a floor, which is the clock difference plus the shortest
 latency, and the shortest latency is a setting (only a pulse-per-second wire could measure it). The floor is the lowest
-that was seen, raised by no more than two clocks drift apart (the lower envelope of one-way delays [1]); by it each fix is
-placed at the time that it names, however late it comes.
+that was seen, raised by no more than two clocks drift apart (the lower envelope of one-way delays [1]); by it each fix
+is placed at the time that it names, however late it comes.
 
-The receiver's own clock may jump (leap seconds that it learns late): then arrivals keep the rhythm and its times do not.
-Where a fix is late its times keep the rhythm and the arrivals do not. A jump that lasts for some fixes is taken over.
-After a loss of fix neither shows; then what lasts for half a minute is a jump, unless the line is full. A fix that comes
-earlier than the floor shows a jump, or that all before were late.
+The receiver's own clock may jump (leap seconds that it learns late): then arrivals keep the rhythm and its times do
+not. Where a fix is late its times keep the rhythm and the arrivals do not. A jump that lasts for some fixes is taken
+over. After a loss of fix neither shows; then what lasts for half a minute is a jump, unless the line is full. A fix
+that comes earlier than the floor shows a jump, or that all before were late.
 
 A line that has been full since the start has not shown its floor: until it pauses the times are not certain.
 
-Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the
-date. UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of the
-date (a receiver that jumps by a week, or corrects one) is taken over after half a minute: nobody drives into another
-week, and most such jumps are soon taken back.
+Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the date.
+UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of the date
+(a receiver that jumps by a week, or corrects one) is taken over after half a minute: nobody drives into another week,
+and most such jumps are soon taken back.
 
-[1] S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM 1999.
+[1] S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM
+    1999.
 """
 
 from __future__ import annotations

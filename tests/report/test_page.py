@@ -88,7 +88,8 @@ def test_the_page_says_the_figures(drive) -> None:
 
 def test_every_flag_that_rows_carry_is_explained() -> None:
     assert set(FLAG_MEANINGS) == {"gps_lost", "gap", "clipped", "slow", "fast", "stationary", "time_unset", "partial",
-                                  "unsettled", "faint", "blind", "frozen", "repeated", "speed_doubtful", "gps_late", "hidden"}
+                                  "unsettled", "faint", "blind", "frozen", "repeated", "speed_doubtful", "gps_late",
+                                  "hidden"}
 
 
 def test_the_page_needs_nothing_from_elsewhere(drive) -> None:

@@ -1,0 +1,318 @@
+"""What comes on a serial line, when it is not what was expected, and what to do.
+
+Problem: "nothing that can be read" has many causes, and a wrong baud rate is only one of them: a receiver set to its
+maker's binary protocol, sentences without checksum, lines of another form, the accelerometer at the receiver's port.
+Solution: the last bytes are kept, and when somebody asks they are recognised: frames of known protocols by their
+lengths and checks, NMEA sentences by their checksums, whole lines of printable text. A table (``ADVICE``) says what to
+do about each kind at each port.
+
+Sources of the frames: the makers' protocol descriptions, as far as a frame's length and check go (u-blox UBX; CSR SiRF
+binary; RTCM 10403; Septentrio SBF; NovAtel OEM; SkyTraq; MediaTek; Trimble TSIP; Garmin serial; WitMotion; Xsens;
+MicroStrain; MAVLink).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+from zlib import crc32
+
+from drivers.errors import shortened
+from drivers.framing import exclusive_or, fletcher8
+from drivers.nmea_sentences import Checksum, MalformedError, check, parse_checked
+
+RECENT_BYTES = 4096
+SHOWN_CHARACTERS = 60
+_FEWEST_SENTENCES = 3
+_MOST = 0.5
+_TEXT_SHARE = 0.9
+_ONE_BYTE_SHARE = 0.9
+
+RECEIVER, SENSOR = "receiver", "sensor"
+
+
+class RecentBytes:
+    """The last bytes of a stream."""
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+
+    def note(self, data: bytes) -> None:
+        """More bytes."""
+        self._data += data
+        if len(self._data) > 2 * RECENT_BYTES:
+            del self._data[:-RECENT_BYTES]
+
+    def advice(self, port: str, expected: str) -> str:
+        """What comes and what to do, at the port of a ``RECEIVER`` or ``SENSOR``; ``expected``: there."""
+        contents = recognise(bytes(self._data[-RECENT_BYTES:]))
+        shown = f" (such as {contents.shown})" if contents.shown else ""
+        return ADVICE[port, contents.kind].format(what=contents.what, shown=shown, expected=expected)
+
+    def sentence_kinds(self) -> str:
+        """Names of the NMEA sentences with the right checksum that came."""
+        return _kinds([line for line in _sentences(bytes(self._data)) if check(line) is Checksum.GOOD])
+
+
+class Contents(NamedTuple):
+    """What was recognised: a key of ``ADVICE``, words for it, and a line or some bytes of it, printable."""
+
+    kind: str
+    what: str
+    shown: str
+
+
+class _Protocol(NamedTuple):
+    """Frames that begin with ``sync``; ``size`` gives a frame's length by its first ``head`` bytes, ``is_right`` looks
+    at the whole frame; ``by``: who sends such."""
+
+    name: str
+    by: str
+    sync: bytes
+    head: int
+    size: Callable[[bytes], int]
+    is_right: Callable[[bytes], bool]
+
+
+def _low(data: bytes) -> int:
+    return int.from_bytes(data, "little")
+
+
+def _high(data: bytes) -> int:
+    return int.from_bytes(data, "big")
+
+
+def _crc(data: bytes, polynomial: int, bits: int) -> int:
+    """Cyclic redundancy check, highest bit first, from zero."""
+    register, top = 0, 1 << (bits - 1)
+    for byte in data:
+        register ^= byte << (bits - 8)
+        for _ in range(8):
+            register = (register << 1) ^ (polynomial if register & top else 0)
+        register &= (1 << bits) - 1
+    return register
+
+
+def _novatel_is_right(frame: bytes) -> bool:
+    return crc32(frame[:-4], 0xFFFFFFFF) ^ 0xFFFFFFFF == _low(frame[-4:])
+
+
+_PROTOCOLS = (
+    _Protocol("UBX frames (u-blox binary)", RECEIVER, b"\xb5\x62", 6, lambda h: 8 + _low(h[4:6]),
+              lambda f: fletcher8(f[2:-2]) == f[-2:]),
+    _Protocol("SiRF binary frames", RECEIVER, b"\xa0\xa2", 4, lambda h: 8 + _high(h[2:4]),
+              lambda f: f[-2:] == b"\xb0\xb3" and sum(f[4:-4]) & 0x7FFF == _high(f[-4:-2])),
+    _Protocol("SkyTraq binary frames", RECEIVER, b"\xa0\xa1", 4, lambda h: 7 + _high(h[2:4]),
+              lambda f: f[-2:] == b"\r\n" and _folded(f[4:-3]) == f[-3]),
+    _Protocol("RTCM correction messages", RECEIVER, b"\xd3", 3, lambda h: 6 + (_high(h[1:3]) & 0x3FF),
+              lambda f: _crc(f[:-3], 0x864CFB, 24) == _high(f[-3:])),
+    _Protocol("Septentrio SBF blocks", RECEIVER, b"$@", 8, lambda h: _low(h[6:8]),
+              lambda f: _crc(f[4:], 0x1021, 16) == _low(f[2:4])),
+    _Protocol("NovAtel binary messages", RECEIVER, b"\xaa\x44\x12", 10, lambda h: 4 + h[3] + _low(h[8:10]),
+              _novatel_is_right),
+    _Protocol("MediaTek binary packets", RECEIVER, b"\x04\x24", 4, lambda h: _low(h[2:4]),
+              lambda f: f[-2:] == b"\r\n" and _folded(f[2:-3]) == f[-3]),
+    _Protocol("WitMotion frames", SENSOR, b"\x55", 2, lambda h: 11 if 0x4F < h[1] < 0x60 else 0,
+              lambda f: sum(f[:-1]) & 0xFF == f[-1]),
+    _Protocol("Xsens messages", SENSOR, b"\xfa\xff", 4, lambda h: 5 + h[3], lambda f: sum(f[1:]) & 0xFF == 0),
+    _Protocol("MicroStrain packets", SENSOR, b"\x75\x65", 4, lambda h: 6 + h[3],
+              lambda f: fletcher8(f[:-2]) == f[-2:]),
+)
+_LARGEST_FRAME = 2048
+_GARMIN_OR_TSIP = re.compile(rb"\x10([^\x03\x10])((?:[^\x10]|\x10\x10){1,255}?)\x10\x03")
+_MAVLINK = {0xFE: (8, "MAVLink messages (a flight controller)"), 0xFD: (12, "MAVLink messages (a flight controller)")}
+
+
+def _folded(data: bytes) -> int:
+    """Exclusive-or of all bytes, however many."""
+    folded = 0
+    for at in range(0, len(data), 128):
+        folded ^= exclusive_or(data[at : at + 128])
+    return folded
+
+
+def recognise(data: bytes) -> Contents:
+    """What some thousand bytes of a line are."""
+    if data and max(data.count(byte) for byte in set(data)) >= _ONE_BYTE_SHARE * len(data):
+        byte = max(set(data), key=data.count)
+        return Contents("level", f"hardly anything but the byte 0x{byte:02x}", "")
+    framed = _frames(data)
+    sentences: dict[Checksum, list[bytes]] = {found: [] for found in Checksum}
+    for line in _sentences(data):
+        sentences[check(line)].append(line)
+    good, bad, unchecked = (sentences[found] for found in (Checksum.GOOD, Checksum.BAD, Checksum.MISSING))
+    if framed is not None and not good:
+        return framed
+    lines, text_share = _text_lines(data)
+    count = len(good) + len(bad) + len(unchecked)
+    if count >= _FEWEST_SENTENCES or 2 * count > len(lines) > 0:
+        if len(good) > max(len(bad), len(unchecked)):
+            malformed = [line for line in good if _is_malformed(line)]
+            return Contents("malformed" if malformed else "sentences", _kinds(malformed or good),
+                            _shown((malformed or good)[-1]))
+        if len(unchecked) > len(bad):
+            return Contents("no_checksum", _kinds(unchecked), _shown(unchecked[-1]))
+        return Contents("damaged", f"{len(bad)} of {count}", _shown(bad[-1]))
+    if text_share < _TEXT_SHARE:
+        return Contents("noise", "", f"the bytes {data[-12:].hex(' ')}" if data else "")
+    if not lines:
+        return Contents("endless", "", _shown(data))
+    form = _form_of_numbers(lines)
+    return Contents("numbers" if form else "text", form, _shown(lines[-1]))
+
+
+def _frames(data: bytes) -> Contents | None:
+    """The protocol whose frames make most of the bytes; None where none does."""
+    found: list[tuple[int, str, str]] = []
+    for protocol in _PROTOCOLS:
+        covered, at = 0, data.find(protocol.sync)
+        while 0 <= at <= len(data) - protocol.head:
+            size = protocol.size(data[at : at + protocol.head])
+            frame = data[at : at + size]
+            right = protocol.head <= size <= _LARGEST_FRAME and len(frame) == size and protocol.is_right(frame)
+            covered += size if right else 0
+            at = data.find(protocol.sync, at + (size if right else 1))
+        found.append((covered, protocol.by, protocol.name))
+    found += _stuffed_frames(data)
+    for sync, (more, name) in _MAVLINK.items():
+        found.append((_chained(data, sync, more), SENSOR, name))
+    covered, by, name = max(found)
+    return Contents(f"{by}_binary", name, "") if covered > _MOST * len(data) else None
+
+
+def _stuffed_frames(data: bytes) -> list[tuple[int, str, str]]:
+    """Bytes in frames between DLE and DLE ETX: Garmin's have a sum, Trimble's have none."""
+    garmin = tsip = 0
+    for match in _GARMIN_OR_TSIP.finditer(data):
+        body = match[1] + match[2].replace(b"\x10\x10", b"\x10")
+        is_garmin = len(body) > 2 and len(body) == body[1] + 3 and sum(body) & 0xFF == 0
+        garmin += len(match[0]) if is_garmin else 0
+        tsip += len(match[0])
+    return [(garmin + 1 if garmin else 0, RECEIVER, "Garmin binary packets"), (tsip, RECEIVER, "Trimble TSIP packets")]
+
+
+def _chained(data: bytes, sync: int, more: int) -> int:
+    """Bytes in frames whose second byte says their length and behind which the next one begins."""
+    covered, at = 0, data.find(sync)
+    while 0 <= at < len(data) - 1:
+        end = at + data[at + 1] + more
+        right = end < len(data) and data[end] == sync
+        covered += end - at if right else 0
+        at = end if right else data.find(sync, at + 1)
+    return covered
+
+
+_SENTENCE = re.compile(rb"[$!][A-Z][ -#%-~]*")
+
+
+def _sentences(data: bytes) -> list[bytes]:
+    """Lines that begin as NMEA sentences do, but for the first and the last, which may be cut."""
+    found = [match[0] for match in _SENTENCE.finditer(data)]
+    return [line for line in (found if data[-1:] in b"\r\n" else found[:-1]) if b"," in line]
+
+
+def _is_malformed(sentence: bytes) -> bool:
+    try:
+        parse_checked(sentence)
+    except MalformedError:
+        return True
+    return False
+
+
+def _kinds(sentences: Sequence[bytes]) -> str:
+    """``RMC, GGA and GSV``; proprietary ones by their whole name."""
+    names = []
+    for line in sentences:
+        address = line[1:].split(b",")[0].split(b"*")[0][:10].decode("ascii", "replace")
+        names.append(address if address.startswith("P") or len(address) < 4 else address[2:])
+    once = sorted(dict.fromkeys(names), key=names.count, reverse=True)[:8]
+    return " and ".join([", ".join(once[:-1]), once[-1]] if len(once) > 1 else once)
+
+
+def _text_lines(data: bytes) -> tuple[list[bytes], float]:
+    """Whole lines of printable text, and the share of all bytes that is such text."""
+    parts = re.split(rb"[\r\n]+", data)
+    texts = [part for part in parts if _is_text(part)]
+    whole = [part for part in parts[1:-1] if part and _is_text(part)] or [part for part in parts[:-1] if _is_text(part)]
+    size = sum(map(len, parts))
+    return [part for part in whole if part], sum(map(len, texts)) / size if size else 0.0
+
+
+def _is_text(line: bytes) -> bool:
+    try:
+        return line.decode("utf-8").replace("\t", " ").isprintable()
+    except UnicodeDecodeError:
+        return False
+
+
+NUMBER = re.compile(r"(?<![\w.^])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?(?![\w^])")
+_PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} *)?")
+
+
+def _form_of_numbers(lines: list[bytes]) -> str:
+    """How lines with three numbers or more differ from ``x,y,z``; empty where they are no such lines."""
+    texts = [line.decode("utf-8") for line in lines]
+    rows = [[float(word) for word in NUMBER.findall(text)] for text in texts]
+    count = sorted(map(len, rows))[len(rows) // 2]
+    same = [row for row in rows if len(row) == count]
+    if count < 3 or len(same) < _MOST * len(rows):
+        return ""
+    text = texts[-1]
+    if all(map(_PLAIN.fullmatch, texts[-3:])):
+        largest = max(abs(value) for row in same for value in row)
+        return f"three numbers up to {largest:g}, which no sample can be by this profile's unit and range"
+    more = f"{count} numbers"
+    if count > 3 and len(same) > 2 and all(a[0] < b[0] for a, b in zip(same[:-1], same[1:], strict=True)):
+        more += ", the first of which grows as a time does,"
+    if any(letter.isalpha() for letter in text):
+        return f"{more} with words beside them"
+    between = [name for sign, name in ((";", "semicolons"), ("\t", "tabs"), (",", "commas")) if sign in text]
+    if text.rstrip().endswith((",", ";")):
+        return f"{more} with a separator after the last one"
+    return f"{more} with {between[0] if between else 'blanks'} between them"
+
+
+def _shown(line: bytes) -> str:
+    return shortened(line.decode("utf-8", "replace").strip(), SHOWN_CHARACTERS)
+
+
+_EXCHANGED = ("{{expected}} expected, and what comes is {{what}}{{shown}}, as {other} sends: the two ports may be "
+              "exchanged. Compare gps.port and the accelerometer's port in the settings with ls -l /dev/serial/by-id")
+_LEVEL = ("{what} comes: the line stands at the wrong level. Check that TX, RX and ground are not exchanged, and that "
+          "no RS-232 plug is on a 3.3 V input")
+_NOISE = ("bytes arrive, but none that can be read{shown}: check the baud rate in the settings, and that no other "
+          "device is on this port")
+_DAMAGED = ("{what} sentences have a wrong checksum{shown}, so they are damaged on the way: check the ground wire, the "
+            "length of the cable, and that no other device is on this port")
+
+ADVICE = {
+    (RECEIVER, "sentences"): "it sends {what}, but no place{shown}: have it send RMC, which says time, date, place and "
+                             "speed in one sentence",
+    (RECEIVER, "no_checksum"): "its sentences ({what}) come without a checksum{shown}, and are not taken, as a damaged "
+                               "one would not be noticed: switch the checksum on in the receiver",
+    (RECEIVER, "damaged"): _DAMAGED,
+    (RECEIVER, "malformed"): "its {what} have the right checksum, but a field in them cannot be what its place "
+                             "says{shown}: renew its firmware, or have it send other sentences ({expected} expected)",
+    (RECEIVER, "receiver_binary"): "it sends {what}, and {expected} expected: switch it to NMEA at this port (RMC and "
+                                   "GGA are enough)",
+    (RECEIVER, "text"): "whole lines of text come, so the baud rate is right, but they are no NMEA sentences{shown}; "
+                        "{expected} expected: switch the receiver to NMEA 0183, and check that this is its port",
+    (RECEIVER, "sensor_binary"): _EXCHANGED.format(other="an accelerometer"),
+    (RECEIVER, "numbers"): _EXCHANGED.format(other="an accelerometer").replace("{what}", "lines of {what}"),
+    (SENSOR, "sentences"): _EXCHANGED.format(other="a GPS receiver").replace("{what}", "NMEA sentences ({what})"),
+    (SENSOR, "sensor_binary"): "it sends {what}, and {expected} expected: have the device send that, or write a "
+                               "profile of your own for its frames (docs/installation.md)",
+    (SENSOR, "numbers"): "whole lines come, so the baud rate is right, but with {what}{shown}; {expected} expected: "
+                         "have the device send that, or choose or write a profile that fits its lines "
+                         "(docs/installation.md)",
+    (SENSOR, "text"): "whole lines of text come, so the baud rate is right, but no samples{shown}; {expected} "
+                      "expected: have the device send that, or choose or write a profile that fits "
+                      "(docs/installation.md)",
+    (SENSOR, "receiver_binary"): _EXCHANGED.format(other="a GPS receiver"),
+    **{(port, "endless"): "text comes without line ends{shown}; {expected} expected: have each line end with CR, LF or "
+                          "both" for port in (RECEIVER, SENSOR)},
+    **{(port, "level"): _LEVEL for port in (RECEIVER, SENSOR)},
+    **{(port, "noise"): _NOISE for port in (RECEIVER, SENSOR)},
+}
+ADVICE |= {(SENSOR, kind): ADVICE[SENSOR, "sentences"] for kind in ("no_checksum", "damaged", "malformed")}
