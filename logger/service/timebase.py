@@ -55,11 +55,13 @@ class _Stray:
     """Fixes in a row that are as much later or earlier than the floor: since when [us], and how many.
 
     is_jump   the receiver's clock has jumped; else they are late, or it is not known yet
+    floor_us  of arrivals less such times: by as much higher or lower as its clock has left its rhythm
     """
 
     lag_us: int
     since_us: int
     is_jump: bool
+    floor_us: int
     fixes: int = 0
 
 
@@ -81,7 +83,7 @@ class Timebase:
         self._date_us: int | None = None
         self._date_vote: tuple[int, int, int] | None = None
         self._has_paused = False
-        self._was_low = False
+        self._was_low = self._was_late = False
         self.unsure_until_us: int | None = None
         self.late_us = 0
         self.time_jumps = 0
@@ -93,13 +95,13 @@ class Timebase:
         lag_us = self._lag_us(fix.t_us, fix.time_of_day_us)
         jumped = self._has_jumped(fix, lag_us)
         self._last = fix.t_us, fix.t_us - lag_us
-        if jumped:
-            return TimedFix(fix.t_us - self._latency_us, fix)
+        if jumped and self._stray is not None:
+            return TimedFix(fix.t_us - lag_us + self._stray.floor_us - self._latency_us, fix)
         self._lower(fix, lag_us)
         assert self._floor_us is not None
         if fix.utc_us is not None and fix.valid:
             self._vote_for_date(fix.t_us, fix.t_us - lag_us, fix.utc_us)
-        self.late_us = lag_us - self._floor_us
+        self.late_us = max(0, lag_us - self._floor_us)
         t_us = fix.t_us - self.late_us - self._latency_us
         if not self._has_paused:
             self.unsure_until_us = t_us
@@ -118,9 +120,10 @@ class Timebase:
         was_low, self._was_low = self._was_low, before_us - lag_us > NOTABLE_US
         self._floor_us = before_us + drift_us if self._was_low and not was_low else min(before_us + drift_us, lag_us)
         self._floor_t_us = fix.t_us
+        self._was_late |= self._was_low
         if not self._has_paused and not fix.may_wait and not self._was_low:
             self._has_paused = True
-            if before_us - self._floor_us <= NOTABLE_US:
+            if not self._was_late:
                 self.unsure_until_us = None
 
     def _lag_us(self, t_us: int, time_of_day_us: int) -> int:
@@ -145,13 +148,16 @@ class Timebase:
             if lag_us > floor_us and passed_us - own_passed_us <= JUMP_US:
                 self._stray = None  # later by and by, or less late than before, as some were lost that waited: no jump
                 return False
-            keeps_rhythm = usual_us is not None and abs(passed_us - usual_us) < abs(own_passed_us - usual_us)
-            stray = self._stray = _Stray(lag_us, fix.t_us, lag_us < floor_us or keeps_rhythm)
+            stray = self._stray = _Stray(lag_us, fix.t_us, lag_us < floor_us, lag_us)
+            expected_us = max(1, round(passed_us / usual_us)) * usual_us if usual_us else 0
+            if usual_us and abs(passed_us - expected_us) < abs(own_passed_us - expected_us):
+                stray.is_jump, stray.floor_us = True, floor_us + expected_us - own_passed_us
         stray.fixes += 1
         lasts = fix.t_us - stray.since_us >= LASTING_US and not fix.may_wait
         if stray.fixes < AGREEING_FIXES if stray.is_jump else not lasts:
             return stray.is_jump
-        self._floor_us, self._floor_t_us, self._stray = lag_us, fix.t_us, None
+        self._was_late |= stray.floor_us < floor_us
+        self._floor_us, self._floor_t_us, self._stray = stray.floor_us, fix.t_us, None
         self.time_jumps += 1
         return False
 

@@ -33,13 +33,12 @@ def test_waits_are_taken_out_and_a_clock_that_drifts_is_followed() -> None:
         assert np.abs(fix_times_s(on_board_s, named_s) - true_s).max() < 0.01
 
 
-def test_a_wrong_time_is_placed_by_its_arrival_and_a_jump_of_the_receiver_is_none_of_the_road() -> None:
+def test_neither_a_wrong_time_nor_a_jump_of_the_receiver_is_a_step_of_the_car() -> None:
     true_s, arrival_s, named_s = arrived()
     named_s[300] += 7.0
     named_s[400:] -= 2.0
     found = fix_times_s(placed(arrival_s, named_s), named_s)
     assert np.abs(found - true_s).max() < 0.12
-    assert abs(found[300] - (arrival_s[300] - 0.2)) < 1e-6
 
 
 def test_without_times_fixes_stay_where_they_were_placed() -> None:
