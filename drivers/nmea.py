@@ -142,8 +142,8 @@ class _Epoch:
 
     def valid(self) -> bool:
         """The validity rule of the module."""
-        asked = [one for one in (self.rmc, self.gga) if one is not None] or [self.gll]
-        return all(one is not None and one.vouches and one.lat_deg is not None for one in asked)
+        asked = (self.rmc, self.gga) if self.rmc or self.gga else (self.gll,)
+        return all(one.vouches and one.lat_deg is not None for one in asked if one is not None)
 
     def fix(self, utc_us: int | None) -> Fix:
         """The epoch as a valid fix."""

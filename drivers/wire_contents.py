@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 from zlib import crc32
 
@@ -246,14 +247,14 @@ def _is_text(line: bytes) -> bool:
         return False
 
 
-NUMBER = re.compile(r"(?<![\w.^])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?(?![\w^])")
+_NUMBER = re.compile(r"(?<![\w.^+-])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?(?![\w^])")
 _PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} *)?")
 
 
 def _form_of_numbers(lines: list[bytes]) -> str:
     """How lines with three numbers or more differ from ``x,y,z``; empty where they are no such lines."""
     texts = [line.decode("utf-8") for line in lines]
-    rows = [[float(word) for word in NUMBER.findall(text)] for text in texts]
+    rows = [[float(word) for word in _NUMBER.findall(text)] for text in texts]
     count = sorted(map(len, rows))[len(rows) // 2]
     same = [row for row in rows if len(row) == count]
     if count < 3 or len(same) < _MOST * len(rows):
@@ -263,7 +264,7 @@ def _form_of_numbers(lines: list[bytes]) -> str:
         largest = max(abs(value) for row in same for value in row)
         return f"three numbers up to {largest:g}, which no sample can be by this profile's unit and range"
     more = f"{count} numbers"
-    if count > 3 and len(same) > 2 and all(a[0] < b[0] for a, b in zip(same[:-1], same[1:], strict=True)):
+    if count > 3 and len(same) > 2 and all(a[0] < b[0] for a, b in pairwise(same)):
         more += ", the first of which grows as a time does,"
     if any(letter.isalpha() for letter in text):
         return f"{more} with words beside them"

@@ -11,6 +11,7 @@ from logger.report.placed_rows import placed
 from ..support.drives.lines import SATELLITES, Receiver, drive, gga, gll, off_m, off_s, rmc, rmc_gga_and, vtg, zda
 from ..support.drives.replay import core_for
 
+
 def by_and_by(utc: datetime, t_s: float) -> list[str]:
     return rmc_gga_and(18 if t_s % 40 < 15 else 2)(utc, t_s)
 
