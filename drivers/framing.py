@@ -195,6 +195,12 @@ def fletcher8(data: bytes) -> bytes:
 LINE_BYTES_MAX = 80
 
 _LINE_END = re.compile(rb"[\r\n]")
+_NUMBER = re.compile(rb"(?<![\w.^+-])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?(?![\w^])")
+
+
+def numbers_in(line: bytes) -> list[float]:
+    """The decimal numbers that stand by themselves in a line, whatever stands between them: not the 2 of ``m/s^2``."""
+    return [float(word) for word in _NUMBER.findall(line)]
 
 
 class LineFramer(_Framer):

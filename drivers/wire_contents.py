@@ -20,7 +20,7 @@ from typing import NamedTuple
 from zlib import crc32
 
 from drivers.errors import shortened
-from drivers.framing import exclusive_or, fletcher8
+from drivers.framing import exclusive_or, fletcher8, numbers_in
 from drivers.nmea_sentences import Checksum, MalformedError, check, parse_checked
 
 RECENT_BYTES = 4096
@@ -247,14 +247,13 @@ def _is_text(line: bytes) -> bool:
         return False
 
 
-_NUMBER = re.compile(r"(?<![\w.^+-])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?(?![\w^])")
 _PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} *)?")
 
 
 def _form_of_numbers(lines: list[bytes]) -> str:
     """How lines with three numbers or more differ from ``x,y,z``; empty where they are no such lines."""
     texts = [line.decode("utf-8") for line in lines]
-    rows = [[float(word) for word in _NUMBER.findall(text)] for text in texts]
+    rows = [numbers_in(line) for line in lines]
     count = sorted(map(len, rows))[len(rows) // 2]
     same = [row for row in rows if len(row) == count]
     if count < 3 or len(same) < _MOST * len(rows):
@@ -305,11 +304,10 @@ ADVICE = {
     (SENSOR, "sensor_binary"): "it sends {what}, and {expected} expected: have the device send that, or write a "
                                "profile of your own for its frames (docs/installation.md)",
     (SENSOR, "numbers"): "whole lines come, so the baud rate is right, but with {what}{shown}; {expected} expected: "
-                         "have the device send that, or choose or write a profile that fits its lines "
-                         "(docs/installation.md)",
+                         "have the device send that, or write a profile that says which of the numbers are X, Y "
+                         "and Z (docs/installation.md)",
     (SENSOR, "text"): "whole lines of text come, so the baud rate is right, but no samples{shown}; {expected} "
-                      "expected: have the device send that, or choose or write a profile that fits "
-                      "(docs/installation.md)",
+                      "expected: have the device send that (docs/installation.md)",
     (SENSOR, "receiver_binary"): _EXCHANGED.format(other="a GPS receiver"),
     **{(port, "endless"): "text comes without line ends{shown}; {expected} expected: have each line end with CR, LF or "
                           "both" for port in (RECEIVER, SENSOR)},

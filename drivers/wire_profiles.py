@@ -8,7 +8,7 @@ they mean. Shipped ones lie in ``drivers/profiles``, anyone may name another by 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from math import inf
 from pathlib import Path
@@ -28,6 +28,7 @@ WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
 UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}
 AXES = "xyz"
 PROFILE_BYTES_MAX = 65_536
+MOST_NUMBERS = 40  # of one digit in a line of 80 characters
 
 Triple = tuple[float, float, float]
 
@@ -95,15 +96,23 @@ class FrameLayout:
 
 @dataclass(frozen=True)
 class LineLayout:
-    """Lines ``x,y,z``: m/s2 per unit, and where the range ends [in units]."""
+    """Lines ``x,y,z``: m/s2 per unit, and where the range ends [in units].
+
+    numbers, columns   lines of another form: so many numbers, whatever stands between them, of which these (counted
+                       from 1) are X, Y, Z; None: lines ``x,y,z`` and nothing else
+    """
 
     unit_mps2: float
     range_units: float
+    numbers: int | None = None
+    columns: tuple[int, int, int] = (1, 2, 3)
 
     @property
     def words(self) -> str:
         """What comes, for people."""
         unit = next(name for name, unit_mps2 in UNITS_MPS2.items() if unit_mps2 == self.unit_mps2)
+        if self.numbers is not None:
+            return f"lines with {self.numbers} numbers, in {unit},"
         return f"lines x,y,z in {unit} (three numbers, two commas, nothing else)"
 
 
@@ -186,6 +195,9 @@ class _Keys:
         if key not in self._content:
             raise self.wrong(key, f"{expected}, but the key is missing")
         return self._content.pop(key)
+
+    def has(self, key: str) -> bool:
+        return key in self._content
 
     def inner(self, key: str) -> _Keys:
         return _Keys(self._place, f"{self._path}{key}.", self._take(key, "keys with values"), self._lines)
@@ -294,5 +306,9 @@ def _frame_layout(keys: _Keys) -> FrameLayout:
 
 def _line_layout(keys: _Keys) -> LineLayout:
     layout = LineLayout(UNITS_MPS2[keys.choice("unit", list(UNITS_MPS2))], keys.number("range", 1e-3, 1e4))
+    if keys.has("numbers") or keys.has("columns"):
+        numbers = keys.whole("numbers", 3, MOST_NUMBERS)
+        x, y, z = keys.wholes("columns", 3, 1, numbers)
+        layout = replace(layout, numbers=numbers, columns=(x, y, z))
     keys.finish()
     return layout

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from drivers.accelerometers.accelerometer import Readings, SerialAccelerometer
 from drivers.dated_samples import WORTH_TELLING, DatedSamples, Samples
 from drivers.errors import SettingsError
-from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
+from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
 from drivers.recorded_words import RecordedWords
 from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
@@ -87,7 +87,7 @@ class _LineReader:
         return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
 
     def _samples(self, lines: list[Frame]) -> _Found:
-        values = np.array([_triple(line.data) for line in lines], dtype=np.float64)
+        values = np.array([_triple(line.data, self._layout) for line in lines], dtype=np.float64)
         largest = np.abs(values).max(axis=1)
         return _Found(
             lines[0].after_loss,
@@ -98,8 +98,12 @@ class _LineReader:
         )
 
 
-def _triple(line: bytes) -> Triple:
+def _triple(line: bytes, layout: LineLayout) -> Triple:
     """The three numbers of a line; not-a-numbers when it is damaged."""
+    if layout.numbers is not None:
+        found = numbers_in(line)
+        x, y, z = layout.columns
+        return (found[x - 1], found[y - 1], found[z - 1]) if len(found) == layout.numbers else _NO_SAMPLE
     match = _LINE.fullmatch(line)
     if match is None or (match[4] and exclusive_or(line[: line.index(b"*")]) != int(match[4], 16)):
         return _NO_SAMPLE

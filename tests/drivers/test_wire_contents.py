@@ -1,4 +1,4 @@
-"""What comes on a serial line: frames made by other people's libraries or by their makers' descriptions, text, noise."""
+"""What comes on a serial line: frames made by their makers' descriptions, text, noise."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import random
 import struct
 import zlib
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 from pynmeagps import NMEAMessage
 
@@ -195,3 +197,21 @@ def test_at_the_sensors_port_a_time_or_a_receiver_is_recognised() -> None:
     other = PascoDecoder(load_profile("lines"))
     other.feed(0, b"".join(nmea("GSV", numMsg=1, msgNum=1, numSV=0)() for _ in range(40)))
     assert "as a GPS receiver sends: the two ports may be exchanged" in other.unread
+
+
+@pytest.mark.parametrize(("line", "layout"), [
+    ("X: 0.49  Y: -0.98  Z: 9.80  m/s^2 ", "{unit: mps2, range: 160, numbers: 3, columns: [1, 2, 3]}"),
+    ("1200;0.05;-0.1;1;25.3;", "{unit: g, range: 16, numbers: 5, columns: [2, 3, 4]}"),
+    ('{"az": 1.0, "ax": 0.05, "ay": -1e-1}', "{unit: g, range: 16, numbers: 3, columns: [2, 3, 1]}"),
+], ids=["words", "time first, temperature last", "JSON"])
+def test_a_profile_of_ones_own_reads_lines_of_another_form(line: str, layout: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.yaml"
+    path.write_text("name: own\nversion: 1\nverified: true\nsource: ours\nframing: lines\nrate_hz: 100\n"
+                    f"clock_tolerance_ppm: 20000\nline: {layout}\n")
+    decoder = PascoDecoder(load_profile(str(path)))
+    for k in range(300):
+        decoder.feed(10_000 * k, line.encode() + b"\r\n" if k != 200 else b"1.0 2.0\r\n")
+    decoder.flush()
+    block = decoder.take()
+    assert np.allclose(block.accel_mps2, [0.49, -0.98, 9.80], atol=0.01)
+    assert decoder.counters.bad_frames == 1
