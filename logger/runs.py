@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.pass_band import in_band
+from logger.left_out import LeftOut, counting
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 
@@ -134,6 +135,7 @@ class Run:
     more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
     low_pass         what was found of it; None: nothing
     outside_mps2     r.m.s. of what a model and the sensor differ by outside of the pass band [m/s2]
+    cut_s            how much of its drive is in no run, as the car stood or nothing was read; of one run of a drive
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -150,6 +152,7 @@ class Run:
     more: Array = field(default_factory=lambda: np.empty((0, 0)))
     low_pass: LowPass | None = None
     outside_mps2: float = 0.0
+    cut_s: float = 0.0
 
     def __post_init__(self) -> None:
         if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):
@@ -278,6 +281,16 @@ def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> flo
     """rms(residuals) / rms(measured) over all samples of arrays (n,); NaN where nothing but zeros was measured."""
     left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))
     return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+
+
+def runs_left_out(runs: Sequence[Run]) -> tuple[LeftOut, ...]:
+    """What of the drives that these runs are of is compared with nothing."""
+    return counting((
+        LeftOut(sum(run.cut_s for run in runs), "s", "in which the car stood or nothing was read"),
+        LeftOut(sum(run.first / run.rate_hz for run in runs), "s", "at the beginning of runs, as the car's past is not "
+                "known"),
+        LeftOut(sum(np.count_nonzero(~run.read[run.first:]) / run.rate_hz for run in runs), "s",
+                "in short holes between readings")))
 
 
 def short_names(runs: Sequence[Run]) -> dict[str, str]:

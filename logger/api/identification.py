@@ -17,7 +17,8 @@ from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.runs import SKIP_S
+from logger.left_out import left_out_json, left_out_lines
+from logger.runs import SKIP_S, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import vehicle_file
 
@@ -239,8 +240,9 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
     return FittedNumbers(
         fit, _fitted(given, model, fit),
-        as_json(fit, *checks) | record_json(found, common, records),
-        [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
+        as_json(fit, *checks) | record_json(found, common, records) | left_out_json(runs_left_out(records)),
+        [_head(given, len(fit.free), records, low), *left_out_lines(runs_left_out(records)),
+         *lines(fit, *checks), *common_words(model, common),
          *record_words(found)])
 
 
@@ -413,8 +415,10 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
     return FittedNumbers(
         fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))),
                                 errors=_road_fit_errors(fit)),
-        {**as_json(fit, parameters), "runs": [record.name for record in records]},
-        [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters)])
+        {**as_json(fit, parameters), "runs": [record.name for record in records],
+         **left_out_json(runs_left_out(records))},
+        [_head(given, len(parameters), records, f"; over {where}", ","), *left_out_lines(runs_left_out(records)),
+         *lines(fit, parameters)])
 
 
 def _road_fit_errors(fit: RoadFit) -> NumberErrors:

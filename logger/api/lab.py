@@ -13,6 +13,8 @@ from logger.api.run_checks import checked_runs
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
+from logger.left_out import LeftOut, left_out_json, left_out_lines
+from logger.runs import runs_left_out
 from logger.store.formats import drive_file
 
 if TYPE_CHECKING:
@@ -155,16 +157,18 @@ def diagnose(
     """
     bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose",
                        low_pass_hz=low_pass_hz, anyway=anyway)
-    return diagnosis_of(replace(bench, effects=among(bench.effects, candidates)).diagnosed(progress))
+    return diagnosis_of(replace(bench, effects=among(bench.effects, candidates)).diagnosed(progress),
+                        runs_left_out(bench.runs.runs))
 
 
-def diagnosis_of(found: diagnosis_results.Diagnosis) -> Diagnosis:
-    """What the lab found, as it is shown."""
+def diagnosis_of(found: diagnosis_results.Diagnosis, left_out: Sequence[LeftOut] = ()) -> Diagnosis:
+    """What the lab found, as it is shown, and what it left out."""
     from logger.report.diagnosis_text import as_json
     from logger.report.lab_text import diagnosis_lines
 
-    summary = as_json(found)
-    return Diagnosis("\n".join(diagnosis_lines(found, None)), summary, **diagnosis_fields(summary))
+    summary = as_json(found) | left_out_json(left_out)
+    words = "\n".join([*left_out_lines(left_out), *diagnosis_lines(found, None)])
+    return Diagnosis(words, summary, **diagnosis_fields(summary))
 
 
 def diagnosis_fields(summary: Mapping[str, Any]) -> dict[str, Any]:

@@ -92,11 +92,12 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
 
     parts = driven_parts(drive, drive.track.timed)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
+    cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part],
                 drive.track.begun(part.start / drive.rate_hz), facts=drive.facts,
-                usable=drive.marks(part), more=_more(drive, part))
+                usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
             for part in parts]
 
 

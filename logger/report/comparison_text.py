@@ -11,11 +11,12 @@ from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
+from logger.left_out import left_out_json
 from logger.report.band_text import band_json
 from logger.report.quantities import signal_errors
 from logger.report.removed_text import removed_json, removed_words
 from logger.report.residual_text import sentence
-from logger.runs import normalised_rms_error
+from logger.runs import normalised_rms_error, runs_left_out
 
 _HELPS = 0.97
 _MOST_MOVES = 3
@@ -87,7 +88,7 @@ def conclusion(found: Comparison) -> str:
 def as_json(found: Comparison) -> dict[str, Any]:
     """The comparison as one JSON object; error and where are of the model as it stands."""
     return {
-        **_standing_json(found.plain),
+        **_standing_json(found.plain), **left_out_json(runs_left_out(found.plain.residuals.runs)),
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
         "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
         "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},

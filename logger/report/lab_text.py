@@ -7,12 +7,13 @@ from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.selection.add_effect import AddedEffects
+from logger.left_out import left_out_lines
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.diagnosis_text import looks_like, summary, table, untested
 from logger.report.residual_text import error_text, paired
 from logger.report.text_layout import columns, paragraphs
-from logger.runs import short_names
+from logger.runs import runs_left_out, short_names
 
 _PLACES = 5
 
@@ -22,7 +23,8 @@ def comparison_lines(found: Comparison) -> list[str]:
     residuals = found.plain.residuals
     seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
     return [
-        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
+        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s",
+        *left_out_lines(runs_left_out(residuals.runs)), "",
         paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
         paragraphs([conclusion(found)]), "",
         *_tables(found),

@@ -21,6 +21,7 @@ from logger.dsp.range_ends import range_ends
 from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times
 from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
+from logger.left_out import LeftOut, counting
 from logger.printable import counted
 from logger.runs import CLIPPED, NO_READING
 from logger.store.formats.csv_table import place
@@ -94,6 +95,7 @@ class EvenRecord:
     start_s, rate_hz    [s], [Hz]
     doubts      what may be wrong with it
     resampled   None: it is as it was recorded
+    left_out    of its samples
     """
 
     start_s: float
@@ -102,6 +104,7 @@ class EvenRecord:
     others: dict[str, Array]
     doubts: tuple[Doubt, ...]
     resampled: Resampled | None
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def even_record(
@@ -224,8 +227,9 @@ def _resampled(
     grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
     beside = {name: np.interp(grid_s, times_s, one) for name, one in others.items()}
     dropped = float(held.mean()) if repeats is None else repeats.share
+    left = LeftOut(len(t_s) - len(taken_s), "sample", "that only repeated the one before")
     return EvenRecord(float(taken_s[0]), wanted_hz, dict(zip(names, laid.T.copy(), strict=True)), beside, tuple(doubts),
-                      Resampled(own_hz, wanted_hz, widest_s, dropped))
+                      Resampled(own_hz, wanted_hz, widest_s, dropped), counting([left]))
 
 
 def even_times_of(t_s: Array, file: str) -> Array:

@@ -83,7 +83,7 @@ def test_what_is_no_profile_is_refused_with_its_line(path: Path, content: str | 
 
 def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
     for place in (tmp_path / "none.csv", tmp_path):
-        with pytest.raises(BadInput, match="expected a (readable )?file"):
+        with pytest.raises(BadInput, match=r"expected a (readable )?file"):
             read_profile(place)
 
 
