@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from logger.api.outputs import check_out
 from logger.api.shown import Shown
 from logger.errors import BadInput
+from logger.left_out import LeftOut, counting, left_out_lines
 from logger.printable import counted
+from logger.report.left_rows import damaged
 
 if TYPE_CHECKING:
     from logger.exchange.layer import Layer
@@ -36,13 +38,16 @@ class Conversion(Shown):
     damaged_lines: int
     of: str = "window"
 
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What of the logs is not in it."""
+        return counting([damaged(self.damaged_lines)])
+
     def __repr__(self) -> str:
         said = f"{self.path}: {counted(self.rows, self.of)}"
         if self.placed < self.rows:
             said += f", {self.rows - self.placed} of them without a position"
-        if self.damaged_lines:
-            said += f"; {counted(self.damaged_lines, 'damaged line')} left out ('ridelog verify' lists them)"
-        return said
+        return "\n".join([said, *left_out_lines(self.left_out)])
 
 
 def convert(logs: Path | str | Sequence[Path | str], to: Path | str, smoothness: Path | str | None = None

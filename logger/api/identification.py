@@ -17,7 +17,7 @@ from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.left_out import left_out_json, left_out_lines
+from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import SKIP_S, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import vehicle_file
@@ -241,9 +241,13 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     return FittedNumbers(
         fit, _fitted(given, model, fit),
         as_json(fit, *checks) | record_json(found, common, records) | left_out_json(runs_left_out(records)),
-        [_head(given, len(fit.free), records, low), *left_out_lines(runs_left_out(records)),
-         *lines(fit, *checks), *common_words(model, common),
-         *record_words(found)])
+        [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
+         *record_words(found), *left_out_paragraph(_beside_beginnings(records))])
+
+
+def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
+    """What is left out, but the beginnings, which the first line says."""
+    return runs_left_out([replace(one, skip_s=0.0) for one in records])
 
 
 def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Record], question: Question,
@@ -417,8 +421,8 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
                                 errors=_road_fit_errors(fit)),
         {**as_json(fit, parameters), "runs": [record.name for record in records],
          **left_out_json(runs_left_out(records))},
-        [_head(given, len(parameters), records, f"; over {where}", ","), *left_out_lines(runs_left_out(records)),
-         *lines(fit, parameters)])
+        [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters),
+         *left_out_paragraph(_beside_beginnings(records))])
 
 
 def _road_fit_errors(fit: RoadFit) -> NumberErrors:

@@ -13,7 +13,7 @@ from logger.api.run_checks import checked_runs
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.left_out import LeftOut, left_out_json, left_out_lines
+from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import runs_left_out
 from logger.store.formats import drive_file
 
@@ -167,7 +167,7 @@ def diagnosis_of(found: diagnosis_results.Diagnosis, left_out: Sequence[LeftOut]
     from logger.report.lab_text import diagnosis_lines
 
     summary = as_json(found) | left_out_json(left_out)
-    words = "\n".join([*left_out_lines(left_out), *diagnosis_lines(found, None)])
+    words = "\n".join([*diagnosis_lines(found, None), *left_out_paragraph(left_out)])
     return Diagnosis(words, summary, **diagnosis_fields(summary))
 
 

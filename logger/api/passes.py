@@ -106,7 +106,9 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     >>> bool((found.drives >= 1).all())
     True
     """
+    from logger.left_out import left_out_json, left_out_paragraph
     from logger.report.combined_drives import combined_drives
+    from logger.report.left_rows import of_passes
     from logger.report.passes_text import as_json, lines
     from logger.store.log.log_reader import find_logs_in, read_found
 
@@ -117,13 +119,16 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     end_s = np.inf if until is None else day_of(until, "--until")
     split_s = None if split is None else day_of(split, "--split")
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    records = [one for file in read_found(find_logs_in(places)) for one in file.records]
+    files = read_found(find_logs_in(places))
+    records = [one for file in files for one in file.records]
     if since is not None or until is not None:
         records = [one for one in records if one.utc_us is not None and first_s <= one.utc_us / US_PER_S < end_s]
     if not records:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row"
                        + (" of these days" if since or until else ""))
     found = combined_drives(records, length_m, above_m_per_km, split_s)
+    left = of_passes(files, records, found.placed)
     return RepeatedDrives(
-        "\n".join(lines(found)), as_json(found), found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
+        "\n".join([*lines(found), *left_out_paragraph(left)]), as_json(found) | left_out_json(left),
+        found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)

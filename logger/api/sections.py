@@ -102,7 +102,9 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     >>> bool((found.known_m <= found.length_m + 1e-6).all())
     True
     """
+    from logger.left_out import left_out_json, left_out_paragraph
     from logger.report.drive_sections import drive_sections
+    from logger.report.left_rows import of_sections
     from logger.report.sections_text import as_json, lines
     from logger.store.log.log_reader import find_logs_in, read_found
 
@@ -114,12 +116,13 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     if not any(one.records for one in files):
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
     drives = tuple(drive_sections(files, length_m) if route is None else _on_route(files, route, length_m))
+    left = of_sections(files, [row for one in drives for row in one.records], route is not None)
     figures = [one.figures for one in drives]
     known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
         "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
     return Sections(
-        "\n".join(lines(drives, length_m, units, localized_m_per_km)), as_json(drives, length_m, localized_m_per_km),
-        length_m,
+        "\n".join([*lines(drives, length_m, units, localized_m_per_km), *left_out_paragraph(left)]),
+        as_json(drives, length_m, localized_m_per_km) | left_out_json(left), length_m,
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
         speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)

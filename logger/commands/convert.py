@@ -20,6 +20,7 @@ from pathlib import Path
 
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
+from logger.left_out import left_out_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,5 +41,5 @@ def run(args: argparse.Namespace) -> int:
     done = convert(args.logs, args.to, args.smoothness)
     rows = "rows" if args.smoothness is None else "ways"
     print(json.dumps({"file": str(done.path), "format": done.format, rows: done.rows, "placed": done.placed,
-                      "damaged_lines": done.damaged_lines}) if args.json else done)
+                      "damaged_lines": done.damaged_lines, **left_out_json(done.left_out)}) if args.json else done)
     return EXIT_DONE

@@ -22,7 +22,7 @@ from logger.api.outputs import check_out
 from logger.commands.lab_model import add_bench_arguments, bench, progress
 from logger.errors import EXIT_DONE
 from logger.files import write_text
-from logger.left_out import left_out_json, left_out_lines
+from logger.left_out import left_out_json, left_out_paragraph
 from logger.report.text_layout import paragraphs
 from logger.runs import runs_left_out
 
@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(as_json(found) | left_out_json(runs_left_out(given.runs.runs)), allow_nan=False))
         return EXIT_DONE
-    print(paragraphs([_compared(given), *left_out_lines(runs_left_out(given.runs.runs))]), "",
-          *diagnosis_lines(found, None if args.all else _SHOWN), "",
+    print(paragraphs([_compared(given)]), "", *diagnosis_lines(found, None if args.all else _SHOWN),
+          *left_out_paragraph(runs_left_out(given.runs.runs)), "",
           _next(args, given, found), sep="\n")
     if args.out is not None:
         print(f"\nPage: {args.out}")

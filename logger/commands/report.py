@@ -10,8 +10,10 @@ from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import replace_bytes
+from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.drawing import ENDINGS
+from logger.report.left_rows import of_files
 from logger.report.maps import Way
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
@@ -46,9 +48,10 @@ def run(args: argparse.Namespace) -> int:
     records = [record for file in files for record in file.records]
     if args.json:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
-                          "summary": summary_json(summarise(records))}))
+                          "summary": summary_json(summarise(records)), **left_out_json(of_files(files))}))
     else:
-        print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})")
+        print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})",
+              *left_out_lines(of_files(files)), sep="\n")
     return EXIT_DONE
 
 

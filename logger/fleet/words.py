@@ -10,7 +10,9 @@ import numpy as np
 from logger.fleet.ingest import Counts
 from logger.fleet.layer import FIELDS, roads_layer
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable, change_found
+from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.printable import counted
+from logger.report.left_rows import damaged
 from logger.report.quantities import known
 from logger.store.log.log_reader import utc
 
@@ -21,19 +23,22 @@ _SURE = 2.0
 
 def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
     """What an ingest did, by name; ``rows``: in the dataset after it."""
-    return {**vars(counts), "rows": rows}
+    return {**vars(counts), "rows": rows, **left_out_json(_left_out(counts))}
+
+
+def _left_out(counts: Counts) -> list[LeftOut]:
+    return [damaged(counts.damaged_lines), *(LeftOut(number, "row", why) for number, why in (
+        (counts.repeated, "that are known already"),
+        (counts.contradictions, "at odds with a known one of the same number and time; the first one stays"),
+        (counts.undated, "without a date"), (counts.unplaced, "without a place or a direction"),
+        (counts.trimmed, "cut at the ends of drives")))]
 
 
 def ingest_words(counts: Counts, rows: int, place: str) -> str:
     """The same in lines."""
     lines = [f"{place}: {counts.added:,} rows added, {rows:,} in all"]
-    said = ((counts.known_logs, "log", "known already"), (counts.repeated, "row", "known already"),
-            (counts.contradictions, "row", "at odds with a known one of the same number and time; the first one stays"),
-            (counts.damaged_lines, "damaged line", "refused ('ridelog verify' lists them)"),
-            (counts.undated, "row", "without a date left out"),
-            (counts.unplaced, "row", "without a place or a direction left out"),
-            (counts.trimmed, "row", "cut at the ends of drives"))
-    return "\n".join([*lines, *(f"  {counted(number, what)} {words}" for number, what, words in said if number)])
+    known = [f"  {counted(counts.known_logs, 'log')} known already"] if counts.known_logs else []
+    return "\n".join([*lines, *known, *(f"  {one}" for one in left_out_lines(_left_out(counts)))])
 
 
 def figures_json(figures: FleetFigures) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.selection.add_effect import AddedEffects
-from logger.left_out import left_out_lines
+from logger.left_out import left_out_paragraph
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.diagnosis_text import looks_like, summary, table, untested
@@ -23,11 +23,10 @@ def comparison_lines(found: Comparison) -> list[str]:
     residuals = found.plain.residuals
     seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
     return [
-        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s",
-        *left_out_lines(runs_left_out(residuals.runs)), "",
+        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
         paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
         paragraphs([conclusion(found)]), "",
-        *_tables(found),
+        *_tables(found), *left_out_paragraph(runs_left_out(residuals.runs)),
     ]
 
 

@@ -186,11 +186,12 @@ def test_what_it_says(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = logs.parent / "way.geojson"
     write(logs, drive(eastwards(1.0, 1.0, 1)), "00003-001.csv", "torn,line\n")
     assert main(["convert", str(logs), str(logs / "00001-001.csv"), "--to", str(out)]) == 0
-    assert capsys.readouterr().out == (f"{out}: 11 windows, 1 of them without a position; 1 damaged line left out "
-                                       "('ridelog verify' lists them)\n")
+    assert capsys.readouterr().out == (f"{out}: 11 windows, 1 of them without a position\n"
+                                       "Left out: 1 damaged line ('ridelog verify' lists them).\n")
     assert main(["convert", str(logs), "--to", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
-        "file": str(out), "format": "geojson", "rows": 11, "placed": 10, "damaged_lines": 1}
+        "file": str(out), "format": "geojson", "rows": 11, "placed": 10, "damaged_lines": 1,
+        "left_out": [{"amount": 1, "unit": "damaged line", "why": "('ridelog verify' lists them)"}]}
 
 
 @pytest.mark.parametrize(("to", "complaint"), [
