@@ -6,6 +6,8 @@ import errno
 import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +19,9 @@ from hypothesis import strategies as st
 from drivers.accelerometers import _iio_device
 from drivers.accelerometers._iio_layout import read_description, understood
 from drivers.accelerometers.iio import IioConfig, IioDecoder, IioSource
-from drivers.errors import BadReply, NotPresent, SettingsLost
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost
 from drivers.events import Event
+from drivers.foreign_faults import as_device_error
 from drivers.readings import AccelerationBlock
 
 from ..support.accelerometer_fakes.fake import Clock
@@ -267,6 +270,53 @@ def test_a_node_that_may_not_be_read_says_who_forbids_it(
     monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(NotPresent, match=words):
         IioSource(fake.settings, machine).open()
+
+
+@pytest.mark.parametrize("call", ["open", "read", "close", "wait"])
+def test_whatever_its_node_answers_costs_its_own_readings_and_keeps_nothing_open(
+        tmp_path: Path, call: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake = fake_in(tmp_path)
+    machine = fake.machine()
+    works = {name: getattr(os, name) for name in ("open", "read", "close")}
+    nodes: set[int] = set()
+
+    def opens(path: Any, *arguments: Any, **named: Any) -> int:
+        if path == fake.node and call == "open":
+            raise fault
+        descriptor: int = works["open"](path, *arguments, **named)
+        nodes.update({descriptor} if path == fake.node else ())
+        return descriptor
+
+    def fails(name: str) -> Callable[..., Any]:
+        def failing(descriptor: int, *arguments: Any) -> Any:
+            is_node = descriptor in nodes
+            if name == "close":
+                nodes.discard(descriptor)
+                works[name](descriptor)
+            if is_node and call == name:
+                raise fault
+            return works[name](descriptor, *arguments) if name != "close" else None
+        return failing
+
+    def ready(descriptor: int, timeout_s: float) -> bool:
+        if call == "wait":
+            raise fault
+        return True
+
+    monkeypatch.setattr(os, "open", opens)
+    for name in ("read", "close"):
+        monkeypatch.setattr(os, name, fails(name))
+    machine = replace(machine, wait_readable=ready)
+    for number in errno.errorcode:
+        fault: Exception = OSError(number, os.strerror(number))
+        source = IioSource(fake.settings, machine)
+        with suppress(DeviceError), as_device_error():
+            source.open()
+            source.poll()
+        with suppress(DeviceError), as_device_error():
+            source.close()
+        assert not nodes
+        assert (fake.device / "buffer/enable").read_text().strip() == "0"
 
 
 def test_scans_that_come_in_pieces_are_put_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,6 +24,7 @@ from typing import Any
 import serial
 import smbus2
 
+from drivers import sources
 from drivers.accelerometers._bma220_chip import Bma220Chip
 from drivers.accelerometers._bma220_registers import REGISTER_STEP
 from drivers.machine import Machine
@@ -160,7 +161,7 @@ def iio_devices() -> None:
 
 if __name__ == "__main__":
     supervisor.FIRST_WAIT_US = supervisor.LONGEST_WAIT_US = 1000
-    listener.CLOSED_WAIT_S = 0.002
+    listener.CLOSED_WAIT_S = sources.GATHER_S = 0.002
     {"serial": serial_ports, "i2c": i2c_buses, "iio": iio_devices}[sys.argv.pop(1)]()
     try:
         main.run()
