@@ -106,10 +106,12 @@ def _rough(sections: RoadTable) -> Html:
              f"{sections.length_m[one]:.0f}", str(sections.cars[one]), f"{sections.passes[one]:.0f}",
              f"{utc(int(sections.last_us[one])):%Y-%m-%d}", sections.visit[one].replace("|", ", ")) for one in order]
     heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")
+    none = ("No section gives a reason." if np.isfinite(sections.iri_std_m_per_km).any() else
+            "Too few drives to be certain of any section.")
     return section("To visit", grid(heads, rows, words=(0, 5, 6)) + hint(
         "Sections of 0.1 mi, one direction each. Rough: above 170 in/mi with 95 % certainty; worse: its change is "
         "significant; uncomfortable: 0.8 m/s² and more. Cars and passes: the fewest cars and the mean passes of its "
-        "segments.")) if rows else section("To visit", Html('<p class="empty">No section gives a reason.</p>'))
+        "segments.")) if rows else section("To visit", html('<p class="empty">{}</p>', none))
 
 
 def _worse(sections: RoadTable) -> Html:

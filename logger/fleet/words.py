@@ -90,7 +90,8 @@ def _cars(figures: FleetFigures) -> list[str]:
     bias, std = biases.gain - 1.0, biases.gain * biases.log_std
     if not isfinite(biases.pass_std):
         more = len(figures.names) - _SHOWN_CARS
-        return [f"Cars: {', '.join(figures.names[:_SHOWN_CARS])}" + f" and {more} more (--json has all)" * (more > 0)]
+        return [f"Cars: {', '.join(sorted(figures.names)[:_SHOWN_CARS])}"
+                + f" and {more} more (--json has all)" * (more > 0)]
     if not biases.known.any():
         return ["No road has passes of two cars: nothing is known of their biases"]
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
