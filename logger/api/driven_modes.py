@@ -10,7 +10,7 @@ import numpy.typing as npt
 from logger.api.drives import read_run
 from logger.api.ranges import SPEED
 from logger.api.vehicles import model_of
-from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
+from logger.api.vibration_records import Channels, Found, Question, name_of, read_channels
 from logger.errors import BadInput
 from logger.runs import READING, SKIP_S
 from logger.store.formats.channel_file import SPEED as SPEED_COLUMN
@@ -20,7 +20,8 @@ from logger.store.formats.record_file import VERTICAL
 
 Array = npt.NDArray[np.float64]
 
-_UNUSED = ("order", "response", "input_column", "segments")
+METHOD = "vehicle"
+_UNUSED = ("order", "response", "input_column")
 
 
 def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Found:
@@ -35,7 +36,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Fou
     for option in _UNUSED:
         if getattr(question, option) is not None:
             raise question.wrong(option, f": expected a record without {question.said('vehicle')}")
-    if question.method != USUAL_METHOD:
+    if question.method is not None:
         raise question.wrong("method", f" {question.method}: expected none with {question.said('vehicle')}, whose "
                                        "numbers are fitted to the spectrum")
     name, start_s, rate_hz, samples, speed_mps, usable = _record(given, question)
@@ -51,7 +52,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Fou
         found = car_modes(model.vehicle, samples[inside], speed_mps[inside], usable[inside], rate_hz)
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
-    return Found(found, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
+    return Found(found, METHOD, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
 
 
 def _record(given: ChannelRecord | Path | str, question: Question

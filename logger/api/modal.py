@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, DECREMENT, IRI, MODAL_METHODS, RESPONSES, SPECTRUM, SPEED
+from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, MODAL_METHODS, MODAL_METHODS_GONE, RESPONSES, SPEED
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
-from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
+from logger.api.vibration_records import Channels, Found, Question, name_of, read_channels
 from logger.errors import BadInput
 from logger.store.formats import channel_file
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_SEGMENTS = 8
+_ONLY_DECAYS = ("era", "decrement")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,9 +64,9 @@ class Modes(CommandResult):
 
 
 def modes(
-    record: Channels | Path | str, method: str = USUAL_METHOD, *, columns: Sequence[str] | None = None,
+    record: Channels | Path | str, method: str | None = None, *, columns: Sequence[str] | None = None,
     input_column: str | None = None, order: int | None = None, response: str | None = None,
-    from_s: float | None = None, to_s: float | None = None, segments: int | None = None,
+    from_s: float | None = None, to_s: float | None = None,
     vehicle: Model | Path | str | None = None, speed_mps: float | None = None,
 ) -> Modes:
     """Natural frequencies, damping ratios and mode shapes of a free decay or of a response to random forces, each with
@@ -78,14 +78,13 @@ def modes(
 
     record          100 samples or more; or its CSV file, as ``read_channels``; with a vehicle a drive or its folder, as
                     ``read_run``, or a record of one sensor with ``speed_mps``
-    method          era, for a free decay; ssi, ssi-cov, ar, for a random response; n4sid, arx, armax, beside a measured
-                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode; none with a vehicle
+    method          era, for a free decay; ssi, for a random response; n4sid, beside a measured input; None: as the
+                    record is; decrement (Eq 5.2 of Blum 2015), for one mode of a free decay; none with a vehicle
     columns         of the sensors; None: all but the input
-    input_column    of a force or motion that was measured, for n4sid, arx and armax
-    order           states of the model (lags for ar, arx and armax), 2 or more; None: chosen by rule
+    input_column    of a force or motion that was measured, for n4sid
+    order           states of the model, 2 or more; None: chosen by rule
     response        "decay" or "random"; None: the record is looked at
     from_s, to_s    stretch to be looked at [s]; None: as long as the record
-    segments        of an fft; None: 8
     vehicle         that was driven, as in ``read_vehicle``; its wheelbase, contact patch and sensor's place are held
     speed_mps       of a record that does not say it
 
@@ -99,7 +98,7 @@ def modes(
     >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
     ([1.5], [0.02])
     """
-    question = Question(method, columns, input_column, order, response, from_s, to_s, segments, vehicle, speed_mps)
+    question = Question(method, columns, input_column, order, response, from_s, to_s, vehicle, speed_mps)
     return modes_by(question, found_modes(record, question),
                     "record" if isinstance(record, Channels) else Path(record).name)
 
@@ -114,7 +113,7 @@ def modes_by(question: Question, found: Found, name: str) -> Modes:
         np.array([getattr(one, column) for one in many], dtype=np.float64)
         for column in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"))
     return Modes(
-        "\n".join(lines(result, kept, name)), as_json(result, kept, question.method), kept.names, frequency_hz,
+        "\n".join(lines(result, kept, name)), as_json(result, kept, found.method), kept.names, frequency_hz,
         frequency_std_hz, damping_ratio, damping_std,
         np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
@@ -185,7 +184,7 @@ def found_modes(given: channel_file.ChannelRecord | Path | str, question: Questi
     _check_stands(given, question)
     record, inputs = _asked(given, question)
     try:
-        return Found(_find(question, record, inputs), record)
+        return Found(*_find(question, record, inputs), record)
     except ValueError as error:
         raise BadInput(f"{name_of(given)}: {error}") from None
 
@@ -203,26 +202,23 @@ def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Ques
 
 def _check(question: Question) -> None:
     """BadInput for an option that the method has no use for, or does not know."""
-    from logger.modal.analysis import NEED_INPUT, TAKE_INPUT
-
     method, said = question.method, question.said("method")
-    for option, word, known in (("method", method, MODAL_METHODS), ("response", question.response, (None, *RESPONSES))):
+    if method in MODAL_METHODS_GONE:
+        raise question.wrong("method", f" {method}: no longer offered, it missed or made up modes: expected {said} "
+                                       f"{MODAL_METHODS_GONE[method]}"
+                                       + (f" with {question.said('input_column')}" if "x" in method else ""))
+    for option, word, known in (("method", method, (None, *MODAL_METHODS)),
+                                ("response", question.response, (None, *RESPONSES))):
         if word not in known:
             raise question.wrong(option, f" {word}: expected one of {', '.join(filter(None, known))}")
-    if method in (SPECTRUM, DECREMENT):
-        for option in ("order", "response"):
-            if getattr(question, option) is not None:
-                raise question.wrong(option, f": expected a method with poles, not {said} {method}")
-    if question.segments is not None and method != SPECTRUM:
-        raise question.wrong("segments", f": expected {said} {SPECTRUM} with it, found {method}")
-    if question.response is not None and question.input_column is not None:
-        raise question.wrong("response", f": expected no {question.said('input_column')}, which says what moves the "
-                                         "structure")
-    if question.input_column is not None and method not in TAKE_INPUT:
-        raise question.wrong("input_column", f": expected {said} {', '.join(TAKE_INPUT[:-1])} or {TAKE_INPUT[-1]} with "
-                                             f"it, found {method}")
-    if question.input_column is None and method in NEED_INPUT:
-        raise question.wrong("method", f" {method}: expected {question.said('input_column')} COLUMN with it")
+    if method == "decrement" and question.order is not None:
+        raise question.wrong("order", f": expected a method with poles, not {said} {method}")
+    if question.input_column is not None:
+        if question.response is not None:
+            raise question.wrong("response", f": expected no {question.said('input_column')}, which says what moves "
+                                             "the structure")
+        if method not in (None, "n4sid"):
+            raise question.wrong("input_column", f": expected {said} n4sid with it, found {method}")
 
 
 def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -> tuple[Channels, Array | None]:
@@ -265,20 +261,23 @@ def _picked(given: channel_file.ChannelRecord, wanted: Sequence[str]) -> Channel
                     given.samples[:, places])
 
 
-def _find(question: Question, record: Channels, inputs: Array | None) -> ModalResult:
-    """ValueError for a record that is too short, or an order that it cannot carry."""
-    from logger.modal.analysis import find_modes
+def _find(question: Question, record: Channels, inputs: Array | None) -> tuple[ModalResult, str]:
+    """What was found, and by which method. ValueError for a record that is too short or of another kind, an order that
+    it cannot carry, or an input that shows nothing."""
+    from logger.modal.analysis import decays, find_modes
     from logger.modal.decrement import decrement_mode
-    from logger.modal.spectral_peaks import peak_modes
 
-    if question.method == SPECTRUM:
-        return peak_modes(record.samples, record.rate_hz, _SEGMENTS if question.segments is None else question.segments)
-    if question.method == DECREMENT:
+    method, said = question.method, question.said("method")
+    decay = inputs is None and (decays(record.samples) if question.response is None else question.response == "decay")
+    if method in _ONLY_DECAYS and not decay:
+        raise ValueError(f"expected a free decay for {said} {method}, found a motion that goes on: {said} ssi finds its "
+                         f"modes; {question.said('response')} decay if it is a decay")
+    if method == "decrement":
         if len(record.names) > 1:
             raise ValueError(f"expected one column for the decrement ({question.said('columns')}), found "
                              f"{','.join(record.names)}")
-        return decrement_mode(record.samples[:, 0], record.rate_hz)
+        return decrement_mode(record.samples[:, 0], record.rate_hz), method
     if question.order is not None and question.order < 2:
         raise ValueError(f"expected an order of 2 or more, found {question.order}")
-    decay = None if question.response is None else question.response == "decay"
-    return find_modes(record.samples, record.rate_hz, question.method, inputs, question.order, decay)
+    found = find_modes(record.samples, record.rate_hz, inputs, question.order, decay)
+    return found, "era" if decay else "ssi" if inputs is None else "n4sid"

@@ -39,12 +39,12 @@ MOST_ROAD_SAMPLES = 20_000_000
 TRIES, WAVINESS = Range(0, 1000), Range(1.0, 3.5)
 """Of an identification: further starts, waviness of a road that was not measured."""
 NOISE_MODELS = ("auto", "white", "ar", "road")
-SPECTRUM, DECREMENT = "fft", "decrement"
-MODAL_METHODS = ("era", "ssi", "ssi-cov", "n4sid", "ar", "arx", "armax", SPECTRUM, DECREMENT)
+MODAL_METHODS = ("era", "ssi", "n4sid", "decrement")
+MODAL_METHODS_GONE = {"ar": "ssi", "ssi-cov": "ssi", "fft": "ssi", "arx": "n4sid", "armax": "n4sid"}
+"""Of modes: the methods, and for those that are no longer offered the one to use."""
 RESPONSES = ("decay", "random")
 COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
 """Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
-"""Of modes: the methods, of which the last two know no poles, and what a record may be."""
 PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
 LOW_PASS = Range(1.0, 45.0, "Hz")
 """Of a calibration: people more in the car, times the body's mass, and the recorder's low pass."""

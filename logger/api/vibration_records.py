@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.modal.mode import ModalResult
 
-USUAL_METHOD = "ssi"
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Channels(channel_file.ChannelRecord, Shown):
     """A record of c sensors, evenly sampled.
@@ -85,14 +82,13 @@ class Question:
     said         how an option is written in a complaint
     """
 
-    method: str = USUAL_METHOD
+    method: str | None = None
     columns: Sequence[str] | None = None
     input_column: str | None = None
     order: int | None = None
     response: str | None = None
     from_s: float | None = None
     to_s: float | None = None
-    segments: int | None = None
     vehicle: Model | Path | str | None = None
     speed_mps: float | None = None
     said: Callable[[str], str] = str
@@ -104,9 +100,10 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What was found; ``record``: of the sensors alone, the stretch that was looked at."""
+    """What was found, by which method; ``record``: of the sensors alone, the stretch that was looked at."""
 
     result: ModalResult
+    method: str
     record: Channels
 
 

@@ -23,16 +23,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.ranges import (
-    COMMON_IRI,
-    COMMON_SPEED_MPS,
-    DECREMENT,
-    IRI,
-    MODAL_METHODS,
-    RESPONSES,
-    SPECTRUM,
-    SPEED,
-)
+from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, MODAL_METHODS, RESPONSES, SPEED
 from logger.commands.numbers import add_number
 from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
@@ -54,21 +45,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--speed", *SPEED, metavar="MPS",
                help=f"with --vehicle: speed on it (default: {COMMON_SPEED_MPS:g}); with a FILE: at which it was "
                     "driven, if it does not say so")
-    parser.add_argument("--method", choices=MODAL_METHODS, metavar="NAME",
-                        help=f"{', '.join(MODAL_METHODS)} (default: ssi). era suits a free decay, ssi a random "
-                             "response, n4sid a measured input; decrement is Eq 5.2, for one mode")
+    parser.add_argument("--method", metavar="NAME",
+                        help=f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid "
+                             "beside a measured input (default: as the record is); decrement is Eq 5.2, for one mode "
+                             "of a free decay")
     parser.add_argument("--columns", metavar="A,B,...",
                         help="columns of the sensors (default: all but t_s, the input, and a drive's speed, distance "
                              "and place)")
-    parser.add_argument("--input", metavar="COLUMN", help="column of the measured input, for n4sid, arx and armax")
+    parser.add_argument("--input", metavar="COLUMN", help="column of the measured input")
     parser.add_argument("--order", type=int, metavar="N",
-                        help="states of the model (lags for ar, arx and armax; for a free decay the most that are "
-                             "tried) instead of the order chosen by rule")
+                        help="states of the model (for a free decay the most that are tried) instead of the order "
+                             "chosen by rule")
     parser.add_argument("--response", choices=RESPONSES, metavar="KIND",
                         help="decay or random; without it the record is looked at")
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="leave out what is before this t_s [s]")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="leave out what is after this t_s [s]")
-    parser.add_argument("--segments", type=int, metavar="N", help="even segments for fft (default: 8)")
     parser.add_argument("--diagram", type=Path, metavar="FILE.csv",
                         help="write the poles of all orders, for a stabilisation diagram")
     parser.add_argument("--example", choices=EXAMPLES, metavar="NAME",
@@ -80,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog modes``."""
     from logger.api.modal import found_modes, modes_by
-    from logger.api.vibration_records import USUAL_METHOD, Question
+    from logger.api.vibration_records import Question
 
     if args.vehicle is not None and args.file is None:
         return _of_vehicle(args)
@@ -94,12 +85,11 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DONE
     if args.file is None:
         raise BadInput("modes: expected a FILE (try 'ridelog modes --help')")
-    method = args.method or USUAL_METHOD
-    if args.diagram is not None and (method in (SPECTRUM, DECREMENT) or args.vehicle is not None):
+    if args.diagram is not None and (args.method == "decrement" or args.vehicle is not None):
         raise BadInput("--diagram: expected a method with poles, not "
-                       + (f"--method {method}" if args.vehicle is None else "--vehicle"))
+                       + (f"--method {args.method}" if args.vehicle is None else "--vehicle"))
     columns = None if args.columns is None else [name.strip() for name in args.columns.split(",")]
-    question = Question(method, columns, args.input, args.order, args.response, args.from_s, args.to_s, args.segments,
+    question = Question(args.method, columns, args.input, args.order, args.response, args.from_s, args.to_s,
                         args.vehicle, args.speed, _option)
     check_picture(args.out, [args.file] + ([] if args.diagram is None else [args.diagram]))
     found = modes_by(question, found_modes(args.file, question), args.file.name)
@@ -138,7 +128,7 @@ def _check_alone(args: argparse.Namespace, said: str) -> None:
     if args.file is not None:
         raise BadInput(f"{said}: expected no FILE with it, found {args.file}")
     given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
-             "--response": args.response, "--from": args.from_s, "--to": args.to_s, "--segments": args.segments,
+             "--response": args.response, "--from": args.from_s, "--to": args.to_s,
              "--diagram": args.diagram, "--out": args.out}
     if options := [option for option, value in given.items() if value is not None]:
         raise BadInput(f"{options[0]}: expected a FILE with it, not {said}")

@@ -4,10 +4,10 @@ Problem: a model of order 20 has ten poles, and a structure that shows five mode
 all orders and pick by eye the ones that stay.
 
 Solution, in words that are printed with the result: the order is where a further state stops paying for itself
-(Schwarz's criterion on the one-step errors). A pole of that order is a mode when it swings, when its frequency and
-damping come with errors small enough to mean something, and when models of the next orders have it too, within those
-errors or a third of half its width. Where the damping is known to a sixth of itself it needs no such witness: larger
-models split what is heavily damped, and a pole that chance made has no damping that is known so well.
+(Schwarz's criterion on the one-step errors). A pole of that order is a mode when it swings, when its place is known to
+within its half bandwidth and what the record resolves, and when models of the next orders have it within that resonance. What is
+less certain has to show more, not less: its standard errors count how far it moves from order to order. What is known
+to a sixth of its half bandwidth needs no such witness: larger models split what is heavily damped.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from logger.modal.mode import (
 )
 
 _NEIGHBOURS, _MUST_HAVE_IT = 4, 3
-_SAME_SD, _SAME_SHARE, _SAME_WIDTH = 3.0, 0.01, 0.3  # standard deviations; of its frequency; of half its width
 _KNOWN_WELL = 6.0
 _MOST_DAMPING = 0.9
 LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
@@ -47,26 +46,28 @@ def generous_size(misfit: Array, count: int, parameters_per_step: int) -> int:
     return int((count * misfit + 2 * parameters_per_step * np.arange(len(misfit))).argmin())
 
 
-def judge(
-    found: OrderPoles, covariance: Array, larger: list[OrderPoles], scale: Array, peaks: npt.NDArray[np.bool_],
-) -> tuple[list[FoundMode], list[Rejected]]:
+def judge(found: OrderPoles, covariance: Array, larger: list[OrderPoles], scale: Array, duration_s: float
+          ) -> tuple[list[FoundMode], list[Rejected]]:
     """Modes and rejected poles of the chosen model.
 
     covariance    (n, 2, 2) of Re s, Im s of each pole [rad/s]
     larger        the models of the next orders
     scale         (channels,) what the channels were divided by
-    peaks         (n,) whether each pole has a peak to show, where the method has poles that do not
+    duration_s    of the record: it resolves no less than 1 / duration
     """
     modes: list[FoundMode] = []
     rejected: list[Rejected] = []
     for k, pole in enumerate(found.poles):
+        is_known_well = _KNOWN_WELL**2 * np.trace(covariance[k]) < pole.real**2
+        near = [] if is_known_well else larger[:_NEIGHBOURS]
+        moves = _moves(complex(pole), near)
+        both = covariance[k] + (np.outer(middle := moves[len(moves) // 2], middle) if len(moves) else 0.0)
         frequency, ratio = float(frequency_hz(pole)), float(damping_ratio(pole))
-        frequency_std, damping_std = errors_of(complex(pole), covariance[k])
-        reason = "" if peaks[k] else "no peak of its own: it shapes the floor between the peaks"
-        reason = reason or _why_not(frequency, ratio, frequency_std, damping_std)
-        if ratio < _KNOWN_WELL * damping_std:
-            reason = reason or _comes_and_goes(found, k, covariance, larger)
-        if reason:
+        frequency_std, damping_std = errors_of(complex(pole), both)
+        width = abs(pole.real) + 2 * np.pi / duration_s
+        reason = _why_not(complex(pole), frequency_std, damping_std, moves, len(near))
+        if reason or np.trace(both) > width**2:
+            reason = reason or "its place is known less well than its resonance is wide"
             rejected.append(Rejected(frequency, ratio, reason))
         else:
             shape = normalised(found.shapes[:, k] * scale)
@@ -74,27 +75,27 @@ def judge(
     return modes, rejected
 
 
-def _why_not(frequency_hz: float, ratio: float, frequency_std_hz: float, damping_std: float) -> str:
-    if not np.isfinite(frequency_std_hz):
-        return "parts of the record do not have it"
-    if ratio <= 0:
-        return "it grows instead of decaying"
-    if ratio > _MOST_DAMPING:
-        return "damped so heavily that it hardly swings"
-    if ratio < _NO_DAMPING or ratio < min(_HUM_DAMPING, 2 * damping_std):
-        return "no damping to be seen: a hum, not a mode"
-    if frequency_std_hz > LARGEST_FREQUENCY_ERROR * frequency_hz:
-        return f"its frequency is uncertain by {frequency_std_hz / frequency_hz:.0%}"
-    if damping_std > LARGEST_DAMPING_ERROR:
-        return f"its damping ratio is uncertain by {damping_std:.2f}"
-    return ""
+def _moves(pole: complex, larger: list[OrderPoles]) -> Array:
+    """How far (m, 2) [rad/s] the pole is moved in those of the larger models that have it, the nearest first.
+
+    A model has it when one of its poles lies within the half-power points of its resonance, -Re s to both sides.
+    """
+    nearest = [model.poles[np.abs(model.poles - pole).argmin()] - pole for model in larger if len(model.poles)]
+    within = sorted((move for move in nearest if abs(move) <= abs(pole.real)), key=abs)
+    return np.array([(move.real, move.imag) for move in within]).reshape(-1, 2)
 
 
-def _comes_and_goes(found: OrderPoles, k: int, covariance: Array, larger: list[OrderPoles]) -> str:
-    near = larger[:_NEIGHBOURS]
-    pole = found.poles[k]
-    reach = max(_SAME_SD * float(np.sqrt(np.trace(covariance[k]))), _SAME_SHARE * abs(pole), _SAME_WIDTH * -pole.real)
-    having = sum(bool(len(model.poles)) and bool(np.abs(model.poles - pole).min() <= reach) for model in near)
-    if having >= min(_MUST_HAVE_IT, len(near)):
-        return ""
-    return f"only {having} of the next {len(near)} orders have it"
+def _why_not(
+    pole: complex, frequency_std_hz: float, damping_std: float, moves: Array, models: int
+) -> str:
+    hz, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
+    reasons = {
+        "parts of the record do not have it": not np.isfinite(frequency_std_hz),
+        "it grows instead of decaying": ratio <= 0,
+        "damped so heavily that it hardly swings": ratio > _MOST_DAMPING,
+        "no damping to be seen: a hum, not a mode": ratio < max(_NO_DAMPING, min(_HUM_DAMPING, 2 * damping_std)),
+        f"its frequency is uncertain by {frequency_std_hz / hz:.0%}": frequency_std_hz > LARGEST_FREQUENCY_ERROR * hz,
+        f"its damping ratio is uncertain by {damping_std:.2f}": damping_std > LARGEST_DAMPING_ERROR,
+        f"only {len(moves)} of the next {models} orders have it": len(moves) < min(_MUST_HAVE_IT, models),
+    }
+    return next((reason for reason, holds in reasons.items() if holds), "")

@@ -12,8 +12,7 @@ With an input (``combined``, N4SID, Van Overschee and De Moor 1994, same weighti
 projected out first. A strong input makes the bias of a past of finite length larger than the scatter, so A is read off
 the shift of the observability there, which has no such bias.
 
-``covariance_driven`` (SSI-cov, Peeters and De Roeck 1999) decomposes the correlations instead, where the noise of the
-sensors is in lag zero only, which is left out.
+``regressive`` is the simplest of them, the regression on lagged samples alone, which shows how long the past matters.
 """
 
 from __future__ import annotations
@@ -26,7 +25,10 @@ import numpy as np
 from logger.modal.mode import Array
 from logger.modal.moments import Moments
 
-_RIDGE = 1e-11
+RIDGE = 1e-12
+"""Of the mean power of the samples: less is rounding of the computation, and is added so that its matrices have roots."""
+_RESOLVED = 30.0
+"""Times that power are errors that a ridge alone makes. Records without noise would have states without end else."""
 
 
 @dataclass(frozen=True)
@@ -81,20 +83,20 @@ def combined(moments: Moments, outputs: int, horizon: int, orders: Sequence[int]
         wanted = np.hstack([g[np.ix_(now_y, past)] @ x.T, g[np.ix_(now_y, now_u)]])
         errors = g[np.ix_(now_y, now_y)] - np.linalg.solve(_ridged(known), wanted.T).T @ wanted.T
         shift = np.asarray(np.linalg.lstsq(seen[:-outputs, :n], seen[outputs:, :n], rcond=None)[0], dtype=np.float64)
-        found.append(StateSpace(shift, np.asarray(seen[:outputs, :n]), np.array([np.linalg.slogdet(errors)[1]])))
+        found.append(StateSpace(shift, np.asarray(seen[:outputs, :n]), _log_det(errors)[None]))
     return found
 
 
-def covariance_driven(correlations: Array, orders: Sequence[int]) -> list[StateSpace]:
-    """SSI-cov, from correlations (lags from 1, channels, references), by the observability's shift."""
-    lags, p, _ = correlations.shape
-    rows = (lags + 1) // 2
-    blocks = correlations[np.arange(rows)[:, None] + np.arange(lags + 1 - rows)]
-    whole = blocks.transpose(0, 2, 1, 3).reshape(rows * p, -1)
-    left, sizes, _ = np.linalg.svd(whole, full_matrices=False)
-    seen = np.asarray(left[:, :max(orders)] * np.sqrt(sizes[:max(orders)]), dtype=np.float64)
-    shifts = [np.asarray(np.linalg.lstsq(seen[:-p, :n], seen[p:, :n], rcond=None)[0]) for n in orders]
-    return [StateSpace(shift, seen[:p, :len(shift)], np.empty(0)) for shift in shifts]
+def regressive(moments: Moments, outputs: int, most: int) -> Array:
+    """log det of the covariance of one-step errors of the regression of the outputs on the inputs now and all channels
+    0, 1, ... most samples ago, by one decomposition; ``moments`` has most + 1 lags."""
+    g = moments.products
+    inputs = moments.channels - outputs
+    now = moments.take(range(most, most + 1), slice(outputs))
+    places = np.concatenate([moments.take(range(most, most + 1), slice(outputs, None)),
+                             moments.take(range(most - 1, -1, -1), slice(None))])
+    seen = np.linalg.solve(_root(g[np.ix_(places, places)]), g[np.ix_(places, now)])
+    return _misfit(g[np.ix_(now, now)], seen.T)[inputs::moments.channels]
 
 
 def _right_vectors(matrix: Array, most: int) -> Array:
@@ -104,15 +106,25 @@ def _right_vectors(matrix: Array, most: int) -> Array:
 
 
 def _ridged(matrix: Array) -> Array:
-    return np.asarray(matrix + _RIDGE * np.trace(matrix) / len(matrix) * np.eye(len(matrix)), dtype=np.float64)
+    return np.asarray(matrix + RIDGE * np.trace(matrix) / len(matrix) * np.eye(len(matrix)), dtype=np.float64)
 
 
 def _root(matrix: Array) -> Array:
-    return np.asarray(np.linalg.cholesky(_ridged(matrix)), dtype=np.float64)
+    """Lower; of a matrix that rounding made indefinite, with as much on its diagonal as it takes."""
+    more = 0.0
+    while True:
+        try:
+            return np.asarray(np.linalg.cholesky(_ridged(matrix) + more * np.eye(len(matrix))), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            more = 10 * more + RIDGE * float(np.trace(matrix)) / len(matrix)
 
 
 def _misfit(power: Array, observe: Array) -> Array:
     """log det of the outputs' covariance less what the first 0, 1, ... n states explain."""
     explained = np.cumsum(observe.T[:, :, None] * observe.T[:, None, :], axis=0)
-    errors = power - np.concatenate([np.zeros((1, *power.shape)), explained])
-    return np.asarray(np.linalg.slogdet(errors)[1])
+    return _log_det(power - np.concatenate([np.zeros((1, *power.shape)), explained]))
+
+
+def _log_det(errors: Array) -> Array:
+    """Of covariances (..., n, n), of which no direction has less than what a computation resolves."""
+    return np.asarray(np.log(np.maximum(np.linalg.eigvalsh(errors), _RESOLVED * RIDGE)).sum(axis=-1))

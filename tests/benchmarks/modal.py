@@ -109,7 +109,7 @@ def five_modes(figures: Figures, decibel: float) -> None:
     for seed in range(TRIALS_OF_FIVE):
         samples = noisy(clean, decibel, np.random.default_rng(seed))
         started_s = time.process_time()
-        found = find_modes(samples, RATE_HZ, "era").modes
+        found = find_modes(samples, RATE_HZ).modes
         taken.append(time.process_time() - started_s)
         near = [[mode for mode in found if abs(mode.frequency_hz / hz(pole) - 1) < NEAR] for pole in true]
         extra += len(found) - sum(map(bool, near))
@@ -141,8 +141,8 @@ def noise_alone(figures: Figures) -> None:
     found = 0
     for seed in range(40):
         samples = np.random.default_rng(seed).standard_normal((4000, 3))
-        found += len(find_modes(samples, RATE_HZ, "ssi").modes)
-        found += len(find_modes(samples, RATE_HZ, "era", decay=True).modes)
+        found += len(find_modes(samples, RATE_HZ).modes)
+        found += len(find_modes(samples, RATE_HZ, decay=True).modes)
     figures.at_most("modes found in 80 records of noise", found, 1, "")
 
 
@@ -155,7 +155,7 @@ def one_mode(figures: Figures) -> None:
         for seed in range(TRIALS_OF_ONE):
             rng = np.random.default_rng(seed)
             samples = noisy(random_response(masses, rng.standard_normal((240 * round(RATE_HZ), 1)), RATE_HZ), 20, rng)
-            mode = match(masses.poles()[0], find_modes(samples, RATE_HZ, "ssi", decay=False).modes)[0]
+            mode = match(masses.poles()[0], find_modes(samples, RATE_HZ, decay=False).modes)[0]
             missed += mode is None
             if mode is not None:
                 here.append((abs(mode.frequency_hz - ONE_HZ) < 2 * mode.frequency_std_hz,
@@ -179,7 +179,7 @@ def compare(figures: Figures, case: Case, kind: str, method: str, decibel: float
     for seed in range(TRIALS):
         samples = record(case, kind, decibel, seed)
         started_s = time.process_time()
-        found = find_modes(samples, RATE_HZ, method, decay=kind == "decay").modes
+        found = find_modes(samples, RATE_HZ, decay=kind == "decay").modes
         taken.append(time.process_time() - started_s)
         matched = match(true, found)
         missed += sum(mode is None for mode in matched)

@@ -60,10 +60,9 @@ def test_a_table_for_a_person(decay: Path, tmp_path: Path, capsys: pytest.Captur
     assert diagram.read_text().splitlines()[0] == "order,frequency_hz,damping_ratio"
 
 
-def test_decrement_and_fft(decay: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_decrement(decay: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = as_json(capsys, decay, "--method", "decrement", "--columns", "top")["modes"]
     assert found[0]["damping_ratio"] == pytest.approx(0.02, abs=4 * found[0]["damping_std"])
-    assert as_json(capsys, decay, "--method", "fft", "--segments", "4")["method"] == "fft"
 
 
 def test_noise_has_no_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -99,8 +98,11 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
     ([], "expected a FILE"),
-    (["FILE", "--method", "arx"], "expected --input COLUMN"),
-    (["FILE", "--input", "top"], "expected --method n4sid, arx or armax with it, found ssi"),
+    (["FILE", "--method", "arx"], "no longer offered.*expected --method n4sid with --input"),
+    (["FILE", "--method", "fft"], "no longer offered.*expected --method ssi$"),
+    (["FILE", "--method", "prony"], "--method prony: expected one of era, ssi, n4sid, decrement"),
+    (["FILE", "--input", "top", "--method", "era"], "expected --method n4sid with it, found era"),
+    (["FILE", "--method", "era", "--response", "random"], "expected a free decay for --method era"),
     (["FILE", "--method", "n4sid", "--input", "none"], "expected a column none, found top,middle"),
     (["FILE", "--columns", "top,side"], "csv:1: expected a header with t_s,top,side"),
     (["FILE", "--columns", "top", "--method", "n4sid", "--input", "top"], "the input not among them"),
@@ -110,15 +112,11 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
     (["FILE", "--from", "8", "--to", "2"], "expected --from before --to"),
     (["FILE", "--to", "0.5"], "expected at least 100 samples, found 51"),
     (["FILE", "--method", "decrement"], "expected one column"),
-    (["FILE", "--method", "fft", "--segments", "100"], "found 100 of 10"),
-    (["FILE", "--method", "fft", "--segments", "0"], "expected 4 segments or more"),
-    (["FILE", "--method", "fft", "--order", "4"], "--order: expected a method with poles, not --method fft"),
-    (["FILE", "--method", "decrement", "--response", "decay"], "--response: expected a method with poles"),
-    (["FILE", "--segments", "4"], "--segments: expected --method fft with it, found ssi"),
+    (["FILE", "--method", "decrement", "--order", "4"], "--order: expected a method with poles"),
     (["FILE", "--method", "n4sid", "--input", "top", "--response", "random"], "--response: expected no --input"),
     (["FILE", "--order", "0"], "expected an order of 2 or more"),
     (["FILE", "--example", "five-storey"], "expected no FILE"),
-    (["--example", "five-storey", "--method", "ar"], "--method: expected a FILE with it, not --example five-storey"),
+    (["--example", "five-storey", "--method", "ssi"], "--method: expected a FILE with it, not --example five-storey"),
     (["--example", "five-storey", "--from", "0"], "--from: expected a FILE with it"),
 ])
 def test_wrong_use(decay: Path, arguments: list[str], complaint: str) -> None:

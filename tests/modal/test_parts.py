@@ -10,8 +10,8 @@ from logger.modal import five_storey
 from logger.modal.decrement import damping_of_two_peaks, log_decrement
 from logger.modal.mode import errors_of, mac
 from logger.modal.moments import segment_products
-from logger.modal.spectral_peaks import peak_modes
-from logger.modal.structure_response import chain, free_decay, random_response, with_damping_ratios
+from logger.modal.spectral_peaks import summed_spectrum
+from logger.modal.structure_response import chain, free_decay, with_damping_ratios
 
 
 def test_moments_are_the_products_of_lagged_samples() -> None:
@@ -71,17 +71,14 @@ def test_decrement_of_a_clean_and_a_noisy_wave() -> None:
         log_decrement(np.exp(-t_s), 100.0)
 
 
-def test_peaks_of_a_spectrum() -> None:
-    masses = with_damping_ratios(np.eye(2), np.array([[2000.0, -1000.0], [-1000.0, 5000.0]]), np.array([0.03, 0.03]))
-    force = np.random.default_rng(3).standard_normal((240_000, 2))
-    result = peak_modes(random_response(masses, force, 100.0), 100.0, 40)
-    true = masses.poles()[0]
-    assert len(result.modes) == 2
-    for mode, pole in zip(result.modes, true, strict=True):
-        assert mode.frequency_hz == pytest.approx(abs(pole) / (2 * np.pi), rel=0.02)
-    assert peak_modes(np.random.default_rng(4).standard_normal((20_000, 2)), 100.0).modes == ()
+def test_a_summed_spectrum_has_the_power_of_the_record() -> None:
+    samples = np.random.default_rng(4).standard_normal((20_000, 2))
+    power, step_hz = summed_spectrum(samples, 100.0, 8)
+    assert step_hz == pytest.approx(0.04)
+    # Hann's window keeps 3/8 of the power; half the bins lie below zero.
+    assert 2 * power.sum(axis=1).mean() / 2500**2 == pytest.approx(2 * 3 / 8, rel=0.03)
     with pytest.raises(ValueError, match="found 8 of 12"):
-        peak_modes(np.ones((100, 1)), 100.0)
+        summed_spectrum(np.ones((100, 1)), 100.0, 8)
 
 
 def test_the_building_against_what_is_printed() -> None:

@@ -63,10 +63,10 @@ def run(effort: Effort) -> Result:
 
 def _line(number: int) -> Line:
     reading = recorded(released(structure())[:, 4], SENSORS[number], 1 + number)
-    found = summed_spectrum(reading[:, None], RATE_HZ, _SEGMENTS)
-    power = found.power.mean(axis=0)
-    shown = slice(1, int(_HIGHEST_HZ / found.step_hz))
-    return Line(SENSORS[number].name, np.asarray(found.step_hz * np.arange(len(power)), float)[shown],
+    powers, step_hz = summed_spectrum(reading[:, None], RATE_HZ, _SEGMENTS)
+    power = powers.mean(axis=0)
+    shown = slice(1, int(_HIGHEST_HZ / step_hz))
+    return Line(SENSORS[number].name, np.asarray(step_hz * np.arange(len(power)), float)[shown],
                 power[shown])
 
 

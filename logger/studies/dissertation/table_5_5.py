@@ -75,9 +75,9 @@ def _record(surface: str, kmh: float, iri: float, seed: int) -> Array:
 
 def _spectrum(accel: Array) -> tuple[Array, Array]:
     """Frequencies [Hz] and power of the even segments of a record, summed; without the mean."""
-    found = summed_spectrum(accel[:, None], RATE_HZ, int(len(accel) / RATE_HZ / _SEGMENT_S))
-    power = found.power.mean(axis=0)
-    return np.asarray(found.step_hz * np.arange(1, len(power)), float), power[1:]
+    powers, step_hz = summed_spectrum(accel[:, None], RATE_HZ, int(len(accel) / RATE_HZ / _SEGMENT_S))
+    power = powers.mean(axis=0)
+    return np.asarray(step_hz * np.arange(1, len(power)), float), power[1:]
 
 
 def _row(printed: tuple[str, float, float, float, float], iri: float, accel: Array) -> tuple[Cell, ...]:

@@ -25,7 +25,7 @@ def run(effort: Effort) -> Result:
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
     missed, extra, records, count = 0, 0, [], effort.count(_RECORDS, 2)
     for seed in effort.each(range(count)):
-        found = find_modes(_record(building, seed), _RATE_HZ, "ssi").modes
+        found = find_modes(_record(building, seed), _RATE_HZ).modes
         near = [[mode for mode in found if abs(mode.frequency_hz / hz - 1) < _NEAR] for hz in true_hz]
         missed += sum(not one for one in near)
         extra += len(found) - sum(map(bool, near))
