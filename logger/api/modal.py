@@ -270,8 +270,8 @@ def _find(question: Question, record: Channels, inputs: Array | None) -> tuple[M
     method, said = question.method, question.said("method")
     decay = inputs is None and (decays(record.samples) if question.response is None else question.response == "decay")
     if method in _ONLY_DECAYS and not decay:
-        raise ValueError(f"expected a free decay for {said} {method}, found a motion that goes on: {said} ssi finds its "
-                         f"modes; {question.said('response')} decay if it is a decay")
+        raise ValueError(f"expected a free decay for {said} {method}, found a motion that goes on: {said} ssi finds "
+                         f"its modes; {question.said('response')} decay if it is a decay")
     if method == "decrement":
         if len(record.names) > 1:
             raise ValueError(f"expected one column for the decrement ({question.said('columns')}), found "

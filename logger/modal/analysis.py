@@ -36,8 +36,8 @@ SHORTEST = 100  # samples
 
 _SEGMENTS = 30
 _LEAST_PAST, _MOST_PAST = 60, 300
-"""Lags of the past that a state is made of, at most so many samples in all. Measured: with 20 ssi misses 25 of 234 modes
-and reports one that is not there, with 60 it misses 21 and with all that there are 29."""
+"""Lags of the past that a state is made of, at most so many samples in all. Measured: with 20 ssi misses 25 of 234
+modes and reports one that is not there, with 60 it misses 21 and with all that there are 29."""
 _MOST_STATES = 40
 _BEYOND = 8  # states beyond the chosen order, for the stabilisation diagram
 _DECAY_RATIO = 3.0

@@ -5,15 +5,14 @@ all orders and pick by eye the ones that stay.
 
 Solution, in words that are printed with the result: the order is where a further state stops paying for itself
 (Schwarz's criterion on the one-step errors). A pole of that order is a mode when it swings, when its place is known to
-within its half bandwidth and what the record resolves, and when models of the next orders have it within that resonance. What is
-less certain has to show more, not less: its standard errors count how far it moves from order to order. What is known
-to a sixth of its half bandwidth needs no such witness: larger models split what is heavily damped.
+within its half bandwidth and what the record resolves, and when models of the next orders have it within that half
+bandwidth. What is less certain has to show more, not less: its standard errors count how far it moves from order to
+order. What is known to a sixth of its half bandwidth needs no such witness: larger models split what is heavily damped.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.modal.mode import (
     Array,

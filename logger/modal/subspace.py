@@ -28,7 +28,7 @@ from logger.modal.moments import Moments
 RIDGE = 1e-12
 """Of the mean power of the samples: less is rounding of the computation, and is added so that its matrices have roots."""
 _RESOLVED = 30.0
-"""Times that power are errors that a ridge alone makes. Records without noise would have states without end else."""
+"""Times that power are errors that a ridge alone makes. Without it, records without noise have states without end."""
 
 
 @dataclass(frozen=True)
