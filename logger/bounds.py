@@ -64,6 +64,12 @@ SIGNAL = Quantity("", 1e12, 1e-30)
 """Of any sensor, in any unit: beyond, squares lose their digits, or are lost."""
 
 
+def time_hint(rate_hz: float) -> str:
+    """What a record with too few samples a second may have instead of seconds; else nothing."""
+    likely = [unit for unit, steps in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)) if 10 <= rate_hz * steps <= 1e4]
+    return f" (t_s in {likely[0]}? Write seconds)" if likely and rate_hz < 1 else ""
+
+
 def samples_between(span: float, step: float, words: str) -> int:
     """How many steps a span has, where so many numbers are to be made. Raises BadInput, which begins with ``words``,
     for more than ``MOST_SAMPLES``."""

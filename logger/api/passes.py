@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.ranges import check_limit
 from logger.api.sections import length_of
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
@@ -113,8 +114,7 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     from logger.store.log.log_reader import find_logs_in, read_found
 
     length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
-    if not (np.isfinite(above_m_per_km) and above_m_per_km > 0):
-        raise BadInput(f"above {above_m_per_km:g} m/km: expected an IRI above 0")
+    check_limit("above_m_per_km", above_m_per_km)
     first_s = -np.inf if since is None else day_of(since, "--since")
     end_s = np.inf if until is None else day_of(until, "--until")
     split_s = None if split is None else day_of(split, "--split")

@@ -23,6 +23,16 @@ class Range(NamedTuple):
             raise BadInput(f"{name} {shown}: expected {ends}")
 
 
+def check_limit(name: str, m_per_km: float) -> None:
+    """BadInput for an IRI from which on a road is to be called rough, and that no road has; ``name``: of what it is."""
+    from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
+
+    try:
+        Range(0.01, HIGHEST_LIMIT_M_PER_KM, "m/km").check(name, m_per_km)
+    except BadInput as error:
+        raise BadInput(f"{error}{limit_hint(m_per_km)}") from None
+
+
 TOLERANCE = Range(0.001, 0.5)
 USUAL_TOLERANCE = 0.04
 """How far off a car's masses, springs and dampers may well be, as a share."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
+from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING, check_limit
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
@@ -193,14 +193,18 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     from logger.report.iri_text import as_json, lines
     from logger.report.localized_text import area_lines, area_values
     from logger.roads.localized_roughness import areas
+    from logger.roads.plausible import spacing_hint, unit_complaint
     from logger.roads.profile_iri import continuous_iri, profile_iri
     from logger.units import WINDOW_M
 
     name, road = _named(profile, resample_m)
+    if localized_m_per_km is not None:
+        check_limit("localized_m_per_km", localized_m_per_km)
     try:
         found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
     except ValueError as error:
-        raise BadInput(f"{name}: {error}") from None
+        hint = spacing_hint(road.spacing_m) or unit_complaint(road.elevation_m, road.spacing_m)
+        raise BadInput(f"{name}: {hint}" if hint.startswith("expected") else f"{name}: {error}{hint}") from None
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
@@ -267,6 +271,7 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
     from logger.roads.track_class import track_class
 
     name, road = _named(profile, resample_m)
+    profile_file.check_road(road, name)
     tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
     try:
         found = [track_class(one, road.spacing_m, road.widest_step_m) for one in tracks]
@@ -278,5 +283,6 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
 
 
 def _named(profile: Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
-    """A profile and what to call it."""
-    return ("profile", profile) if isinstance(profile, Profile) else (str(profile), read_profile(profile, resample_m))
+    """A profile and what to call it, not judged."""
+    return ("profile", profile) if isinstance(profile, Profile) else (
+        str(profile), Profile(**vars(profile_file.read_profile(profile, resample_m, judged=False))))

@@ -68,6 +68,7 @@ def check_distances(drive: Drive, file: Path) -> None:
     import numpy as np
 
     from logger.bounds import SPEED
+    from logger.roads.plausible import likely_unit
 
     distance_m = drive.distance_m
     for wrong, words in (
@@ -81,7 +82,7 @@ def check_distances(drive: Drive, file: Path) -> None:
     way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
     if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
         raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m of way "
-                       f"by the one and {way_m:.4g} m by the other")
+                       f"by the one and {way_m:.4g} m by the other ({likely_unit(by_speed_m, way_m)})")
 
 
 def driven_stretches(drive: DriveOnRoad) -> list[Run]:
@@ -197,12 +198,13 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     others, recorded nothing, or repeats samples."""
     import numpy as np
 
+    from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
     from logger.runs import READING, SKIP_S
 
     if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
         raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "
-                       f"{drive.rate_hz:.4g}")
+                       f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < LEAST_S:
         raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")

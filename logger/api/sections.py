@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.ranges import check_limit
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
 from logger.units import FOOT_M, MILE_M
@@ -109,6 +110,8 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     from logger.store.log.log_reader import find_logs_in, read_found
 
     length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
+    if localized_m_per_km is not None:
+        check_limit("localized_m_per_km", localized_m_per_km)
     if units not in SYSTEMS:
         raise BadInput(f"units {units}: expected one of {', '.join(SYSTEMS)}")
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]

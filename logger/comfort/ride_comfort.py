@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import time_hint
 from logger.comfort.iso2631 import AxisFigures, axis_figures
 from logger.dsp.weightings.weighting import Weighting
 
@@ -83,7 +84,8 @@ def ride_comfort(
     assert vertical is not None
     duration_s = len(vertical) / rate_hz
     if rate_hz < LOWEST_RATE_HZ * (1.0 - _RATE_ROUNDING):
-        raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}")
+        raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
+                         f"{time_hint(rate_hz)}")
     if taken_hz is not None and taken_hz < LEAST_TAKEN_HZ:
         raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
     if duration_s < SHORTEST_S:

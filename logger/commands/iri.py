@@ -10,7 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_limit
 from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
 
@@ -27,8 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resample", type=float, metavar="M",
                         help="for an unevenly spaced profile: lay straight lines between its samples and take a "
                              "sample every M metres; this changes the IRI, and the result says that it was done")
-    add_number(parser, "--localized", 0.01, 1000.0, "m/km", metavar="M_PER_KM",
-               help="list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)")
+    add_limit(parser, "--localized", metavar="IRI",
+              help="list where the IRI over 25 ft, which slides along, is above this, in m/km, or as 160in/mi (AASHTO "
+                   "R 54)")
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 

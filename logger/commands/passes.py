@@ -18,7 +18,7 @@ from pathlib import Path
 
 from logger.api.outputs import check_out
 from logger.api.passes import ROUGH_M_PER_KM, USUAL
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_limit
 from logger.commands.pictures import PAGE, parted, write_picture
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
@@ -34,8 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", metavar="DAY", help="rows before this day (UTC)")
     parser.add_argument("--split", metavar="DAY",
                         help="what changed between the drives before this day and those from it on")
-    add_number(parser, "--above", 0.01, 100.0, "m/km", metavar="M_PER_KM", default=ROUGH_M_PER_KM,
-               help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490.313)")
+    add_limit(parser, "--above", metavar="IRI", default=ROUGH_M_PER_KM,
+              help=f"from which IRI [m/km, or as 160in/mi] a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, "
+                   "poor by 23 CFR 490.313)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
                         help=f"write the means as {table_endings()}, or a page with map and curves (.html) or picture "
                              "(.png .svg .pdf); once for each")

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from logger.api.outputs import check_out
 from logger.api.sections import SYSTEMS
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_limit
 from logger.commands.pictures import parted, write_picture
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
@@ -36,8 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: {_USUAL})")
     parser.add_argument("--route", metavar="LINE.geojson", type=Path,
                         help="count by the measures of this line, along and against it")
-    add_number(parser, "--localized", 0.01, 1000.0, "m/km", metavar="M_PER_KM",
-               help="list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)")
+    add_limit(parser, "--localized", metavar="IRI",
+              help="list where the IRI over 25 ft, which slides along, is above this, in m/km, or as 160in/mi (AASHTO "
+                   "R 54)")
     parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
                         help=f"write the sections as {table_endings()} (in SI units), or a page or picture of them "

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import time_hint
 from logger.estimation.batch import (
     Windows,
     estimated,
@@ -32,6 +33,7 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
+from logger.roads.plausible import likely_unit
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import known_car
@@ -79,7 +81,8 @@ def estimable(
     """A drive of samples (n,) at an even rate, made ready. ``Unusable`` for one too slow, for a distance that jumps
     (faster than ``fastest_mps``) or goes back farther than a correction, and for a speed that does not go with it."""
     if rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
-        raise Unusable(f"expected at least {_SLOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}")
+        raise Unusable(f"expected at least {_SLOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
+                       f"{time_hint(rate_hz)}")
     _check_way(distance_m, fastest_mps / rate_hz)
     _check_speed(rate_hz, speed_mps, distance_m)
     if (np.diff(distance_m) >= 0).all():
@@ -108,8 +111,8 @@ def _check_speed(rate_hz: float, speed_mps: Array, distance_m: Array) -> None:
     if larger_m > _LEAST_WAY_M and abs(way_m - integral_m) > _WAYS_DIFFER * larger_m:
         factor = f"{integral_m / way_m:.3g}" if way_m > 0 else "infinitely many"
         raise Unusable(f"expected speed_mps and distance_m to agree within {_WAYS_DIFFER:.0%}, found "
-                       f"{integral_m:.4g} m by speed_mps, {factor} times the {way_m:.4g} m of distance_m (km/h would "
-                       "give 3.6)")
+                       f"{integral_m:.4g} m by speed_mps, {factor} times the {way_m:.4g} m of distance_m "
+                       f"({likely_unit(integral_m, way_m)})")
 
 
 @dataclass(frozen=True)

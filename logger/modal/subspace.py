@@ -26,7 +26,7 @@ from logger.modal.mode import Array
 from logger.modal.moments import Moments
 
 RIDGE = 1e-12
-"""Of the mean power of the samples: less is rounding of the computation, and is added so that its matrices have roots."""
+"""Of the mean power of the samples: less is rounding of the computation, and is added to give its matrices roots."""
 _RESOLVED = 30.0
 """Times that power are errors that a ridge alone makes. Without it, records without noise have states without end."""
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from logger.roads.plausible import unit_doubt
 from logger.roads.profile_iri import ProfileIri
 from logger.roads.roughness_words import ride_words, road_kinds
 from logger.store.formats.profile_file import Profile
 
-ROUGHEST_M_PER_KM = 100.0
-"""No road that a car can drive on is as rough: the scale of the World Bank's Technical Paper 46 ends at 24."""
 _HEADS = {"iri_m_per_km": "IRI", "iri_right_m_per_km": "IRI right", "mri_m_per_km": "MRI", "hri_m_per_km": "HRI"}
 
 
@@ -22,15 +21,12 @@ def as_json(result: ProfileIri, profile: Profile) -> dict[str, Any]:
     ]
     resampled = {} if profile.widest_step_m is None else {
         "resampled_to_m": profile.spacing_m, "widest_step_m": profile.widest_step_m}
-    doubts = {"doubts": [{"what": "unit", "words": doubt}]} if (doubt := unit_doubt(result)) else {}
+    doubts = {"doubts": [{"what": "unit", "words": doubt}]} if (doubt := unit_doubt(_roughest(result))) else {}
     return {**result.row(0), "windows": windows, **resampled, **doubts}
 
 
-def unit_doubt(result: ProfileIri) -> str:
-    """What is to be suspected of a profile that is rougher than any road; else nothing."""
-    iri = max(result.row(0).values())
-    return "" if iri <= ROUGHEST_M_PER_KM else (
-        f"Elevation in mm? An IRI of {iri:.4g} m/km is more than any road has; expected elevation_m in metres.")
+def _roughest(result: ProfileIri) -> float:
+    return max(result.row(0).values())
 
 
 def _cut_short(result: ProfileIri) -> list[str]:
@@ -45,7 +41,7 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
     printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
-    if doubt := unit_doubt(result):
+    if doubt := unit_doubt(_roughest(result)):
         printed.append(doubt)
     if profile.widest_step_m is not None:
         printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")

@@ -3,6 +3,9 @@
 Problem: a profile is long (400,000 lines for 10 km at 25 mm), comes from many hands, and everything computed from it
 assumes that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
 
+Its unit is that of the columns' names: ``elevation_mm``, ``distance_ft``. What can be no road in that unit is refused
+(``logger.roads.plausible``).
+
 Solution: distances must lie on an even grid, but for the rounding of their digits; anything else is refused with its
 line. Straight lines between the samples are laid through an uneven profile only
 when ``resample_m`` asks for it, and the profile says so.
@@ -20,6 +23,7 @@ import numpy.typing as npt
 from logger.bounds import DISTANCE, ELEVATION, MOST_SAMPLES
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
+from logger.roads.plausible import UNITS_M, unit_complaint
 from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
 from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
 
@@ -52,30 +56,43 @@ class Profile:
     widest_step_m: float | None = None
 
 
-def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
+def read_profile(path: Path | str, resample_m: float | None = None, judged: bool = True) -> Profile:
     """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line).
 
     resample_m    lay a grid of this spacing [m] over the profile, linearly between its samples
+    judged        refuse elevations that no road has, as ``check_road``
 
     Raises BadInput ("file:line: expected ...") for a file that is neither, for values that are missing or not finite,
     and for distances that do not grow or, without ``resample_m``, are not evenly spaced.
     """
     path = file_in(path, PROFILE_NAME)
     data = read_bounded(path, MAX_BYTES)
-    if is_erd(data):
-        return _from_erd(parse_erd(data, path), str(path), resample_m)
-    return _from_table(*parse_table(data, str(path)), resample_m)
+    found = (_from_erd(parse_erd(data, path), str(path), resample_m) if is_erd(data) else
+             _from_table(*parse_table(data, str(path)), resample_m))
+    if judged:
+        check_road(found, str(path))
+    return found
+
+
+def check_road(profile: Profile, name: str) -> None:
+    """Raise BadInput for a profile that cannot be one in metres; ``name``: what it is called."""
+    for track in (profile.elevation_m, profile.elevation_right_m):
+        if track is not None and (words := unit_complaint(track, profile.spacing_m)):
+            raise BadInput(f"{name}: {words}")
 
 
 def parse_table(data: bytes, file: str) -> tuple[Array, str]:
     """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]; and the file's name for
-    ``place``."""
+    ``place``. Columns may have another unit, by the ending of their names."""
 
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
         numbers = names[: -len(PLACE)] if names[-len(PLACE) :] == PLACE else names
-        return numbers if numbers in (COLUMNS[:2], COLUMNS) else None
+        in_metres = tuple(f"{name.rpartition('_')[0]}_m" for name in numbers)
+        units = {name.rpartition("_")[2] for name in numbers}
+        return numbers if in_metres in (COLUMNS[:2], COLUMNS) and units <= set(UNITS_M) else None
 
-    return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1:]
+    names, values, named = parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")
+    return values * [UNITS_M[name.rpartition("_")[2]] for name in names], named
 
 
 def read_places(path: Path | str) -> tuple[Array, Array, Array]:
@@ -112,7 +129,10 @@ def _check_place(row: Array, where: str) -> None:
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
-    tracks = [taken(ELEVATION, "elevations", track, file) for track in table.T[1:]]
+    try:
+        tracks = [taken(ELEVATION, "elevations", track, file) for track in table.T[1:]]
+    except BadInput as error:
+        raise BadInput(f"{error} (in mm? Name the column by its unit, as elevation_mm)") from None
     distance = taken(DISTANCE, "distances", table[:, 0], file)
     if len(distance) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
