@@ -111,7 +111,7 @@ def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
     from logger.extraction.measured_line import MeasuredLine
 
-    profile, places = read_profile(path), read_places(path)
+    profile, places = read_profile(path, judged=True), read_places(path)
     try:
         return MeasuredProfile(path, profile, MeasuredLine.of(*places))
     except ValueError as error:

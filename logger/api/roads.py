@@ -70,7 +70,7 @@ def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     >>> road.elevation_m.shape, road.spacing_m
     ((2001,), 0.1)
     """
-    return Profile(**vars(profile_file.read_profile(path, resample_m)))
+    return Profile(**vars(profile_file.read_profile(path, resample_m, judged=True)))
 
 
 def write_profile(path: Path | str, profile: Profile) -> None:
@@ -285,4 +285,4 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
 def _named(profile: Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
     """A profile and what to call it, not judged."""
     return ("profile", profile) if isinstance(profile, Profile) else (
-        str(profile), Profile(**vars(profile_file.read_profile(profile, resample_m, judged=False))))
+        str(profile), Profile(**vars(profile_file.read_profile(profile, resample_m))))

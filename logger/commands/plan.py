@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.store.formats.profile_file import read_profile
     from logger.store.formats.vehicle_file import read_model
 
-    road = None if args.profile is None else track_of(read_profile(args.profile))
+    road = None if args.profile is None else track_of(read_profile(args.profile, judged=True))
     given = bench(args, searches="ridelog plan") if args.runs else None
     model = given.model if given is not None else read_model(vehicle_path(args.vehicle))
     if args.out is not None:

@@ -255,7 +255,8 @@ def _road(args: argparse.Namespace) -> Track:
     from logger.store.formats.drive_file import track_of
     from logger.store.formats.profile_file import read_profile
 
-    track = Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
+    track = (Track(args.flat, np.zeros(2)) if args.flat is not None else
+             track_of(read_profile(args.profile, judged=True)))
     wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
     try:
         return with_obstacles(track, wanted)

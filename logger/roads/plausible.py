@@ -53,10 +53,10 @@ def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
         found = iri(elevation_m, spacing_m)
         if found <= ROUGHEST_M_PER_KM:
             return ""
-        likely = _likely(found)
-        return (f"expected elevations in m, found an IRI of {found:.4g} m/km, more than any road has. Elevation in "
-                f"{likely or 'another unit'}? Name the column by its unit, as elevation_{likely or 'mm'}, or write "
-                "metres")
+        likely = _likely(found) or "another unit"
+        column = "elevation_mm" if likely == "another unit" else f"elevation_{likely}"
+        return (f"expected elevations in m. Elevation in {likely}? By its IRI of {found:.4g} m/km, more than any road "
+                f"has, the profile seems to be in {likely}: name the column by its unit, as {column}, or write metres")
     slope = float(np.abs(np.diff(elevation_m)).mean()) / spacing_m
     return "" if slope <= _STEEPEST else (
         f"expected elevations in m, found a mean slope of {100 * slope:.4g} %, more than any road has. Elevation in "

@@ -96,7 +96,7 @@ def read_run(folder: Path | str) -> DriveOnRoad:
         raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE} (or {EXCITATION})")
     timed = driven_by_time(path)
     drive = drive_in(path, timed)
-    track = excitation_beside(drive) if timed else track_of(read_profile(path / PROFILE))
+    track = excitation_beside(drive) if timed else track_of(read_profile(path / PROFILE, judged=True))
     return DriveOnRoad(**vars(drive), track=track)
 
 

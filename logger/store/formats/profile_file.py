@@ -56,7 +56,7 @@ class Profile:
     widest_step_m: float | None = None
 
 
-def read_profile(path: Path | str, resample_m: float | None = None, judged: bool = True) -> Profile:
+def read_profile(path: Path | str, resample_m: float | None = None, judged: bool = False) -> Profile:
     """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line).
 
     resample_m    lay a grid of this spacing [m] over the profile, linearly between its samples
