@@ -237,3 +237,13 @@ def test_a_folder_stands_for_the_file_in_it_or_is_refused_in_words(tmp_path: Pat
         refused = called(*words, empty)
         assert refused.returncode == 2
         assert f"or a folder with {name}, found a folder without it" in refused.stderr
+
+
+def test_modes_refuses_sensors_that_stood_still_for_a_while(tmp_path: Path) -> None:
+    top, middle = (rounded(np.roll(at(EVEN_S, FINE), places), 0.001) for places in (0, 300))
+    for one in (top, middle):
+        one[1000:2000] = one[1000]
+    path = write_record(tmp_path / "tower.csv", EVEN_S, top=top, middle=middle)
+    done = called("modes", path, "--method", "fft")
+    assert done.returncode == 2
+    assert "tower.csv:1003: expected no hole above 0.5 s, found a sensor that stands still on all axes" in done.stderr

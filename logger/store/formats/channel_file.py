@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.bounds import SIGNAL
-from logger.dsp.repeated_samples import find_repeats
+from logger.dsp.repeated_samples import find_holds, find_repeats
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import parse_columns, place, taken
 from logger.store.formats.drive_file import DISTANCE, DRIVE, PLACE, SPEED, USABLE, header_of
+from logger.store.formats.record_checks import hold_doubts
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
@@ -64,6 +65,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
                            "leave its column out")
     if repeats := find_repeats(samples):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
+    hold_doubts(table[:, 0], find_holds(table[:, 0], samples), file)
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 

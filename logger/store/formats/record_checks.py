@@ -128,7 +128,7 @@ def even_record(
     doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)
     repeats = find_repeats(samples)
     held = find_holds(t_s, samples) if repeats is None else np.zeros(len(samples), dtype=np.bool_)
-    doubts += _hold_doubts(t_s, held, file)
+    doubts += hold_doubts(t_s, held, file)
     if moving is None or moving.any():
         driven = slice(None) if moving is None else moving
         doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven], file)
@@ -145,7 +145,7 @@ def even_record(
     return _resampled(t_s, samples, accel, others, repeats, held, file, asked.resample_hz, doubts)
 
 
-def _hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
+def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
     """That the sensor stood still for a while; BadInput where that is too long to draw a line across."""
     if not held.any():
         return []
