@@ -25,7 +25,7 @@ class FileSystem:
         """Open an empty file for writing; give its descriptor. ``new``: raise ``FileExistsError`` where one is. A link
         is not followed, a pipe not waited for."""
         flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | NO_WAIT | (os.O_EXCL if new else os.O_TRUNC)
-        return check_regular(path, os.open(path, flags, 0o644))
+        return check_regular(path, os.open(path, flags, 0o666))
 
     def write(self, descriptor: int, data: bytes) -> None:
         """Hand all bytes to the system."""

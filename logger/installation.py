@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from logger.errors import BadInput, CheckFailed
+from logger.files import make_folder, replace_bytes
 from logger.shipped import shipped
 
 PROGRAM = Path("/opt/ridelog/bin/ridelog")
@@ -218,15 +219,12 @@ def _content(path: Path) -> bytes | None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_name(f".{path.name}.ridelog-tmp")
-    new.write_bytes(data)
-    new.chmod(0o644)
-    new.replace(path)
+    make_folder(path.parent)
+    replace_bytes(path, data, 0o644)
 
 
 def _make_link(path: Path, target: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     new = path.with_name(f".{path.name}.ridelog-tmp")
     new.unlink(missing_ok=True)
     new.symlink_to(target)

@@ -18,6 +18,7 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.chart_data import line
 from logger.errors import BadInput
+from logger.files import make_folder, together
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
@@ -138,20 +139,21 @@ def write_run(folder: Path | str, run: Run) -> None:
     >>> write_run(folder / "again", read_run(folder))
     """
     place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
     columns = {"t_s": run.time_s, "accel_z_mps2": run.accel_z_mps2, "speed_mps": run.speed_mps,
                "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable,
                **run.more}
     away = (drive_file.SPEED, drive_file.DISTANCE) if run.excitation is not None else ()
-    drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items()
-                                                      if one is not None and name not in away})
-    if run.facts != UNKNOWN:
-        write_run_facts(place, run.facts)
-    if run.excitation is not None:
-        on_its_clock = run.excitation.begun(-float(run.time_s[0]))
-        drive_file.write_excitation(place / drive_file.EXCITATION, on_its_clock)
-    if run.profile is not None:
-        write_profile(place / drive_file.PROFILE, run.profile)
+    with together():
+        make_folder(place)
+        drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items()
+                                                          if one is not None and name not in away})
+        if run.facts != UNKNOWN:
+            write_run_facts(place, run.facts)
+        if run.excitation is not None:
+            on_its_clock = run.excitation.begun(-float(run.time_s[0]))
+            drive_file.write_excitation(place / drive_file.EXCITATION, on_its_clock)
+        if run.profile is not None:
+            write_profile(place / drive_file.PROFILE, run.profile)
 
 
 def make_run(

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from drivers.errors import SettingsError
 from drivers.recorded_words import folder_name
 from logger.errors import BadInput
+from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
@@ -194,11 +195,12 @@ def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured:
         raise BadInput(f"{source}: expected {LEAST_S:g} s and {LEAST_M:g} m of driving {why}, found none"
                        f"{recorded.hint}{also}")
     folders = [out / (name + (f"-{number}" if number > 1 else "")) for number in range(1, len(drives) + 1)]
-    _make_room(folders, source, out)
     runs = []
-    for folder, drive in zip(folders, drives, strict=True):
-        tell(f"writing {folder.name}")
-        runs.append(_written(folder, drive, recorded, measured, source.name))
+    with together():
+        _make_room(folders, source, out)
+        for folder, drive in zip(folders, drives, strict=True):
+            tell(f"writing {folder.name}")
+            runs.append(_written(folder, drive, recorded, measured, source.name))
     return Extracted(tuple(runs), left_out, recorded.torn_tail, recorded.notes)
 
 
@@ -214,9 +216,7 @@ def _make_room(folders: list[Path], source: Path, out: Path) -> None:
             raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found the run of something else")
     for folder in earlier:
         for name in (drive_file.DRIVE, drive_file.PROFILE, RUN):
-            (folder / name).unlink(missing_ok=True)
-        if not any(folder.iterdir()):
-            folder.rmdir()
+            remove_file(folder / name)
 
 
 # --- runs of it ---
@@ -377,7 +377,7 @@ def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
 
 def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: MeasuredProfile | None, source: str
              ) -> ExtractedRun:
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     columns = {drive_file.TIME: drive.time_s, drive_file.VERTICAL: drive.accel_mps2, drive_file.SPEED: drive.speed_mps,
                drive_file.DISTANCE: drive.distance_m}
     if recorded.fixes.have_places:

@@ -23,7 +23,7 @@ from logger.api.outputs import check_out
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.errors import BadInput
-from logger.files import write_text
+from logger.files import make_folder, write_text
 from logger.report.text_layout import columns, paragraphs
 from logger.store.formats import vehicle_file as vehicle_format
 
@@ -151,7 +151,7 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
     """Make the folder for the files. BadInput where there cannot be one, and for files that are read, or cannot be
     written; ``option``: how the folder was asked for."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
     except FileExistsError:
         raise BadInput(f"{option} {out}: expected a folder".lstrip()) from None
     for file in (out / STORY, out / LAW, *(_vehicle_file(out, number + 1) for number in range(MOST_ROUNDS))):

@@ -11,6 +11,7 @@ from logger.api.bench import Bench, Notify, silent
 from logger.api.lab import Runs, bench_with
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart, Curves
@@ -67,8 +68,6 @@ class LearnedLaw(CommandResult):
 
     def write(self, path: Path | str) -> None:
         """Write the law's file. ValueError where no law was learned."""
-        from logger.files import write_text
-
         if not self.source:
             raise ValueError(self.words)
         write_text(Path(path), self.source)

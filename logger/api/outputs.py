@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
 from logger.errors import BadInput
+from logger.files import why_not_written
+
+
+def check_outs(asked: Iterable[tuple[str, Path | None]], runs: Iterable[Path] = (), read: Iterable[Path] = ()) -> None:
+    """Raise BadInput as ``check_out`` for any of the files to write, by the options that ask for them, and where two
+    are one file."""
+    folders, files = list(runs), list(read)
+    taken: set[Path] = set()
+    for option, out in asked:
+        if out is not None:
+            if out.resolve() in taken:
+                raise BadInput(f"{option} {out}: expected every file to be another one")
+            check_out(out, folders, files, option)
+            taken.add(out.resolve())
 
 
 def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option: str = "--out") -> None:
@@ -25,18 +38,5 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
         raise BadInput(f"{said}: expected another file than those that are read")
     if not out.parent.is_dir() or out.is_dir():
         raise BadInput(f"{said}: expected a file in a folder that there is")
-    if not _may_be_written(out):
-        raise BadInput(f"{said}: expected a file that may be written")
-
-
-def _may_be_written(path: Path) -> bool:
-    """Whether a file can be written, as far as that shows without writing. What is there stays as it is; one that is
-    not there is made and taken away: permissions alone do not show all that root, or a file system, cannot do."""
-    if path.exists():
-        return os.access(path, os.W_OK)
-    try:
-        path.touch(exist_ok=False)
-        path.unlink()
-    except OSError:
-        return False
-    return True
+    if why := why_not_written(out):
+        raise BadInput(f"{said}: expected a file that may be written ({why})")

@@ -24,6 +24,7 @@ from logger.api.ranges import NOISE_MPS2
 from logger.errors import BadInput
 from logger.extraction.measured_line import MeasuredLine, passes
 from logger.shipped import vehicle_path
+from logger.store.formats.drive_file import write_table
 from logger.store.formats.logger_columns import named_columns
 from logger.store.formats.vehicle_file import read_model
 
@@ -144,7 +145,7 @@ def _runs(recording: Recording, scratch: Path, vehicle: str, profile: Path | Non
 
 def _write(path: Path, header: str, *columns: Array) -> None:
     rows = np.column_stack(columns)
-    np.savetxt(path, rows[np.isfinite(rows).all(axis=1)], fmt="%.12g", delimiter=",", header=header, comments="")
+    write_table(path, header.split(","), rows[np.isfinite(rows).all(axis=1)], "%.12g")
 
 
 def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:

@@ -54,7 +54,6 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(as_json(found) | {"vehicle": str(args.out)}, allow_nan=False))
     else:
         print("\n".join(addition_lines(found)))
-        print(f"\nVehicle: {args.out}")
     return EXIT_DONE
 
 

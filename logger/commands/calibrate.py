@@ -13,10 +13,11 @@ import argparse
 import json
 from pathlib import Path
 
+from logger.api.outputs import check_outs
 from logger.api.ranges import LOW_PASS, MASS_FACTOR, PASSENGERS, SEED
 from logger.commands.lab_model import warned
 from logger.commands.numbers import add_number
-from logger.errors import EXIT_DONE, BadInput
+from logger.errors import EXIT_DONE
 from logger.files import write_text
 
 
@@ -50,13 +51,12 @@ def run(args: argparse.Namespace) -> int:
 
     path = vehicle_path(args.vehicle)
     model = read_model(path)
-    if args.out is not None and args.out.exists() and args.out.samefile(path):
-        raise BadInput(f"--out {args.out}: expected another file than the vehicle's")
+    check_outs([("--out", args.out)], read=[path])
     found = calibrated(model, path, Question(
         WINDOW_M if args.window is None else args.window, args.low_pass, args.passengers, args.sprung_mass_factor,
         args.seed, args.recompute, "--window"), warned)
     if args.out is not None:
-        write_text(args.out, "".join(csv_lines(found.speeds)), "ascii")
+        write_text(args.out, csv_lines(found.speeds), "ascii")
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:

@@ -15,7 +15,7 @@ import json
 from pathlib import Path
 
 from drivers.catalogue import names
-from logger.commands.pictures import add_out, check_picture, write_picture
+from logger.commands.pictures import add_out, check_pictures, write_pictures
 from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
 
@@ -41,10 +41,10 @@ def run(args: argparse.Namespace) -> int:
 
     if args.daily_hours is not None and not 0.0 < args.daily_hours <= 24.0:
         raise BadInput(f"--daily-hours: expected more than 0 and at most 24 hours, found {args.daily_hours:g}")
-    check_picture(args.out, [args.file])
+    check_pictures(args.out, [args.file])
     found = comfort(args.file, args.weighting, daily_hours=args.daily_hours, unit=args.unit,
                     resample_hz=args.resample)
-    write_picture(args.out, "Ride comfort", args.file.name, found.text, found.charts)
+    write_pictures(args.out, "Ride comfort", args.file.name, found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     tell_doubts(args.file, found.doubts)
     return EXIT_DONE

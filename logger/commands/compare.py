@@ -53,6 +53,4 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(as_json(found), allow_nan=False))
     else:
         print("\n".join(comparison_lines(found)))
-        if args.out is not None:
-            print(f"\nPage: {args.out}")
     return EXIT_DONE

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from logger.commands.replay import replay
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import replace_bytes
+from logger.files import make_folder, write_file
 
 REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
 DRIVE_DIR, LAB_DIR, FIELD_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field"
@@ -61,8 +61,8 @@ def _drive(out: Path, as_json: bool) -> None:
     from logger.commands.report import write_report
 
     dump = out / DUMP_NAME
-    out.mkdir(parents=True, exist_ok=True)
-    replace_bytes(dump, (resources.files("logger.demo") / DUMP_NAME).read_bytes())
+    make_folder(out)
+    write_file(dump, [(resources.files("logger.demo") / DUMP_NAME).read_bytes()])
     outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
     report = out / REPORT_NAME
     write_report([(log, None) for log in outcome.files], report)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from logger.commands.demo_lab import truth_beside
 from logger.commands.lab import say, take
 from logger.commands.lab_model import bench_from, on_screen, progress, wipe
+from logger.files import write_text
 from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
@@ -175,7 +176,6 @@ def _essential(lines: list[str]) -> Iterator[str]:
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
     from logger.api.extracted_runs import RATE_HZ
     from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
-    from logger.files import write_text
     from logger.report.field_page import page
     from logger.report.maps import Way
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns

@@ -67,8 +67,6 @@ def run(args: argparse.Namespace) -> int:
     print(paragraphs([_compared(given)]), "", *diagnosis_lines(found, None if args.all else _SHOWN),
           *left_out_paragraph(runs_left_out(given.runs.runs)), "",
           _next(args, given, found), sep="\n")
-    if args.out is not None:
-        print(f"\nPage: {args.out}")
     return EXIT_DONE
 
 

@@ -25,13 +25,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.outputs import check_outs
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, WINDOW
 from logger.commands.lab_model import add_anyway, warned
 from logger.commands.numbers import add_number
-from logger.commands.pictures import HELP, check_picture, parted, write_picture
+from logger.commands.pictures import HELP, parted, write_pictures
 from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.files import together, write_text
 
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
@@ -51,8 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--step", *ADDED, metavar="MPS2",
                help="step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)")
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
-    parser.add_argument("--out", type=Path, action="append", metavar="FILE",
-                        help=f"write the windows as CSV; FILE.html: {HELP}; may be given for each")
+    parser.add_argument("--out", type=Path, action="append", default=[], metavar="FILE",
+                        help=f"write the windows as CSV; FILE.html: {HELP}; may repeat")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     add_record_options(parser)
     add_anyway(parser)
@@ -84,17 +85,18 @@ def run(args: argparse.Namespace) -> int:
     window_m = WINDOW_M if args.window is None else args.window
     vehicle_yaml = vehicle_path(args.vehicle)
     model = read_model(vehicle_yaml)
-    picture, args.out = parted(args.out)
-    _check_files(args, vehicle_yaml, picture)
+    pictures, tables = parted(args.out)
+    _check_files(args, vehicle_yaml)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
     learns = args.noise is None
     sensor = Sensor(NOISE_MPS2 if learns else args.noise, step_of(drive, args.step))
     found = assessed(drive, model, sensor, window_m, learns, warned, args.anyway)
-    files = [] if args.profile_out is None else _write_road(args.profile_out, found)
-    if args.out is not None:
-        write_text(args.out, "".join(window_lines(found)), "ascii")
-    shown = estimate_by(found, checked, str(args.run), list(map(str, files)))
-    write_picture(picture, "Roughness from acceleration", str(args.run), shown.text, shown.charts)
+    with together():
+        files = [] if args.profile_out is None else _write_road(args.profile_out, found)
+        for path in tables:
+            write_text(path, window_lines(found), "ascii")
+        shown = estimate_by(found, checked, str(args.run), list(map(str, files)))
+        write_pictures(pictures, "Roughness from acceleration", str(args.run), shown.text, shown.charts)
     print(json.dumps(shown.as_json(), allow_nan=False) if args.json else shown.text)
     tell_doubts(args.run, (doubt.words for doubt in checked.doubts))
     if args.profile_out is not None and not files:
@@ -103,20 +105,15 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _check_files(args: argparse.Namespace, vehicle_yaml: Path, picture: Path | None) -> None:
+def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
     """Raise BadInput where a file to write is one that is read, or another one to write."""
     from logger.store.formats.drive_file import DRIVE, PROFILE
 
     read = (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)
-    check_picture(picture, read)
-    taken = {path.resolve() for path in read}
-    for option, path in (("--out", picture), ("--out", args.out), ("--profile-out", args.profile_out)):
-        if path is not None:
-            if path.resolve() in taken:
-                raise BadInput(f"{option} {path}: expected every file to be another one")
-            taken.add(path.resolve())
+    check_outs([*(("--out", path) for path in args.out), ("--profile-out", args.profile_out)], read=read)
     if args.profile_out is None:
         return
+    taken = {path.resolve() for path in (*read, *args.out, args.profile_out)}
     folder = args.profile_out.parent.resolve()
     beside = {path for path in taken if path.parent == folder} | set(folder.iterdir() if folder.is_dir() else ())
     part = re.compile(rf"{re.escape(args.profile_out.stem)}-[1-9][0-9]*{re.escape(args.profile_out.suffix)}")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.files import make_folder, together, write_text
 
 if TYPE_CHECKING:
     from logger.dsp.fixed_scaling import FixedCascade
@@ -40,9 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Make the integers, write the headers, print what they are."""
     headers = [_weighting(args), _golden_car(args)]
-    args.out.mkdir(parents=True, exist_ok=True)
-    for header in headers:
-        write_text(args.out / header.file, header.text(), "ascii")
+    with together():
+        make_folder(args.out)
+        for header in headers:
+            write_text(args.out / header.file, header.text(), "ascii")
     if args.json:
         print(json.dumps({"data_bits": args.data_bits, "filters": [header.as_json(args.out) for header in headers]}))
         return EXIT_DONE

@@ -18,6 +18,7 @@ from logger.api.outputs import check_out
 from logger.commands.numbers import add_number
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
+from logger.files import note
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,6 +78,7 @@ def _ingest(args: argparse.Namespace) -> int:
 
     done = fleet_ingest(args.logs, args.to, car=args.car, car_folders=args.car_folders, roads=args.roads,
                         trim_m=args.trim_m)
+    note(args.to)
     print(json.dumps(done.as_json()) if args.json else done.text)
     return EXIT_DONE
 

@@ -40,13 +40,13 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.outputs import check_out
+from logger.api.outputs import check_outs
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.commands.lab_model import add_anyway
 from logger.commands.numbers import add_number
-from logger.commands.pictures import parted, write_picture
+from logger.commands.pictures import parted, write_pictures
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.files import together
 
 if TYPE_CHECKING:
     from logger.api.identification import FittedNumbers, Question
@@ -94,20 +94,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
                         help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
     add_anyway(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE", action="append",
+    parser.add_argument("--out", type=Path, metavar="FILE", action="append", default=[],
                         help="write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the "
-                             "residual and of correlated numbers; once for each")
+                             "residual and of correlated numbers; may repeat")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog identify``."""
     from logger.identification.identifiability import NotIdentifiable
+    from logger.report.identification_charts import charts
 
     _check_given(args)
-    picture, vehicle = parted(args.out)
-    if picture is not None:
-        check_out(picture, args.runs, ())
+    pictures, vehicles = parted(args.out)
+    check_outs([("--out", path) for path in args.out], args.runs)
     try:
         found = _found(args)
     except NotIdentifiable as refusal:
@@ -116,16 +116,12 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(_refusal_json(refusal), allow_nan=False))
         print(f"ridelog: {refusal}", file=sys.stderr)
         return EXIT_CHECK_FAILED
-    if vehicle is not None:
-        _write(vehicle, found.model, found.fit)
-    if picture is not None:
-        from logger.report.identification_charts import charts
-
-        write_picture(picture, "Fitted numbers", ", ".join(map(str, args.runs)), "\n".join(found.lines),
-                      lambda: charts(found.fit))
+    with together():
+        for vehicle in vehicles:
+            _write(vehicle, found.model, found.fit)
+        write_pictures(pictures, "Fitted numbers", ", ".join(map(str, args.runs)), "\n".join(found.lines),
+                       lambda: charts(found.fit))
     print(json.dumps(found.as_json, allow_nan=False) if args.json else "\n".join(found.lines))
-    if vehicle is not None and not args.json:
-        print(f"Vehicle: {vehicle}")
     return EXIT_DONE if found.fit.converged else EXIT_CHECK_FAILED
 
 
@@ -209,9 +205,8 @@ def _write(path: Path, made: Model, found: Fit | RoadFit) -> None:
     """The fitted vehicle, its standard errors as comments."""
     from logger.store.formats.vehicle_file import write_model
 
-    write_model(path, made)
     comments = [f"# {made.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} "
                 f"before, {found.error_after:.4f} after"]
     comments += [f"# {name}: {value:.6g}, standard error {found.standard_errors[name]:.2g}"
                  for name, value in found.parameters.items()]
-    write_text(path, "\n".join([*comments, path.read_text("utf-8")]))
+    write_model(path, made, "".join(f"{line}\n" for line in comments))

@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 
 from logger.commands.numbers import add_limit
-from logger.commands.pictures import add_out, check_picture, write_picture
+from logger.commands.pictures import add_out, check_pictures, write_pictures
 from logger.errors import EXIT_DONE, BadInput
 
 WINDOW_M = 100.0
@@ -48,9 +48,9 @@ def run(args: argparse.Namespace) -> int:
 
     if not args.window > 0:
         raise BadInput(f"--window {args.window:g}: expected a length above 0 m")
-    check_picture(args.out, [args.profile])
+    check_pictures(args.out, [args.profile])
     found = iri(args.profile, args.window, args.resample, args.localized)
-    write_picture(args.out, "International Roughness Index", args.profile.name, found.text, found.charts)
+    write_pictures(args.out, "International Roughness Index", args.profile.name, found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE
 

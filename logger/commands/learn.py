@@ -17,10 +17,10 @@ import argparse
 import json
 from pathlib import Path
 
-from logger.api.outputs import check_out
+from logger.api.outputs import check_outs
 from logger.commands.lab_model import add_bench_arguments, bench, progress
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.files import together, write_text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,25 +39,23 @@ def run(args: argparse.Namespace) -> int:
     if args.out.suffix != ".py":
         raise BadInput(f"--out {args.out}: expected the name of a Python file, which ends in .py")
     given = bench(args, searches="ridelog learn")
-    check_out(args.out, args.runs, given.files_read)
-    if args.page is not None:
-        check_out(args.page, args.runs, [*given.files_read, args.out], "--page")
+    check_outs([("--out", args.out), ("--page", args.page)], args.runs, given.files_read)
     with progress() as notify:
         found = learned(given, notify)
         drawn = picture_of(found)
     source = source_of(found.learning, found.addition)
-    if source:
-        write_text(args.out, source)
-    if args.page is not None:
-        write_text(args.page, page(found.learning, found.addition, drawn, given.model.vehicle.name, str(args.out)))
+    with together():
+        if source:
+            write_text(args.out, source)
+        if args.page is not None:
+            write_text(args.page, page(found.learning, found.addition, drawn, given.model.vehicle.name,
+                                       str(args.out)))
     if args.json:
         print(json.dumps(as_json(found.learning, found.addition, str(args.out)), allow_nan=False))
         return EXIT_DONE
     print(*law_lines(found.learning, found.addition), sep="\n")
     if source:
         law = args.out if args.out.is_absolute() else f"./{args.out}"
-        print(f"\nLaw: {args.out}\nNext: ridelog add-effect {law} --vehicle {args.vehicle} --out with-law.yaml "
+        print(f"\nNext: ridelog add-effect {law} --vehicle {args.vehicle} --out with-law.yaml "
               f"{' '.join(map(str, args.runs))}")
-    if args.page is not None:
-        print(f"Page: {args.page}")
     return EXIT_DONE

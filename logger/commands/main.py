@@ -13,10 +13,12 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any, NoReturn, TextIO, cast
 
 from drivers.errors import DriverError
 from logger.errors import EXIT_BAD_INPUT, RidelogError, did_you_mean
+from logger.files import written_files
 from logger.printable import LONGEST_COMPLAINT, printable, word
 
 VERBS = {
@@ -53,6 +55,8 @@ VERBS = {
     "capture": "record the raw bytes of a serial port",
     "hil": "play a recorded dump into serial ports for the running service, and check its log",
 }
+MOST_NAMED = 8
+"""Of more files in one folder only their number is said: a screen still holds the result above."""
 EXIT_INTERRUPTED = 130
 EXIT_PIPE_CLOSED = 141
 
@@ -75,8 +79,26 @@ _SAID = (
 """Complaints of argparse, and how all others here are worded."""
 
 
+class _Once(argparse.Action):
+    """An option with one value: who gives it twice would lose the first. Options that may repeat are ``append``."""
+
+    _is_given = False
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
+        if self.option_strings and self._is_given:
+            parser.error(f"{option_string}: expected it once, found it twice")
+        self._is_given = True
+        setattr(namespace, self.dest, values)
+
+
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line, worded as all others."""
+    """A parser whose complaint is one line, worded as all others, and that drops no value."""
+
+    def __init__(self, *words: Any, **named: Any) -> None:
+        super().__init__(*words, **named)
+        for kind in (None, "store"):
+            self.register("action", kind, _Once)
 
     def error(self, message: str) -> NoReturn:
         for theirs, ours in _SAID:
@@ -97,8 +119,24 @@ def main(arguments: list[str]) -> int:
     parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__,
                      formatter_class=_Help, allow_abbrev=False)
     module.add_arguments(parser)
-    status: int = module.run(parser.parse_args(arguments[1:]))
+    given = parser.parse_args(arguments[1:])
+    with written_files() as written:
+        try:
+            status: int = module.run(given)
+        finally:
+            _name_written(written)
     return status
+
+
+def _name_written(paths: list[Path]) -> None:
+    """Say what was written, on stderr: stdout holds the result."""
+    by_folder: dict[Path, list[Path]] = {}
+    for path in paths:
+        by_folder.setdefault(path.parent, []).append(path)
+    for folder, files in by_folder.items():
+        many = len(files) > MOST_NAMED
+        for words in [f"{len(files)} files in {folder}"] if many else files:
+            print(printable(f"Wrote {words}"), file=sys.stderr)
 
 
 def run() -> NoReturn:

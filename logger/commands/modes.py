@@ -25,9 +25,9 @@ from typing import TYPE_CHECKING, Any
 
 from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, MODAL_METHODS, RESPONSES, SPEED
 from logger.commands.numbers import add_number
-from logger.commands.pictures import add_out, check_picture, write_picture
+from logger.commands.pictures import add_out, check_pictures, write_pictures
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.files import together, write_text
 
 if TYPE_CHECKING:
     from logger.api.modal import Array
@@ -91,11 +91,12 @@ def run(args: argparse.Namespace) -> int:
     columns = None if args.columns is None else [name.strip() for name in args.columns.split(",")]
     question = Question(args.method, columns, args.input, args.order, args.response, args.from_s, args.to_s,
                         args.vehicle, args.speed, _option)
-    check_picture(args.out, [args.file] + ([] if args.diagram is None else [args.diagram]))
+    check_pictures(args.out, [args.file], [("--diagram", args.diagram)])
     found = modes_by(question, found_modes(args.file, question), args.file.name)
-    if args.diagram is not None:
-        write_text(args.diagram, _diagram_csv(found.poles), "ascii")
-    write_picture(args.out, "Modes", args.file.name, found.text, found.charts)
+    with together():
+        if args.diagram is not None:
+            write_text(args.diagram, _diagram_csv(found.poles), "ascii")
+        write_pictures(args.out, "Modes", args.file.name, found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE
 
@@ -129,7 +130,7 @@ def _check_alone(args: argparse.Namespace, said: str) -> None:
         raise BadInput(f"{said}: expected no FILE with it, found {args.file}")
     given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
              "--response": args.response, "--from": args.from_s, "--to": args.to_s,
-             "--diagram": args.diagram, "--out": args.out}
+             "--diagram": args.diagram, "--out": args.out or None}
     if options := [option for option, value in given.items() if value is not None]:
         raise BadInput(f"{options[0]}: expected a FILE with it, not {said}")
 

@@ -16,10 +16,10 @@ import argparse
 import json
 from pathlib import Path
 
-from logger.api.outputs import check_out
+from logger.api.outputs import check_outs
 from logger.api.passes import ROUGH_M_PER_KM, USUAL
 from logger.commands.numbers import add_limit
-from logger.commands.pictures import PAGE, parted, write_picture
+from logger.commands.pictures import PAGE, parted, write_pictures
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
 
@@ -37,9 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_limit(parser, "--above", metavar="IRI", default=ROUGH_M_PER_KM,
               help=f"from which IRI [m/km, or as 160in/mi] a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, "
                    "poor by 23 CFR 490.313)")
-    parser.add_argument("--out", metavar="FILE", type=Path, action="append",
+    parser.add_argument("--out", metavar="FILE", type=Path, action="append", default=[],
                         help=f"write the means as {table_endings()}, or a page with map and curves (.html) or picture "
-                             "(.png .svg .pdf); once for each")
+                             "(.png .svg .pdf); may repeat")
     parser.add_argument("--visit", metavar="FILE", type=Path,
                         help="write the places to visit: waypoints (.gpx), or one of --out's other endings")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -49,25 +49,23 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog passes``."""
     from logger.api.passes import passes
     from logger.exchange.format import format_of, write_layer
-    from logger.files import write_text
+    from logger.files import together, write_text
     from logger.store.log.log_reader import find_logs_in
 
-    picture, table = parted(args.out)
-    for path in (table, args.visit):
-        if path is not None:
-            format_of(path)
+    pictures, tables = parted(args.out)
+    for path in (*tables, *([args.visit] if args.visit else [])):
+        format_of(path)
     logs = [log for log, _ in find_logs_in(args.logs)]
-    for path, option in ((picture, "--out"), (table, "--out"), (args.visit, "--visit")):
-        if path is not None:
-            check_out(path, (), logs, option)
+    check_outs([*(("--out", path) for path in args.out), ("--visit", args.visit)], read=logs)
     found = passes(args.logs, args.length, args.since, args.until, args.split, args.above)
-    if table is not None:
-        write_layer(found.layer(), table)
-    if args.visit is not None:
-        write_layer(found.visits(), args.visit)
-    if picture is not None and picture.suffix.lower() == PAGE:
-        write_text(picture, found.page())
-    else:
-        write_picture(picture, "Passes", ", ".join(map(str, args.logs)), found.text, found.charts)
+    with together():
+        for table in tables:
+            write_layer(found.layer(), table)
+        if args.visit is not None:
+            write_layer(found.visits(), args.visit)
+        for page in (path for path in pictures if path.suffix.lower() == PAGE):
+            write_text(page, found.page())
+        write_pictures([path for path in pictures if path.suffix.lower() != PAGE], "Passes",
+                       ", ".join(map(str, args.logs)), found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE

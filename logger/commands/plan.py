@@ -70,6 +70,4 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(as_json(found), allow_nan=False))
         return EXIT_DONE
     print(*plan_lines(found), sep="\n")
-    if args.out is not None:
-        print(f"\nPage: {args.out}")
     return EXIT_DONE

@@ -16,6 +16,7 @@ from typing import Any
 
 from drivers.dump import open_dump
 from logger.errors import BadInput
+from logger.files import make_folder, note
 from logger.printable import counted
 from logger.service.config import Config, load_config
 
@@ -108,7 +109,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         car = read_on_board(config.vehicle)
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         facts = wiring.sidecar(config, sensor, car, known, noise) | {"replayed_from": dump.name}
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         with FolderLock(out):
             repair(out)
             session = next_session(out)
@@ -122,6 +123,8 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     if not quiet:
         print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
     files, summary = _written(out, session)
+    for file in files:
+        note(file)
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
     return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known)
 

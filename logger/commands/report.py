@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import replace_bytes
+from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.drawing import ENDINGS
@@ -75,7 +75,7 @@ def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: S
         raise BadInput(f"{', '.join(str(log) for log, _ in logs)}: expected a log with at least one intact row")
     try:
         text = page(files, base, base_name, tiles_from)
-        replace_bytes(out, text.encode("utf-8", "xmlcharrefreplace"))
+        write_file(out, [text.encode("utf-8", "xmlcharrefreplace")])
     except OSError as error:
         raise BadInput(f"{out}: expected a place where a page can be written ({error.strerror})") from None
     return files

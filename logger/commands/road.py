@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
 from logger.commands.numbers import add_number
-from logger.commands.pictures import add_out, check_picture, write_picture
+from logger.commands.pictures import add_out, check_pictures, write_pictures
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import naming, write_text
+from logger.files import together, write_text
 
 if TYPE_CHECKING:
     from logger.roads.elevation_spectrum import Array, BandedSpectrum
@@ -88,8 +88,7 @@ def _generate(args: argparse.Namespace) -> int:
     if args.out is None:
         sys.stdout.writelines(_csv(elevation, args.spacing))
     else:
-        with naming(args.out), args.out.open("w", encoding="ascii", newline="\n") as file:
-            file.writelines(_csv(elevation, args.spacing))
+        write_text(args.out, _csv(elevation, args.spacing), "ascii")
     if args.json:
         print(json.dumps(made | {"file": str(args.out)}))
     else:
@@ -118,13 +117,12 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 def _classify(args: argparse.Namespace) -> int:
     from logger.api.roads import classify
 
-    if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
-        raise BadInput(f"--psd {args.psd}: expected another file than the profile")
-    check_picture(args.out, [args.profile] + ([] if args.psd is None else [args.psd]))
+    check_pictures(args.out, [args.profile], [("--psd", args.psd)])
     found = classify(args.profile, args.resample)
-    if args.psd is not None:
-        write_text(args.psd, _psd_csv(found.spectrum), "ascii")
-    write_picture(args.out, "Class of the road", args.profile.name, found.text, found.charts)
+    with together():
+        if args.psd is not None:
+            write_text(args.psd, _psd_csv(found.spectrum), "ascii")
+        write_pictures(args.out, "Class of the road", args.profile.name, found.text, found.charts)
     print(json.dumps(found.as_json()) if args.json else found.text)
     return EXIT_DONE
 

@@ -18,12 +18,13 @@ import argparse
 import json
 from pathlib import Path
 
-from logger.api.outputs import check_out
+from logger.api.outputs import check_outs
 from logger.api.sections import SYSTEMS
 from logger.commands.numbers import add_limit
-from logger.commands.pictures import parted, write_picture
+from logger.commands.pictures import parted, write_pictures
 from logger.commands.table_files import table_endings
 from logger.errors import EXIT_DONE
+from logger.files import together
 
 _USUAL = "100m"
 
@@ -40,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
               help="list where the IRI over 25 ft, which slides along, is above this, in m/km, or as 160in/mi (AASHTO "
                    "R 54)")
     parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
-    parser.add_argument("--out", metavar="FILE", type=Path, action="append",
+    parser.add_argument("--out", metavar="FILE", type=Path, action="append", default=[],
                         help=f"write the sections as {table_endings()} (in SI units), or a page or picture of them "
-                             "(.html .png .svg .pdf); once for each")
+                             "(.html .png .svg .pdf); may repeat")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -52,17 +53,15 @@ def run(args: argparse.Namespace) -> int:
     from logger.exchange.format import format_of, write_layer
     from logger.store.log.log_reader import find_logs_in
 
-    picture, table = parted(args.out)
-    if table is not None:
+    pictures, tables = parted(args.out)
+    for table in tables:
         format_of(table)
-    if written := [path for path in (picture, table) if path is not None]:
-        read = [log for log, _ in find_logs_in(args.logs)]
-        for path in written:
-            check_out(path, (), read)
+    if args.out:
+        check_outs([("--out", path) for path in args.out], read=[log for log, _ in find_logs_in(args.logs)])
     found = sections(args.logs, args.length, args.units, args.route, args.localized)
-    if table is not None:
-        write_layer(found.layer(), table)
-    of = ", ".join(map(str, args.logs))
-    write_picture(picture, "Sections", of, found.text, found.charts)
+    with together():
+        for table in tables:
+            write_layer(found.layer(), table)
+        write_pictures(pictures, "Sections", ", ".join(map(str, args.logs)), found.text, found.charts)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE

@@ -24,11 +24,12 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.outputs import check_out
+from logger.api.outputs import check_outs
 from logger.api.ranges import ADDED, RATE, SPEED
 from logger.commands.numbers import add_number, named_numbers
-from logger.commands.pictures import HELP, check_picture, parted, write_picture
+from logger.commands.pictures import HELP, parted, write_pictures
 from logger.errors import EXIT_DONE, BadInput
+from logger.files import together
 
 if TYPE_CHECKING:
     from logger.profiles.excitation import Excitation
@@ -74,9 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "name")
     parser.add_argument("--list-effects", action="store_true",
                         help="print the effects there are, with their parameters, and do nothing else")
-    parser.add_argument("--out", type=Path, action="append", metavar="FILE",
+    parser.add_argument("--out", type=Path, action="append", default=[], metavar="FILE",
                         help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run. FILE.html: "
-                             f"{HELP}; may be given for each")
+                             f"{HELP}; may repeat")
     parser.add_argument("--profile-out", type=Path, metavar="FILE",
                         help="write the road that was driven as well, with its obstacles")
     add_number(parser, "--rate", *RATE, default=100.0, metavar="HZ",
@@ -112,13 +113,9 @@ def _simulate(args: argparse.Namespace) -> None:
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
     from logger.store.formats.drive_file import COLUMNS, TIME, write_drive, write_profile
 
-    picture, args.out = parted(args.out)
-    _check_given(args)
-    _check_files(args, picture)
-    check_out(args.out, ())
-    check_picture(picture, ())
-    if args.profile_out is not None:
-        check_out(args.profile_out, (), option="--profile-out")
+    pictures, drives = parted(args.out)
+    _check_given(args, drives)
+    _check_files(args)
     vehicle, effects, said = _model(args.vehicle, args.effect)
     track = _rig(args) if args.excitation is not None else _road(args)
     car = car_on(vehicle, effects, said, track)
@@ -130,16 +127,12 @@ def _simulate(args: argparse.Namespace) -> None:
                                  SensorErrors(args.noise, args.step, args.seed))
     except ValueError as error:
         raise BadInput(f"{car.vehicle.name}: {error}") from None
-    write_drive(args.out, {name: one for name, one in columns.items() if name not in away})
-    if args.profile_out is not None:
-        assert isinstance(track, Track)
-        write_profile(args.profile_out, track)
     accel, speed_mps, distance_m = (columns[name] for name in COLUMNS[1:])
     way = {} if track.timed else {
         "distance_start_m": float(distance_m[0]), "distance_end_m": float(distance_m[-1]),
         "speed_mean_mps": float(speed_mps.mean())}
     made: dict[str, Any] = {
-        "vehicle": vehicle.name, "model": vehicle.model, "file": str(args.out), "samples": len(accel),
+        "vehicle": vehicle.name, "model": vehicle.model, "file": str(drives[0]), "samples": len(accel),
         "rate_hz": args.rate, "duration_s": len(accel) / args.rate, **way,
         "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
@@ -148,8 +141,14 @@ def _simulate(args: argparse.Namespace) -> None:
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
     words = _in_words(made)
-    drive = Run(args.out, args.rate, columns[TIME], accel, speed_mps, distance_m, None, None)
-    write_picture(picture, "Simulated drive", str(args.out), words, drive.charts)
+    drive = Run(drives[0], args.rate, columns[TIME], accel, speed_mps, distance_m, None, None)
+    with together():
+        for path in drives:
+            write_drive(path, {name: one for name, one in columns.items() if name not in away})
+        if args.profile_out is not None:
+            assert isinstance(track, Track)
+            write_profile(args.profile_out, track)
+        write_pictures(pictures, "Simulated drive", str(drives[0]), words, drive.charts)
     print(json.dumps(made) if args.json else words)
 
 
@@ -168,7 +167,7 @@ def _in_words(made: dict[str, Any]) -> str:
 # --- what was asked for ---
 
 
-def _check_given(args: argparse.Namespace) -> None:
+def _check_given(args: argparse.Namespace, drives: list[Path]) -> None:
     """What is needed for a drive, though not for a list of effects."""
     if args.excitation is not None:
         others = {"--speed": args.speed is not None, "--speed-file": args.speed_file, "--obstacle": args.obstacle,
@@ -178,19 +177,18 @@ def _check_given(args: argparse.Namespace) -> None:
     needed = {"--vehicle": args.vehicle,
               "--profile or --flat": args.profile or args.excitation or args.flat is not None,
               "--speed or --speed-file": args.speed is not None or args.speed_file or args.excitation,
-              "--out": args.out}
+              "--out": drives}
     missing = [name for name, given in needed.items() if not given]
     if missing:
         raise BadInput(f"simulate: expected {', '.join(missing)} (try 'ridelog simulate --help')")
 
 
-def _check_files(args: argparse.Namespace, picture: Path | None) -> None:
+def _check_files(args: argparse.Namespace) -> None:
     from logger.shipped import vehicle_path
 
     read = (vehicle_path(args.vehicle), args.profile, args.excitation, args.speed_file)
-    files = [path.resolve() for path in (args.out, picture, args.profile_out, *read) if path is not None]
-    if len(set(files)) < len(files):
-        raise BadInput(f"--out {args.out}: expected every file to be another one")
+    check_outs([*(("--out", path) for path in args.out), ("--profile-out", args.profile_out)],
+               read=[path for path in read if path is not None])
 
 
 def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:

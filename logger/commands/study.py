@@ -21,8 +21,9 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from logger.api.outputs import check_outs
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.files import naming, write_text
+from logger.files import make_folder, together, write_text
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -76,8 +77,7 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
     if not study.data and args.vehicle is not None:
         raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
-    if args.out is not None and not args.out.parent.is_dir():
-        raise BadInput(f"--out {args.out}: expected a folder {args.out.parent}, found none")
+    check_outs([("--out", args.out)])
     show = show_progress if sys.stderr.isatty() else _show_nothing
     result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, show, args.folder, args.vehicle))
     if args.out is not None:
@@ -88,8 +88,6 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         print(json.dumps(as_json(study, result), allow_nan=False))
     else:
         print("\n".join(lines(study, result)))
-        if args.out is not None:
-            print(f"\nPage: {args.out}")
     return EXIT_CHECK_FAILED if study.differs(result) else EXIT_DONE
 
 
@@ -102,18 +100,21 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
         raise BadInput("study all: expected --out DIR, a folder for its pages")
     if args.folder is not None:
         raise BadInput(f"study all: expected no DIR, found {args.folder}")
-    with naming(args.out):
-        args.out.mkdir(parents=True, exist_ok=True)
+    make_folder(args.out)
     chosen = [one for one in known if not one.data]
     share = QUICK_SHARE if args.quick else 1.0
     carried = {}
-    for study, found in carry_out_all(chosen, share):
-        carried[study.called] = found
-        if found.result is not None:
-            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", share))
-        print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
-              f"{found.failure or study.words} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
-    write_text(args.out / "index.html", index(known, carried, share))
+    try:
+        for study, found in carry_out_all(chosen, share):
+            carried[study.called] = found
+            print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
+                  f"{found.failure or study.words} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
+    finally:  # what there is, when it is interrupted
+        with together():
+            for study in known:
+                if study.called in carried and (result := carried[study.called].result) is not None:
+                    write_text(args.out / f"{study.called}.html", page(study, result, "index.html", share))
+            write_text(args.out / "index.html", index(known, carried, share))
     failed = [one for one in chosen if carried[one.called].failure]
     if args.json:
         print(json.dumps({"page": str(args.out / "index.html"), "studies": [

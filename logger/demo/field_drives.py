@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
@@ -22,6 +23,7 @@ from logger.demo.lab_drives import LONG_AGO
 from logger.demo.motion import LEAD_M, SPACING_M, Road, RoadStretch, build_road
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DEFAULT, LINES, Drive, DrivePlan, record, simulate_drive
+from logger.files import write_file
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
@@ -106,7 +108,8 @@ def line(name: str, driven: Drive) -> str:
 
 def main() -> None:
     """Write the dumps and the lines to the archive named on the command line."""
-    with TemporaryDirectory() as folder, ZipFile(sys.argv[1], "w") as archive:
+    made = BytesIO()
+    with TemporaryDirectory() as folder, ZipFile(made, "w") as archive:
         for name in PLANS:
             driven = drive(name)
             dump = Path(folder) / f"{name}.dump.gz"
@@ -114,6 +117,7 @@ def main() -> None:
             _add(archive, dump.name, dump.read_bytes(), ZIP_STORED)
         for name in LINES_M:
             _add(archive, name, line(name, driven).encode("ascii"), ZIP_DEFLATED)
+    write_file(sys.argv[1], [made.getvalue()])
 
 
 def _add(archive: ZipFile, name: str, content: bytes, how: int) -> None:

@@ -11,12 +11,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
+from logger.files import make_folder, write_file
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
@@ -75,7 +77,7 @@ def write_run(folder: Path, plan: Plan) -> None:
     true = changed(vehicle, {name: factor * read(vehicle, name) for name, factor in OFF.items()})
     car = compose(true, [chosen(shipped_effects()[EFFECT], EFFECT_VALUES)])
     accel = recorded(car, Passage(track, RATE_HZ, distance + smooth)) + rng.normal(0, _NOISE_MPS2, len(time_s))
-    folder.mkdir(parents=True)
+    make_folder(folder)
     write_drive(folder / DRIVE, {"t_s": time_s, "accel_z_mps2": np.round(accel, 3), "speed_mps": speed,
                                  "distance_m": distance})
     write_profile(folder / PROFILE, track)
@@ -92,7 +94,8 @@ def road(plan: Plan, length_m: float) -> Track:
 
 def main() -> None:
     """Write the runs to the archive named on the command line."""
-    with TemporaryDirectory() as folder, ZipFile(sys.argv[1], "w") as archive:
+    made = BytesIO()
+    with TemporaryDirectory() as folder, ZipFile(made, "w") as archive:
         for plan in PLANS:
             write_run(Path(folder) / plan.name, plan)
             for name in (DRIVE, PROFILE):
@@ -100,6 +103,7 @@ def main() -> None:
                 entry = ZipInfo(f"{plan.name}/{name}", LONG_AGO)
                 entry.compress_type = ZIP_DEFLATED
                 archive.writestr(entry, (Path(folder) / plan.name / name).read_bytes())
+    write_file(sys.argv[1], [made.getvalue()])
 
 
 if __name__ == "__main__":

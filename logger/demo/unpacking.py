@@ -7,7 +7,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 from logger.errors import BadInput
-from logger.files import naming
+from logger.files import make_folder, together, write_file
 
 
 def unpacked(archive: str, out: Path) -> list[Path]:
@@ -25,8 +25,8 @@ def unpacked(archive: str, out: Path) -> list[Path]:
         if path.exists() and not (path.is_file() and path.read_bytes() == content):
             raise BadInput(f"{path}: expected nothing there, or the demo's own file, found something else; choose "
                            "another folder with --out")
-    for path, content in contents.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with naming(path):
-            path.write_bytes(content)
+    with together():
+        for path, content in contents.items():
+            make_folder(path.parent)
+            write_file(path, [content])
     return list(contents)

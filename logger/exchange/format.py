@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 from logger.errors import BadInput
 from logger.exchange.layer import Layer
+from logger.files import write_file
 from logger.plugins import catalogue
 
 
@@ -23,9 +24,9 @@ class Format(ABC):
     title: str
 
     @abstractmethod
-    def write(self, layer: Layer, path: Path) -> None:
-        """Write all rows into a file that is not there yet. BadInput where a library that it takes is missing;
-        OSError where the file cannot be written."""
+    def content(self, layer: Layer, file: str) -> Iterable[bytes]:
+        """A file with all rows, in pieces. BadInput, with the name of the ``file`` that it is for, where a library that
+        it takes is missing."""
 
 
 @cache
@@ -46,13 +47,9 @@ def format_of(path: Path) -> Format:
 
 def write_layer(layer: Layer, path: Path) -> None:
     """Write a file that is there whole, in place of an old one, or not at all; its texts are words that can be seen
-    (``logger.printable``). BadInput as ``format_of`` and ``Format.write``, and where it cannot be written."""
+    (``logger.printable``). BadInput as ``format_of`` and ``Format.content``, and where it cannot be written."""
     form = format_of(path)
-    new = path.with_name(f".{os.getpid()}-{path.name}")  # GDAL goes by the ending
     try:
-        form.write(layer.printable(), new)
-        new.replace(path)
+        write_file(path, form.content(layer.printable(), str(path)))
     except OSError as error:
         raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None
-    finally:
-        new.unlink(missing_ok=True)

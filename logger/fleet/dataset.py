@@ -13,11 +13,11 @@ each file.
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.files import naming, read_bounded, replace_bytes
+from logger.files import BESIDE, DISK, make_folder, naming, read_bounded, replace_bytes
 from logger.fleet.road_cells import region_of
 from logger.store.log.folder_lock import FolderLock
 
@@ -123,7 +123,7 @@ class Dataset:
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Alone, and without what an ingest that was killed has left. BadInput where another writes."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         strange = [one.name for one in self.folder.iterdir() if one.name != _MANIFEST and not one.name.startswith(
             (".", "month=", "ledger", "roads."))]
         if strange:
@@ -131,7 +131,10 @@ class Dataset:
         with FolderLock(self.folder):
             self.manifest = self._read()
             self._clear()
-            yield
+            try:
+                yield
+            finally:
+                self._clear()
 
     def commit(self, rows: Mapping[str, npt.NDArray[Any]], ledger: Mapping[str, Sequence[Any]], roads: str,
                trim_m: float) -> None:
@@ -149,7 +152,6 @@ class Dataset:
     def _replace(self, manifest: Manifest) -> None:
         content = {"ridelog_fleet": _FORMAT, **asdict(manifest)}
         replace_bytes(self.folder / _MANIFEST, json.dumps(content, separators=(",", ":")).encode())
-        _sync(self.folder)
         self.manifest = manifest
 
     def _write_rows(self, commit: str, rows: Mapping[str, npt.NDArray[Any]]) -> Iterator[DataFile]:
@@ -170,24 +172,24 @@ class Dataset:
     def _write(self, path: str, table: pyarrow.Table) -> None:
         from pyarrow import parquet
 
-        whole = self.folder / path
-        whole.parent.mkdir(parents=True, exist_ok=True)
-        new = whole.with_name(f".{whole.name}.tmp")
-        with naming(whole), new.open("wb") as file:
-            parquet.write_table(table, file, compression="zstd")
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(whole)
-        _sync(whole.parent)
+        whole, made = self.folder / path, BytesIO()
+        parquet.write_table(table, made, compression="zstd")
+        make_folder(whole.parent)
+        replace_bytes(whole, made.getvalue())
+        with naming(whole):
+            DISK.sync_directory(whole.parent)
 
     def _clear(self) -> None:
         """Remove files that no manifest names."""
         named = {self.folder / one.path for commit in self.manifest.commits for one in commit.files}
         named |= {self.folder / commit.ledger for commit in self.manifest.commits}
-        for path in [*self.folder.glob("month=*/cell=*/*"), *self.folder.glob("month=*/cell=*/.*.tmp"),
-                     *self.folder.glob("ledger/*"), *self.folder.glob("ledger/.*.tmp")]:
-            if path not in named and path.exists():
+        for path in [*self.folder.glob("month=*/cell=*/*"), *self.folder.glob("ledger/*"),
+                     *self.folder.glob(f"{BESIDE}*"), *self.folder.glob(f".{_MANIFEST}.*")]:
+            if path not in named:
                 path.unlink()
+        for folder in [*self.folder.glob("month=*/cell=*"), *self.folder.glob("month=*"), self.folder / "ledger"]:
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
 
     def _read(self) -> Manifest:
         path = self.folder / _MANIFEST
@@ -229,11 +231,3 @@ def arrow_rows(rows: Mapping[str, npt.NDArray[Any]]) -> pyarrow.Table:
 
     return pyarrow.table({name: pyarrow.array(rows[name], from_pandas=True).cast(getattr(pyarrow, kind)())
                           for name, kind in ROW_TYPES.items()})
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

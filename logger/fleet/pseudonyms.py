@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import hmac
 import io
-import os
 import secrets
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -31,13 +30,7 @@ def own_key(dataset: Path) -> bytes:
     """The key of a dataset; a new one where there is none. BadInput for one that is damaged."""
     path = key_path(dataset)
     if not path.exists():
-        new = path.with_name(f".{path.name}.{os.getpid()}")
-        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(secrets.token_hex(_KEY_BYTES) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
+        replace_bytes(path, f"{secrets.token_hex(_KEY_BYTES)}\n".encode("ascii"), 0o600)
     try:
         key = bytes.fromhex(read_bounded(path, 4096).decode("ascii").strip())
     except (ValueError, UnicodeDecodeError):

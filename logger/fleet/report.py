@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from pathlib import Path
 
 import numpy as np
 
 from logger.errors import BadInput
-from logger.exchange.format import write_layer
-from logger.files import write_text
+from logger.exchange.format import format_of
+from logger.files import whole_folder, write_file, write_text
 from logger.fleet.engine import Engine
 from logger.fleet.expressions import history
 from logger.fleet.layer import roads_layer
@@ -45,19 +43,13 @@ def history_of(engine: Engine, figures: FleetFigures, since_us: int | None, unti
 def write_report(figures: FleetFigures, steps: History, pieces: Pieces | None, out: Path) -> int:
     """Write the folder, of figures by segment; give the number of tiles. BadInput for what cannot be written."""
     sections = grouped(figures.roads, "section", pieces, figures.shared)
-    new = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        new.mkdir()
-        tiles = write_tiles(figures.roads, steps, new / _TILES)
-        write_layer(roads_layer(figures.roads), new / "segments.parquet")
-        for ending in ("parquet", "csv"):
-            write_layer(roads_layer(sections), new / f"sections.{ending}")
-        write_text(new / INDEX, fleet_page(figures, sections))
-        if out.exists():
-            shutil.rmtree(out)
-        new.rename(out)
+        with whole_folder(out) as new:
+            tiles = write_tiles(figures.roads, steps, new / _TILES)
+            for name, roads in (("segments.parquet", figures.roads), ("sections.parquet", sections),
+                                ("sections.csv", sections)):
+                write_file(new / name, format_of(out / name).content(roads_layer(roads), str(out / name)))
+            write_text(new / INDEX, fleet_page(figures, sections))
     except OSError as error:
         raise BadInput(f"--out {out}: expected a folder that can be written ({error.strerror or error})") from None
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
     return tiles

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.files import write_text
+from logger.files import make_folder, write_text
 from logger.fleet.dataset import DAY_US
 from logger.fleet.summary import RoadTable
 
@@ -60,7 +60,7 @@ def write_tiles(segments: RoadTable, history: History, folder: Path) -> int:
     x, y = projected(segments.lat_deg, segments.lon_deg)
     written = 0
     for level in range(highest_level(x, y), DEEPEST + 1):
-        (folder / str(level)).mkdir(parents=True, exist_ok=True)
+        make_folder(folder / str(level))
         made = _of_segments(segments, history, x, y) if level == DEEPEST else _of_squares(segments, x, y, level)
         for name, content in made:
             text = json.dumps(content, separators=(",", ":"), allow_nan=False)

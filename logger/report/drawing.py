@@ -6,6 +6,7 @@ Pages draw the same charts with ``logger.report.charts``, which needs no library
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ _LEAST_BARS = 5  # fewer leave room below, and are no thicker
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
 
 
-def draw(charts: Sequence[Chart], path: Path) -> None:
-    """Draw charts under each other. BadInput where the extra is missing; OSError where the file cannot be written."""
+def drawn(charts: Sequence[Chart], path: Path) -> bytes:
+    """Charts under each other, as the file that this name's ending asks for. BadInput where the extra is missing."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -42,8 +43,11 @@ def draw(charts: Sequence[Chart], path: Path) -> None:
                                      shading="nearest")
             figure.colorbar(shades, ax=axes, label=one.value_name)
     # A date in the file would make the same result another file.
-    about = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[path.suffix.lower()]
-    figure.savefig(path, metadata=about)
+    ending = path.suffix.lower()
+    about = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[ending]
+    made = BytesIO()
+    figure.savefig(made, format=ending[1:], metadata=about)
+    return made.getvalue()
 
 
 def _bars(axes: Any, one: Bars) -> None:

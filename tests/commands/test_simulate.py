@@ -62,7 +62,7 @@ def test_the_installed_command(folder: Path, ridelog: Path) -> None:
     done = subprocess.run(
         [ridelog, "simulate", "--vehicle", vehicle_file("rav4-2009"), "--profile", folder / "profile.csv", "--speed",
          "12", "--out", folder / "drive.csv"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, done.stderr) == (0, f"Wrote {folder / 'drive.csv'}\n")
     assert "drive.csv: rav4-2009 (half car)" in done.stdout
     failed = subprocess.run([ridelog, "simulate", "--vehicle", "rav5", "--flat", "9", "--speed", "1", "--out", "x.csv"],
                             capture_output=True, text=True, check=False, cwd=folder)
@@ -140,9 +140,9 @@ def test_a_slower_and_a_faster_recorder(folder: Path) -> None:
     assert np.std(fast.accel_z_mps2) == pytest.approx(np.std(slow.accel_z_mps2), rel=0.05)
 
 
-def refusal(folder: Path, *arguments: str) -> str:
+def refusal(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> str:
     with pytest.raises(BadInput) as refused:
-        simulated(folder, *arguments)
+        simulated(folder, *arguments, vehicle=vehicle)
     assert not (folder / "drive.csv").exists()
     return str(refused.value)
 
@@ -201,10 +201,11 @@ def test_files_that_will_not_do(folder: Path) -> None:
         assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:{line}: expected t_s within 100000 s")
     speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
     assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
-    assert "expected every file to be another one" in refusal(
+    assert "expected another file than those that are read" in refusal(
         folder, "--speed", "20", "--profile-out", str(folder / "profile.csv"))
-    assert "expected every file to be another one" in refusal(
-        folder, "--speed", "20", "--vehicle", "./mine.yaml", "--profile-out", "mine.yaml")
+    (folder / "mine.yaml").write_bytes(vehicle_file("rav4-2009").read_bytes())
+    assert "expected another file than those that are read" in refusal(
+        folder, "--speed", "20", "--profile-out", str(folder / "mine.yaml"), vehicle=str(folder / "mine.yaml"))
     (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
     assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")
 

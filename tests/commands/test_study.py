@@ -34,10 +34,10 @@ def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
 def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "study.html"
     assert main(["study", "fig-4-25", "--quick", "--out", str(out)]) == 0
-    text = capsys.readouterr().out
+    text, said = capsys.readouterr()
     assert text.startswith("Fig 4.25, section 4.4.2: Peak acceleration")
     assert "0.8703" in text
-    assert text.endswith(f"Page: {out}\n")
+    assert said.endswith(f"Wrote {out}\n")
     assert max(map(len, text.splitlines())) <= 118
     assert out.read_text().count("<svg") == 1
 

@@ -8,7 +8,7 @@ import csv
 import itertools
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -235,11 +235,11 @@ def test_a_format_that_fails_half_way_leaves_the_old_file(logs: Path, monkeypatc
     out = converted(logs, "csv")
     before = out.read_bytes()
 
-    def fail(layer: object, path: Path) -> None:
-        path.write_text("half")
-        raise OSError(28, "No space left on device", str(path))
+    def fail(layer: object, file: str) -> Iterator[bytes]:
+        yield b"half"
+        raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(formats()["csv"], "write", fail)
+    monkeypatch.setattr(formats()["csv"], "content", fail)
     with pytest.raises(BadInput, match=r"out.csv: expected a file that can be written \(No space left on device\)"):
         main(["convert", str(logs), "--to", str(out)])
     assert out.read_bytes() == before

@@ -27,6 +27,7 @@ from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
+from logger.store.formats.drive_file import write_table
 from logger.store.formats.mat_file import read_arrays, read_geopoint
 from logger.studies.checks import Word
 from logger.studies.study import Effort, Item, Picture, Result, Study
@@ -59,8 +60,7 @@ class LaserRoad:
     def write(self, path: Path) -> None:
         """As a profile with places."""
         columns = (self.spacing_m * np.arange(len(self.elevation_m)), self.elevation_m, self.lat_deg, self.lon_deg)
-        np.savetxt(path, np.column_stack(columns), fmt="%.10g", delimiter=",", comments="",
-                   header="distance_m,elevation_m,lat_deg,lon_deg")
+        write_table(path, ("distance_m", "elevation_m", "lat_deg", "lon_deg"), np.column_stack(columns), "%.10g")
 
 
 def run(folder: Path, effort: Effort) -> Result:

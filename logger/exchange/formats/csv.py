@@ -4,7 +4,8 @@ known."""
 from __future__ import annotations
 
 import csv
-from pathlib import Path
+from collections.abc import Iterator
+from io import StringIO
 
 from logger.exchange.format import Format
 from logger.exchange.layer import Layer
@@ -17,12 +18,13 @@ class Csv(Format):
     name = "csv"
     title = "a table of all rows, for spreadsheets"
 
-    def write(self, layer: Layer, path: Path) -> None:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(layer.names)
-            table.writerows([cell(value) if isinstance(value, str) else value for value in one.values]
-                            for one in layer.features)
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
+        text = StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(layer.names)
+        table.writerows([cell(value) if isinstance(value, str) else value for value in one.values]
+                        for one in layer.features)
+        yield text.getvalue().encode()
 
 
 FORMAT = Csv()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 from logger.exchange.format import Format
@@ -18,14 +18,14 @@ class GeoJson(Format):
     name = "geojson"
     title = "a map of all rows, for GIS programs and web maps"
 
-    def write(self, layer: Layer, path: Path) -> None:
-        with path.open("w", encoding="utf-8") as file:
-            file.write('{"type":"FeatureCollection","features":[')
-            for number, one in enumerate(layer.features):
-                feature = {"type": "Feature", "geometry": _geometry(one.geometry),
-                           "properties": dict(zip(layer.names, one.values, strict=True))}
-                file.write((",\n" if number else "\n") + json.dumps(feature, separators=(",", ":"), allow_nan=False))
-            file.write("\n]}\n")
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
+        yield b'{"type":"FeatureCollection","features":['
+        for number, one in enumerate(layer.features):
+            feature = {"type": "Feature", "geometry": _geometry(one.geometry),
+                       "properties": dict(zip(layer.names, one.values, strict=True))}
+            text = json.dumps(feature, separators=(",", ":"), allow_nan=False)
+            yield f"{',' if number else ''}\n{text}".encode()
+        yield b"\n]}\n"
 
 
 def _geometry(geometry: Geometry) -> dict[str, Any] | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
+from io import BytesIO
 
 from logger.errors import BadInput
 from logger.exchange.arrow_table import EXTRA, GEOMETRY, arrow_table
@@ -16,18 +17,15 @@ class GeoPackage(Format):
     name = "gpkg"
     title = "GeoPackage, for GIS programs (needs the 'maps' extra)"
 
-    def write(self, layer: Layer, path: Path) -> None:
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
         try:
             from pyogrio import write_arrow
-            from pyogrio.errors import DataSourceError
         except ImportError as error:
-            raise BadInput(EXTRA.format(path, error)) from None
-        table = arrow_table(layer, str(path))
-        try:
-            write_arrow(table, str(path), driver="GPKG", layer=layer.name, geometry_name=GEOMETRY,
-                        geometry_type="Unknown", crs="EPSG:4326")
-        except DataSourceError as error:
-            raise OSError(None, str(error), str(path)) from None
+            raise BadInput(EXTRA.format(file, error)) from None
+        made = BytesIO()  # GDAL would leave files of its own beside one on a full disk
+        write_arrow(arrow_table(layer, file), made, driver="GPKG", layer=layer.name, geometry_name=GEOMETRY,
+                    geometry_type="Unknown", crs="EPSG:4326")
+        yield made.getvalue()
 
 
 FORMAT = GeoPackage()

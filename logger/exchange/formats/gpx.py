@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from pathlib import Path
 from xml.sax.saxutils import escape
 
 from logger.exchange.format import Format
@@ -25,17 +24,20 @@ class Gpx(Format):
     name = "gpx"
     title = "tracks, for navigation devices and programs"
 
-    def write(self, layer: Layer, path: Path) -> None:
-        with path.open("w", encoding="utf-8") as file:
-            file.write('<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="ridelog" '
-                       f'xmlns="http://www.topografix.com/GPX/1/1" xmlns:ridelog="{_SPACE}">\n')
-            if layer.points:
-                file.writelines(_waypoint(row, row.middle, layer.names) for row in layer.features if row.middle)
-            for group, rows in () if layer.points else groupby(layer.features, lambda row: row.group):
-                file.write(f"<trk><name>{escape(group)}</name>\n")
-                file.writelines(_segments(rows, layer.names))
-                file.write("</trk>\n")
-            file.write("</gpx>\n")
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
+        return map(str.encode, _lines(layer))
+
+
+def _lines(layer: Layer) -> Iterator[str]:
+    yield ('<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="ridelog" '
+           f'xmlns="http://www.topografix.com/GPX/1/1" xmlns:ridelog="{_SPACE}">\n')
+    if layer.points:
+        yield from (_waypoint(row, row.middle, layer.names) for row in layer.features if row.middle)
+    for group, rows in () if layer.points else groupby(layer.features, lambda row: row.group):
+        yield f"<trk><name>{escape(group)}</name>\n"
+        yield from _segments(rows, layer.names)
+        yield "</trk>\n"
+    yield "</gpx>\n"
 
 
 def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:

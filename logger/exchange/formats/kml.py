@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import groupby
-from pathlib import Path
 from xml.sax.saxutils import escape
 
 from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
@@ -25,16 +24,19 @@ class Kml(Format):
     name = "kml"
     title = "lines in the colours of their classes, for Google Earth"
 
-    def write(self, layer: Layer, path: Path) -> None:
-        with path.open("w", encoding="utf-8") as file:
-            file.write('<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
-                       "<name>ridelog</name>\n")
-            file.writelines(_styles())
-            for group, rows in groupby(layer.features, lambda row: row.group):
-                file.write(f"<Folder><name>{escape(group)}</name>\n")
-                file.writelines(_placemark(row, layer.names) for row in rows if row.geometry)
-                file.write("</Folder>\n")
-            file.write("</Document></kml>\n")
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
+        return map(str.encode, _lines(layer))
+
+
+def _lines(layer: Layer) -> Iterator[str]:
+    yield ('<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
+           "<name>ridelog</name>\n")
+    yield from _styles()
+    for group, rows in groupby(layer.features, lambda row: row.group):
+        yield f"<Folder><name>{escape(group)}</name>\n"
+        yield from (_placemark(row, layer.names) for row in rows if row.geometry)
+        yield "</Folder>\n"
+    yield "</Document></kml>\n"
 
 
 def _styles() -> Iterator[str]:

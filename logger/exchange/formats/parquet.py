@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from collections.abc import Iterator
+from io import BytesIO
 from typing import Any
 
 from logger.exchange.arrow_table import GEOMETRY, arrow_table
@@ -18,12 +19,14 @@ class GeoParquet(Format):
     name = "parquet"
     title = "GeoParquet, for data programs (needs the 'maps' extra)"
 
-    def write(self, layer: Layer, path: Path) -> None:
-        table = arrow_table(layer, str(path))
+    def content(self, layer: Layer, file: str) -> Iterator[bytes]:
+        table = arrow_table(layer, file)
         from pyarrow.parquet import write_table
 
         metadata = {**(table.schema.metadata or {}), b"geo": json.dumps(_metadata(layer)).encode()}
-        write_table(table.replace_schema_metadata(metadata), path)
+        made = BytesIO()
+        write_table(table.replace_schema_metadata(metadata), made)
+        yield made.getvalue()
 
 
 def _metadata(layer: Layer) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from drivers.regular_file import open_regular
+from logger.files import replace_bytes
 
 FOLDER = Path("/run/ridelog-export")
 BLOCK_DEVICES = Path("/sys/class/block")
@@ -53,9 +54,7 @@ def stick_of(path: Path) -> str:
 
 def write_note(path: Path, note: StickNote) -> None:
     """Put a note, ``FOLDER/<stick>.<number>.json``, into place in one step. Raises ``OSError``."""
-    new = path.with_suffix(".new")
-    new.write_text(json.dumps(asdict(note)) + "\n", encoding="utf-8")
-    new.replace(path)
+    replace_bytes(path, f"{json.dumps(asdict(note))}\n".encode())
 
 
 def read_note(path: Path) -> StickNote | None:

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
-from logger.files import read_bounded, replace_bytes
+from logger.files import make_folder, read_bounded, replace_bytes
 from logger.shipped import shipped
 from logger.store.formats.checksum import json_sha256
 from logger.vehicle.effect import Chosen
@@ -84,7 +84,7 @@ def keep(paths: Sequence[Path], key: str, speeds: tuple[SpeedCalibration, ...]) 
     for path in paths:
         stored = {name: kept for name, kept in _read(path).items() if name != key} | {key: speeds}
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(path.parent)
             _replace(path, dict(list(stored.items())[-KEPT:]))
         except OSError:
             continue

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.errors import BadInput
-from logger.files import file_in, naming, read_bounded
+from logger.files import file_in, read_bounded, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
@@ -210,7 +211,7 @@ def track_of(profile: Profile) -> Track:
 
 def write_drive(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns (n,) by name in the order given: those of ``COLUMNS``, then any others. OSError as ``open``."""
-    _write(path, tuple(columns), np.stack(list(columns.values()), axis=1), "%.10g")
+    write_table(path, tuple(columns), np.stack(list(columns.values()), axis=1), "%.10g")
 
 
 def write_profile(path: Path, track: Track) -> None:
@@ -218,7 +219,7 @@ def write_profile(path: Path, track: Track) -> None:
     elevations = track.elevation_m.reshape(len(track.elevation_m), -1)
     distance = track.start_m + track.spacing_m * np.arange(len(elevations))
     names = PROFILE_COLUMNS[: 1 + elevations.shape[1]]
-    _write(path, names, np.column_stack([distance, elevations]), "%.7f")
+    write_table(path, names, np.column_stack([distance, elevations]), "%.7f")
 
 
 def write_excitation(path: Path, excitation: Excitation) -> None:
@@ -228,13 +229,12 @@ def write_excitation(path: Path, excitation: Excitation) -> None:
     write_drive(path, dict(zip(EXCITATION_COLUMNS, (time_s, *columns), strict=False)))
 
 
-def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
+def write_table(path: Path, names: Sequence[str], table: Array, form: str) -> None:
+    """Write rows (n, names) below their names, each number in a ``form``, times in their own. OSError if that fails."""
     line = ",".join(_TIME_FORM if name == TIME else form for name in names) + "\n"
-    with naming(path), path.open("w", encoding="ascii", newline="\n") as file:
-        file.write(",".join(names) + "\n")
-        for first in range(0, len(table), _LINES_AT_ONCE):
-            block = table[first : first + _LINES_AT_ONCE]
-            file.write(line * len(block) % tuple(block.ravel().tolist()))
+    blocks = (table[first : first + _LINES_AT_ONCE] for first in range(0, len(table), _LINES_AT_ONCE))
+    write_text(path, chain([",".join(names) + "\n"],
+                           (line * len(block) % tuple(block.ravel().tolist()) for block in blocks)), "ascii")
 
 
 def _choose(names: tuple[str, ...], needed: tuple[str, ...]) -> tuple[str, ...] | None:

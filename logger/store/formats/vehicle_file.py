@@ -233,8 +233,10 @@ def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
     write_model(path, Model(vehicle))
 
 
-def write_model(path: Path | str, model: Model) -> None:
+def write_model(path: Path | str, model: Model, comments: str = "") -> None:
     """Write a model as a file that ``read_model`` reads back equal, to the last bit. OSError if that fails.
+
+    comments    lines that begin with #, to stand before it
 
     The file of a user's own effect is named by its way from the new file's folder. A standard error that is not finite
     is not known, and left out.
@@ -254,7 +256,7 @@ def write_model(path: Path | str, model: Model) -> None:
         keys["history"] = [_OneLine(step=one.step, error=float(one.error),
                                     noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
     text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
-    write_text(path, text)
+    write_text(path, comments + text)
 
 
 def _float_or_none(value: float | None) -> float | None:
