@@ -48,7 +48,8 @@ def write_report(figures: FleetFigures, steps: History, pieces: Pieces | None, o
             tiles = write_tiles(figures.roads, steps, new / _TILES)
             for name, roads in (("segments.parquet", figures.roads), ("sections.parquet", sections),
                                 ("sections.csv", sections)):
-                write_file(new / name, format_of(out / name).content(roads_layer(roads), str(out / name)))
+                write_file(new / name, format_of(out / name).content(
+                    roads_layer(roads).printable(), str(out / name)))
             write_text(new / INDEX, fleet_page(figures, sections))
     except OSError as error:
         raise BadInput(f"--out {out}: expected a folder that can be written ({error.strerror or error})") from None
