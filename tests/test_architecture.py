@@ -197,3 +197,47 @@ def test_nothing_asks_the_system_for_the_date() -> None:
     assert not [(module, node.lineno) for module, tree in TREES.items() for node in ast.walk(tree)
                 if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
                 and (node.value.id, node.attr) in forbidden]
+
+
+WRITING = {"write_text", "write_bytes", "savetxt", "savez", "savez_compressed", "tofile", "savefig",
+           "write_table", "write_arrow", "to_csv", "to_parquet", "ZipFile", "NamedTemporaryFile", "mkstemp",
+           "rename", "renames", "copy2", "copyfile", "copytree"}
+"""Calls that may write a file, or put one in the place of another."""
+WRITERS_OF_FILES = {
+    "drivers.accelerometers._iio_device": "settings of the kernel's driver, which are no files on a disk",
+    "drivers.disk": "the one way of the car, and what the one writer of the desk goes through",
+    "logger.commands.main": "nowhere, when nobody reads on", "logger.files": "the one writer of whole files",
+    "logger.installation": "a link, put into place",
+    "logger.service.status": "a file in memory, every second, without waiting for a disk",
+    "logger.store.export.directory_handle": "sticks, which a hand may pull",
+    "logger.store.export.export": "the same", "logger.store.export.stick_status": "an LED of the board",
+    "logger.store.log.atomic_file": "the car's small files, through drivers.disk",
+    "logger.store.log.dump_recording": "the same", "logger.store.log.quarantine": "the same",
+    "logger.store.log.recovery": "the same",
+}
+
+
+def writes(node: ast.AST) -> bool:
+    """Whether a call may write a file by its path; into memory, or through the writer of ``logger.files``, is none."""
+    if not isinstance(node, ast.Call):
+        return False
+    called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    given = [one.value for one in [*node.args, *(word.value for word in node.keywords)]
+             if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    if called == "open":
+        return any(set(mode) <= set("rwaxbt+U") and set(mode) & set("wax+") for mode in given) or any(
+            isinstance(one, ast.Attribute) and one.attr in {"O_WRONLY", "O_RDWR", "O_CREAT"} for one in ast.walk(node))
+    if called == "replace":  # of a path; a text's takes two words, a dataclass's keywords
+        return len(node.args) == 1 and not node.keywords
+    into_memory = {"made", "archive"} & {one.id for one in node.args if isinstance(one, ast.Name)}
+    ours = called in {"write_text", "write_table"} and isinstance(node.func, ast.Name)
+    reads = called == "ZipFile" and not any(mode in given for mode in ("w", "a", "x"))
+    return called in WRITING and not (into_memory or ours or reads)
+
+
+def test_files_are_written_in_one_place() -> None:
+    found = {module for module, tree in TREES.items() if any(map(writes, ast.walk(tree)))}
+    assert found == set(WRITERS_OF_FILES)
+    for words in ("open(a, 'w')", "a.open(mode='x')", "a.write_text(b)", "np.savetxt(a, b)", "figure.savefig(a)",
+                  "ZipFile(a, 'w')", "a.replace(b)", "os.open(a, os.O_WRONLY)", "pq.write_table(b, a)"):
+        assert writes(ast.parse(words, mode="eval").body), words
