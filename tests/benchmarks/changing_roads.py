@@ -1,0 +1,329 @@
+"""The box's own measure on roads whose roughness changes: beside a page of linear algebra, and the limit.
+
+    python -m tests.benchmarks.changing_roads [--roads sections,constant] [--mph 10,40] [--range 2,8] [--noise 0.147]
+        [--reads 1] [--waviness 2.0] [--learn] [--profile FILE.csv] [--draws 1]
+
+A cell is one kind of road, one speed and one sensor, with exact places and a steady speed. Each line holds, over the
+windows of 25 ft: R2 of ridelog, of the plain method, and of an estimator that knows road, level and car ("limit"); the
+bias of all windows, of the smooth third and of the rough third of the road, by its mean IRI over 100 m; the windows
+within one and two of their standard errors; the same for sections of 0.1 mi as ``ridelog sections`` makes them; and
+the processor time per driven second. Right of the bar stands the plain method's bias.
+
+Roads: ``sections`` change their level at steps, 20 to 500 m apart, by factors of 2 to 16 in the spectrum; ``slow`` ones
+swell over some 200 m; ``constant`` ones do not change; ``holes`` are constant with potholes, bumps, joints and patches.
+``--profile`` is a measured one instead (columns distance_m, elevation_m), driven there and back.
+
+The plain method: the spectrum's level is a hidden Markov chain over blocks of 20 m whose evidence is that of Whittle;
+the waviness is the most probable one; for each level a Wiener filter, and the mean of the folded normal distribution,
+weighted by the level's posterior probability. Rounding is white noise.
+
+Goals: R2 not below the plain method's, bias within 2 %, thirds within 5 %, coverage 0.64 to 0.72 and 0.93 to 0.97.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from math import inf, pi, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from logger.estimation.noise_belief import NoiseBelief
+from logger.estimation.streaming import RoadEstimator, WindowEstimate
+from logger.units import FOOT_M, MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
+from logger.vehicle import half_car
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.structure import body_point
+
+from ..support.drives.measured import (
+    GRID_HZ,
+    SPACING_M,
+    Accelerometer,
+    Drive,
+    Road,
+    iso_road,
+    measured_like_road,
+    recorder_response,
+    road_response,
+    steady_drive,
+)
+from .estimator import LEAD_S, PUSH, known_best, on_grid, r2, rav4, reported
+
+Array = np.ndarray
+
+FIRST_SEED = 960_000
+LENGTH_M = 2400.0
+SECTION_WINDOWS = round(528 * FOOT_M / WINDOW_M)
+GUESS_MPS2 = 0.1
+
+
+# --- roads -----------------------------------------------------------------------------------------------------------
+
+
+def sectioned_road(seed: int, waviness: float) -> Road:
+    """Steps of the level, 20 to 500 m apart, by factors of 2 to 16."""
+    rng = np.random.default_rng(seed)
+    level, at_m = np.zeros(round(LENGTH_M / SPACING_M)), 0.0
+    now = 0.0
+    while at_m < LENGTH_M:
+        until_m = at_m + np.exp(rng.uniform(np.log(20), np.log(500)))
+        level[round(at_m / SPACING_M):round(until_m / SPACING_M)] = now
+        change = rng.uniform(np.log(2), np.log(16))
+        now, at_m = now + (-change if now > 0.5 else change if now < -0.5 else rng.choice((-1, 1)) * change), until_m
+    return with_gain(iso_road(2.5, LENGTH_M, seed, waviness), np.exp(0.5 * level))
+
+
+def slow_road(seed: int, waviness: float) -> Road:
+    """A level that swells: its logarithm has a deviation of 0.8 and no wave shorter than some 200 m."""
+    rng = np.random.default_rng(seed)
+    count = round(LENGTH_M / SPACING_M)
+    waves = np.exp(-0.5 * (np.fft.rfftfreq(count, SPACING_M) * 200.0) ** 2) * (
+        rng.standard_normal((2, count // 2 + 1)).T @ (1, 1j))
+    waves[0] = 0.0
+    level = np.fft.irfft(waves, count)
+    return with_gain(iso_road(2.5, LENGTH_M, seed, waviness), np.exp(0.4 * level / level.std()))
+
+
+def constant_road(seed: int, waviness: float) -> Road:
+    """One level: 1.2, 2.5 or 5 m/km by the seed."""
+    return iso_road((1.2, 2.5, 5.0)[seed % 3], LENGTH_M, seed, waviness)
+
+
+def road_with_holes(seed: int, waviness: float) -> Road:
+    """As profilers find them; the waviness is drawn with the road."""
+    return measured_like_road((1.5, 3.0, 5.0)[seed % 3], LENGTH_M, seed)
+
+
+ROADS: dict[str, Callable[[int, float], Road]] = {
+    "sections": sectioned_road, "slow": slow_road, "constant": constant_road, "holes": road_with_holes}
+
+
+def with_gain(road: Road, gain: Array) -> Road:
+    """The road with slopes that are so many times as steep at each place."""
+    slope = np.diff(road.elevation_m, append=road.elevation_m[0]) * gain
+    return replace(road, elevation_m=np.concatenate([[0.0], np.cumsum(slope - slope.mean())[:-1]]), gain=gain)
+
+
+def measured_profile(path: Path) -> Road:
+    """A measured road there and back, without its slope from end to end; the limit is not known of it."""
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    at_m, elevation_m = table["distance_m"] - table["distance_m"][0], table["elevation_m"]
+    line_m = np.interp(at_m, at_m[[0, -1]], elevation_m[[0, -1]])
+    one_way = np.interp(np.arange(0, at_m[-1], SPACING_M), at_m, elevation_m - line_m)
+    both = np.concatenate([one_way, one_way[::-1]])
+    both = both[:len(both) // 2 * 2]
+    road = Road("measured", 1.0, both, np.zeros(len(both) // 2 + 1), np.ones(len(both)))
+    return replace(road, level_m_per_km=float(road.iri(0.0, road.length_m)))
+
+
+# --- estimates -------------------------------------------------------------------------------------------------------
+
+
+def ours(sensor: Accelerometer, readings: Array, clipped: Array, travelled_m: Array, learns: bool
+         ) -> tuple[list[WindowEstimate], float]:
+    """Windows of ridelog, and its processor time per driven second."""
+    structure, known = half_car.structure(rav4()), reported(sensor)
+    noise = NoiseBelief.guessed(GUESS_MPS2) if learns else None
+    known = replace(known, noise_rms_mps2=GUESS_MPS2) if learns else known
+    started_s = time.process_time()
+    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), known, WINDOW_M, noise=noise,
+                              reads=readings.size // len(readings))
+    at_end = np.where(clipped, np.sign(readings - np.median(readings)), 0.0)
+    usable, found = np.ones(readings.shape, dtype=np.bool_), []
+    for low in range(0, len(readings), PUSH):
+        part = slice(low, low + PUSH)
+        found += estimator.push(readings[part], usable[part], at_end[part], travelled_m[part])
+    found += estimator.finish()
+    return found, (time.process_time() - started_s) / (len(readings) / GRID_HZ)
+
+
+def plain(drive: Drive, sensor: Accelerometer, readings: Array) -> Array:
+    """The plain method's IRI [m/km] at each reading (t,)."""
+    from scipy.special import erf
+
+    speed = float(drive.speed_mps[0])
+    step_m, count, pad = speed / GRID_HZ, len(readings), 4096
+    noise = 2 * step_m * (sensor.noise_mps2**2 + sensor.step_mps2**2 / 12) / sensor.oversample
+    felt = readings - readings.mean()
+
+    def power_of(n: Array) -> Array:
+        return np.asarray(road_response(rav4(), np.maximum(n, 1e-6), speed) * recorder_response(n * speed))
+
+    block_m, levels = 20.0, np.geomspace(3e-7, 2e-3, 45)
+    length = round(2 * block_m / step_m)
+    taper = np.hanning(length)
+    taper /= sqrt(float(taper @ taper))
+    n = np.fft.rfftfreq(length, step_m)
+    used = (n * speed > 0.4) & (n * speed < 36)
+    gain, n = np.abs(power_of(n[used])) ** 2, n[used]
+    centres = np.arange(round(block_m / step_m) // 2, count, round(block_m / step_m))
+    begins = np.clip(centres - length // 2, 0, count - length)
+    seen = np.array([2 * step_m * np.abs(np.fft.rfft(felt[at:at + length] * taper))[used] ** 2 for at in begins])
+    apart = np.log(levels)[:, None] - np.log(levels)
+    move = np.exp(-0.5 * (apart / 0.25) ** 2)
+    move = 0.97 * move / move.sum(axis=1, keepdims=True) + 0.03 / len(levels)
+    best, chance, waviness = -inf, np.empty(0), 2.0
+    for trial in np.arange(1.6, 2.81, 0.1):
+        expected = levels[:, None] * gain * (n / 0.1) ** -trial + noise
+        log_like = -0.5 * (np.log(expected).sum(axis=1) + seen @ (1 / expected).T)
+        like = np.exp(log_like - log_like.max(axis=1, keepdims=True))
+        ahead, behind = np.empty_like(like), np.ones_like(like)
+        now, evidence = np.full(len(levels), 1 / len(levels)), float(log_like.max(axis=1).sum())
+        for row, one in enumerate(like):
+            now = (now @ move if row else now) * one
+            evidence += np.log(now.sum())
+            now = ahead[row] = now / now.sum()
+        for row in range(len(like) - 2, -1, -1):
+            behind[row] = move @ (behind[row + 1] * like[row + 1])
+            behind[row] /= behind[row].sum()
+        if evidence > best:
+            best, waviness, chance = evidence, trial, ahead * behind
+    chance /= chance.sum(axis=1, keepdims=True)
+    n = np.fft.rfftfreq(count + pad, step_m)
+    shape = np.where(n < 0.01, 0.0, (np.maximum(n, 0.01) / 0.1) ** -waviness)
+    response, golden, waves = power_of(n), golden_slope(n), np.fft.rfft(np.concatenate([felt, np.zeros(pad)]))
+    iri = np.zeros(count)
+    for number, level in enumerate(levels):
+        weight = np.interp(np.arange(count), centres, chance[:, number])
+        if weight.max() > 1e-4:
+            share = level * shape / (np.abs(response) ** 2 * level * shape + noise)
+            mean = np.fft.irfft(golden * np.conj(response) * share * waves, count + pad)[:count]
+            spread = sqrt(float(np.trapezoid(np.abs(golden) ** 2 * share * noise, n)))
+            iri += weight * 1000 * (sqrt(2 / pi) * spread * np.exp(-0.5 * (mean / spread) ** 2)
+                                    + mean * erf(mean / spread / sqrt(2)))
+    return iri
+
+
+def golden_slope(n: Array) -> Array:
+    """Slope of the Golden Car per elevation, (n,) [1/m], by its equations written out."""
+    s = 2j * pi * n * 80 / 3.6
+    body = s * s + 6.0 * s + 63.3
+    wheel = 0.15 * s * s + 6.0 * s + 63.3 + 653.0
+    between = 6.0 * s + 63.3
+    road_to_wheel = 653.0 * body / (body * wheel - between**2)
+    return np.asarray(s * (between / body - 1) * road_to_wheel / (80 / 3.6) * np.sinc(0.25 * n))
+
+
+# --- cells -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Windows (n,) of one drive [m/km]; ``rough_m_per_km`` is the road's own mean about each."""
+
+    exact: Array
+    estimate: Array
+    std: Array
+    plain: Array
+    limit: Array
+    rough_m_per_km: Array
+    spent: float
+
+
+def driven(road: Road, mph: float, sensor: Accelerometer, learns: bool, seed: int, with_limit: bool) -> Cell:
+    """One lap."""
+    rng = np.random.default_rng([FIRST_SEED, seed, round(mph), round(1000 * sensor.noise_mps2)])
+    drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ * sensor.oversample)
+    readings, each, clipped = on_grid(drive, sensor, rng)
+    place_m = drive.place_m[::sensor.oversample][:len(readings)]
+    travelled_m = place_m - place_m[0]
+    found, spent = ours(sensor, each, clipped, travelled_m, learns)
+    numbers = np.arange(np.ceil(-place_m[0] / WINDOW_M), np.floor((road.length_m - place_m[0]) / WINDOW_M)).astype(int)
+    begin_m = place_m[0] + numbers * WINDOW_M
+    by_number = {one.number: (one.iri_m_per_km, one.iri_std_m_per_km) for one in found}
+    estimate, std = np.array([by_number.get(number, (np.nan, np.nan)) for number in numbers.tolist()]).T
+    sums = np.concatenate([[0.0], np.cumsum(plain(drive, sensor, readings)[:-1] * np.diff(place_m))])
+    by_plain = np.diff(np.interp(np.append(begin_m, begin_m[-1] + WINDOW_M), place_m, sums)) / WINDOW_M
+    limit = np.full(len(numbers), np.nan)
+    if with_limit:
+        limit = known_best(rav4(), drive, sensor, readings)(begin_m, begin_m + WINDOW_M)
+    exact = road.iri(begin_m, begin_m + WINDOW_M)
+    rough = road.iri(begin_m - 50.0 + WINDOW_M / 2, begin_m + 50.0 + WINDOW_M / 2)
+    return Cell(exact, estimate, std, by_plain, limit, rough, spent)
+
+
+HEADING = (f"{'':42s}{'R2':>7s}{'plain':>7s}{'limit':>7s} |{'bias %':>7s}{'smooth':>7s}{'rough':>7s} |{'in 1':>6s}"
+           f"{'in 2':>6s} |{'0.1 mi: in 1':>13s}{'in 2':>6s} |{'ms/s':>6s} |{'plain: bias':>12s}{'smooth':>7s}"
+           f"{'rough':>7s}")
+
+GOALS = (f"{'goal':42s}{'>=':>7s}{'plain':>7s}{'':7s} |{'+-2':>7s}{'+-5':>7s}{'+-5':>7s} |{'64-72':>6s}{'93-97':>6s}"
+         f" |{'64-72':>13s}{'93-97':>6s} |")
+
+
+def print_cells(name: str, cells: list[Cell]) -> None:
+    """One line for the drives of a cell."""
+    exact, estimate, std, by_plain, limit, rough = (
+        np.concatenate([getattr(cell, field) for cell in cells])
+        for field in ("exact", "estimate", "std", "plain", "limit", "rough_m_per_km"))
+    known = np.isfinite(estimate)
+    thirds = [known & (rough <= np.quantile(rough, 1 / 3)), known & (rough >= np.quantile(rough, 2 / 3))]
+
+    def bias(row: Array, which: Array) -> float:
+        return 100 * (float(row[which].mean() / exact[which].mean()) - 1) if which.any() else np.nan
+
+    def within(error: Array, error_std: Array) -> list[float]:
+        return [float(np.mean(np.abs(error) <= times * error_std)) for times in (1, 2)]
+
+    windows = within((estimate - exact)[known], std[known])
+    errors, stds = [], []
+    for cell in cells:
+        for low in range(0, len(cell.exact) - SECTION_WINDOWS, SECTION_WINDOWS):
+            part = slice(low, low + SECTION_WINDOWS)
+            if np.isfinite(cell.estimate[part]).all():
+                errors.append(float((cell.estimate - cell.exact)[part].mean()))
+                stds.append(sqrt(float((cell.std[part] ** 2).sum())) / SECTION_WINDOWS)
+    sections = within(np.array(errors), np.array(stds)) if errors else [np.nan, np.nan]
+    spent = 1000 * sum(cell.spent for cell in cells) / len(cells)
+    limit_r2 = r2(limit, exact) if np.isfinite(limit).all() else np.nan
+    print(f"{name:42s}{r2(estimate[known], exact[known]):7.3f}{r2(by_plain, exact):7.3f}{limit_r2:7.3f}"
+          f" |{bias(estimate, known):+7.1f}{bias(estimate, thirds[0]):+7.1f}{bias(estimate, thirds[1]):+7.1f}"
+          f" |{windows[0]:6.2f}{windows[1]:6.2f} |{sections[0]:13.2f}{sections[1]:6.2f} |{spent:6.2f}"
+          f" |{bias(by_plain, known):+12.1f}{bias(by_plain, thirds[0]):+7.1f}{bias(by_plain, thirds[1]):+7.1f}"
+          + (f"  {known.mean():.0%} of windows" if not known.all() else ""), flush=True)
+
+
+def sensor_of(range_g: float, noise_mps2: float, reads: int) -> Accelerometer:
+    """A BMA220's steps at a range; 0: a fine sensor."""
+    if range_g == 0:
+        return Accelerometer("fine", noise_mps2, 1e-3, reads)
+    return Accelerometer(f"{range_g:g} g", noise_mps2, range_g * STANDARD_GRAVITY_MPS2 / 32, reads, (-32, 31))
+
+
+def main() -> None:
+    """Print the cells that were asked for."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.changing_roads", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+
+    def numbers(text: str) -> list[float]:
+        return [float(one) for one in text.split(",")]
+
+    parser.add_argument("--roads", default=",".join(ROADS))
+    parser.add_argument("--profile", type=Path)
+    parser.add_argument("--mph", type=numbers, default=[10, 40, 70])
+    parser.add_argument("--range", type=numbers, default=[2, 0], help="g; 0: a fine sensor")
+    parser.add_argument("--noise", type=numbers, default=[0.05, 0.147])
+    parser.add_argument("--reads", type=numbers, default=[1])
+    parser.add_argument("--waviness", type=numbers, default=[2.0])
+    parser.add_argument("--learn", action="store_true", help="the noise is learnt, from a guess of 0.1 m/s2")
+    parser.add_argument("--draws", type=int, default=1, help="roads of each kind")
+    parser.add_argument("--no-limit", action="store_true")
+    asked = parser.parse_args()
+    print(HEADING)
+    print(GOALS)
+    kinds = ["measured"] if asked.profile else asked.roads.split(",")
+    for kind, waviness, range_g, noise, reads, mph in product(
+            kinds, asked.waviness, asked.range, asked.noise, asked.reads, asked.mph):
+        sensor, cells = sensor_of(range_g, noise, int(reads)), []
+        for draw in range(asked.draws):
+            road = measured_profile(asked.profile) if asked.profile else ROADS[kind](FIRST_SEED + draw, waviness)
+            with_limit = not asked.profile and not asked.no_limit
+            cells.append(driven(road, mph, sensor, asked.learn, draw, with_limit))
+        print_cells(f"{kind} w {waviness:g}, {sensor.name} noise {noise:g} x{reads:g}, {mph:g} mph", cells)
+
+
+if __name__ == "__main__":
+    main()
