@@ -203,8 +203,8 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     try:
         found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
     except ValueError as error:
-        hint = spacing_hint(road.spacing_m) or unit_complaint(road.elevation_m, road.spacing_m)
-        raise BadInput(f"{name}: {hint}" if hint.startswith("expected") else f"{name}: {error}{hint}") from None
+        words = unit_complaint(road.elevation_m, road.spacing_m) or f"{error}{spacing_hint(road.spacing_m)}"
+        raise BadInput(f"{name}: {words}") from None
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
@@ -268,6 +268,7 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
     ('C', True)
     """
     from logger.report.road_text import as_json, lines
+    from logger.roads.plausible import spacing_hint
     from logger.roads.track_class import track_class
 
     name, road = _named(profile, resample_m)
@@ -276,7 +277,7 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
     try:
         found = [track_class(one, road.spacing_m, road.widest_step_m) for one in tracks]
     except ValueError as error:
-        raise BadInput(f"{name}: {error}") from None
+        raise BadInput(f"{name}: {error}{spacing_hint(road.spacing_m)}") from None
     left = found[0].roughness
     return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
                      left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km, left.bands)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from logger.roads.plausible import unit_doubt
+from logger.roads.plausible import doubts_of, unit_doubt
 from logger.roads.profile_iri import ProfileIri
 from logger.roads.roughness_words import ride_words, road_kinds
 from logger.store.formats.profile_file import Profile
@@ -21,8 +21,7 @@ def as_json(result: ProfileIri, profile: Profile) -> dict[str, Any]:
     ]
     resampled = {} if profile.widest_step_m is None else {
         "resampled_to_m": profile.spacing_m, "widest_step_m": profile.widest_step_m}
-    doubts = {"doubts": [{"what": "unit", "words": doubt}]} if (doubt := unit_doubt(_roughest(result))) else {}
-    return {**result.row(0), "windows": windows, **resampled, **doubts}
+    return {**result.row(0), "windows": windows, **resampled, **doubts_of(_roughest(result))}
 
 
 def _roughest(result: ProfileIri) -> float:

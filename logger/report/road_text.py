@@ -7,13 +7,15 @@ from typing import Any
 
 from logger.report.summary import IRI_CLASSES
 from logger.roads.iso8608 import iri_from_gd_n0
+from logger.roads.plausible import doubts_of, unit_doubt
 from logger.roads.track_class import TrackClass
 from logger.store.formats.profile_file import Profile
 
 
 def as_json(tracks: Sequence[TrackClass]) -> dict[str, Any]:
     """Named fields, SI units in the names; a second track is ``right``."""
-    return _track_json(tracks[0]) | ({"right": _track_json(tracks[1])} if len(tracks) > 1 else {})
+    return (_track_json(tracks[0]) | ({"right": _track_json(tracks[1])} if len(tracks) > 1 else {})
+            | doubts_of(max(track.iri_m_per_km for track in tracks)))
 
 
 def _track_json(track: TrackClass) -> dict[str, Any]:
@@ -32,6 +34,8 @@ def lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> list[str
     """The lines a person sees; ``name`` is that of the file."""
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
     printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    if doubt := unit_doubt(max(track.iri_m_per_km for track in tracks)):
+        printed.append(doubt)
     for side, track in zip(("left track", "right track") if len(tracks) > 1 else ("",), tracks, strict=True):
         printed += [*(["", side] if side else []), "", *_track_lines(track)]
     return printed

@@ -39,8 +39,13 @@ _SAME_WAY = 0.05
 def unit_doubt(iri_m_per_km: float) -> str:
     """What is to be said of a profile with this IRI that is rougher than any road; else nothing."""
     return "" if iri_m_per_km <= DOUBTFUL_M_PER_KM else (
-        f"Elevation in {_likely(iri_m_per_km) or 'mm'}? An IRI of {iri_m_per_km:.4g} m/km is more than any road has; "
-        "expected elevation_m in metres.")
+        f"Elevation in {_likely(iri_m_per_km)[0]}? An IRI of {iri_m_per_km:.4g} m/km is more than any road has"
+        f"{_in_others(iri_m_per_km)}; expected elevation_m in metres.")
+
+
+def doubts_of(iri_m_per_km: float) -> dict[str, list[dict[str, str]]]:
+    """The same for a program, to be added to its object: ``doubts``; or nothing."""
+    return {"doubts": [{"what": "unit", "words": words}]} if (words := unit_doubt(iri_m_per_km)) else {}
 
 
 def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
@@ -53,10 +58,10 @@ def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
         found = iri(elevation_m, spacing_m)
         if found <= ROUGHEST_M_PER_KM:
             return ""
-        likely = _likely(found) or "another unit"
-        column = "elevation_mm" if likely == "another unit" else f"elevation_{likely}"
-        return (f"expected elevations in m. Elevation in {likely}? By its IRI of {found:.4g} m/km, more than any road "
-                f"has, the profile seems to be in {likely}: name the column by its unit, as {column}, or write metres")
+        unit = _likely(found)[0]
+        return (f"expected elevations in m. Elevation in {unit}? By its IRI of {found:.4g} m/km, more than any road "
+                f"has{_in_others(found)}, the profile seems to be in {unit}: name the column by its unit, as "
+                f"elevation_{unit}, or write metres")
     slope = float(np.abs(np.diff(elevation_m)).mean()) / spacing_m
     return "" if slope <= _STEEPEST else (
         f"expected elevations in m, found a mean slope of {100 * slope:.4g} %, more than any road has. Elevation in "
@@ -88,7 +93,11 @@ def limit_hint(limit_m_per_km: float) -> str:
         f"{limit_m_per_km * INCH_PER_MILE_M_PER_KM:.4g} m/km")
 
 
-def _likely(iri_m_per_km: float) -> str:
-    """The first unit in which elevations with this IRI would be those of a road; nothing where there is none."""
+def _likely(iri_m_per_km: float) -> list[str]:
+    """The units in which elevations with this IRI would be those of a road; millimetres where there is none."""
     low, high = _ROADS_M_PER_KM
-    return next((unit for unit in ("mm", "cm", "in") if low <= iri_m_per_km * UNITS_M[unit] <= high), "")
+    return [unit for unit in ("mm", "cm", "in") if low <= iri_m_per_km * UNITS_M[unit] <= high] or ["mm"]
+
+
+def _in_others(iri_m_per_km: float) -> str:
+    return f" ({', '.join(f'{iri_m_per_km * UNITS_M[unit]:.3g} in {unit}' for unit in _likely(iri_m_per_km))})"

@@ -77,8 +77,12 @@ def test_the_iri_of_distances_in_another_unit_names_it(tmp_path: Path) -> None:
             main(["iri", file])
 
 
-def test_inches_are_doubted_and_no_more() -> None:
-    assert "in cm?" in unit_doubt(160.0)
+def test_inches_are_doubted_and_no_more(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path / "road.csv", "distance_m,elevation_m", DISTANCE_M, smooth() * 1e3 / 25.4 * 2)
+    for command in (["iri", file], ["road", "classify", file]):
+        assert main(command) == 0
+        assert "is more than any road has" in capsys.readouterr().out
+    assert "in cm? An IRI of 160 m/km is more than any road has (1.6 in cm, 4.06 in in)" in unit_doubt(160.0)
     assert unit_doubt(24.0) == ""
 
 
