@@ -74,7 +74,14 @@ def factored(model: DrivesModel, count: int) -> Preconditioner:
                                for first in range(0, count, _AT_ONCE)])
         normal = ssyrk(1 / model.variance, rows.T, beta=1.0, c=normal, trans=1, lower=1, overwrite_c=1)
     factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
-    return lambda residual: np.asarray(cho_solve(factor, residual.T.astype(np.float32), check_finite=False).T, float)
+
+    def condition(residual: Array) -> Array:
+        # By a power of two, which rounds nothing: of single precision 1e39 is infinite, and 1e-46 is 0.
+        scale = np.exp2(np.ceil(np.log2(np.abs(residual).max(axis=1, initial=np.finfo(float).tiny))))[:, None]
+        solved = cho_solve(factor, (residual / scale).T.astype(np.float32), check_finite=False).T
+        return np.asarray(solved, float) * scale
+
+    return condition
 
 
 def solve(model: DrivesModel, readings: Sequence[Array], count: int, solved: float, rounds: int | None = None,
@@ -89,22 +96,27 @@ def solve(model: DrivesModel, readings: Sequence[Array], count: int, solved: flo
     residual = model.back(readings, count)
     white = np.zeros_like(residual)
     unexplained = [one.copy() for one in readings]
-    direction, before = np.zeros_like(residual), np.full(len(residual), np.inf)
+    direction, before = np.zeros_like(residual), np.zeros(len(residual))
     first, done = None, 0
     while done < (MOST_ROUNDS if rounds is None else rounds):
         conditioned = condition(residual)
         size = (residual * conditioned).sum(axis=1)
+        # A preconditioner of another place, or of few digits, may point uphill: then it goes down from there anew.
+        uphill = size <= 0
+        conditioned[uphill] = residual[uphill]
+        size[uphill] = (residual[uphill] ** 2).sum(axis=1)
         first = size if first is None else first
         if rounds is None and (size <= solved**2 * first).all():
             break
         done += 1
-        direction = conditioned + (size / before)[:, None] * direction
+        kept = np.divide(size, before, out=np.zeros_like(size), where=(before > 0) & ~uphill)
+        direction = conditioned + kept[:, None] * direction
         image = model.readings(direction)
         curve = (direction**2).sum(axis=1) + sum((one**2).sum(axis=1) for one in image) / model.variance
-        step = (size / np.maximum(curve, 1e-300))[:, None]
+        step = np.divide(size, curve, out=np.zeros_like(size), where=curve > 0)[:, None]
         white += step * direction
         for one, part in zip(unexplained, image, strict=True):
             one -= step * part
         residual -= step * (direction + model.back(image, count))
-        before = np.maximum(size, 1e-300)
+        before = np.where(size > np.finfo(float).tiny, size, 0.0)
     return white, [one / model.variance for one in unexplained], done
