@@ -25,8 +25,6 @@ from logger.vehicle.effect_parameters import (
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_LEAST_INFORMATION = 1e-12
-
 
 @dataclass(frozen=True, eq=False)
 class RoadFit:
@@ -101,8 +99,8 @@ def _step(score: Array, information: Array, here: Array, low: Array, high: Array
 
 def inverse(information: Array, ridge: float = 1e-6) -> Array:
     """Inverse of a symmetric matrix (m, m), scaled to a unit diagonal and regularised by a ridge. Of a number of which
-    next to nothing is known, a standard error of 1e6 on its scale and more, it is 0: no step moves it."""
-    known = np.diag(information) > _LEAST_INFORMATION
+    next to nothing is known, a standard error of 1e8 on its scale, it is 0: no step moves it."""
+    known = np.diag(information) > np.finfo(float).eps
     scale = np.where(known, 1 / np.sqrt(np.where(known, np.diag(information), 1.0)), 0.0)
     scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
