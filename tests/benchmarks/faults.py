@@ -28,6 +28,7 @@ from ..support.faults import kills as killing
 from ..support.faults import sensors as sensor_faults
 from ..support.faults import sticks as stick_faults
 from ..support.faults.trials import Hazard, Line, run
+from ..support.fuzz.field_targets import FIELD_TARGETS
 from ..support.fuzz.mutation import Counts, read_counts
 from ..support.fuzz.targets import TARGETS
 from .figures import Figures, read_figures
@@ -164,7 +165,7 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
         f"slowest {max(float(row[2]) for row in huge):.0f} s of work, memory +{max(int(row[3]) for row in huge)} MB"
         if not failed else f"**BROKEN**: {'; '.join(failed)}", len(huge), wrong=failed)]
     lines += _readers(read_counts(done.stdout))
-    _check_ended(done, lines, len(TARGETS) + 1)
+    _check_ended(done, lines, len(TARGETS) + len(FIELD_TARGETS) + 1)
     return Group("Hostile input", _tool(inputs), lines)
 
 

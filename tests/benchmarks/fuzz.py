@@ -5,8 +5,11 @@
 
 Each reader gets N damaged inputs, or as many as all of them together get in S seconds. The tool is the project's own
 (``tests/support/fuzz``): mutation of valid examples and tokens, guided by the places in the sources where inputs are
-refused. With ``--huge-gb`` files that are huge or unpack to it come first. Prints one line per reader: inputs,
-accepted, refused, different ends, the slowest input, growth of memory, promises broken; what broke one is kept in the
+refused. Names that begin with ``fields:`` are readers, and with ``command:`` whole commands, on valid files in which a
+field, a column or some lines were changed; ``--only`` takes "fields" and "commands" for all of a kind, and commands,
+which take longer, are tried only there. No input may take more than 500 MB. With ``--huge-gb`` files that are huge or
+unpack to it come first. Prints one line per reader: inputs, accepted, refused, different ends, the slowest input,
+growth of memory, promises broken; what broke one is kept in the
 folder given by ``--keep``. With ``--record`` a line for every so many inputs goes to a file as well, and what that
 file counts already is not done again: a long run may be stopped and gone on with.
 """
@@ -41,13 +44,14 @@ def main() -> int:
     parser.add_argument("--record", type=Path, help="file to add the counts to, and to go on from")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--huge-gb", type=float, default=0.0)
-    parser.add_argument("--only", default=",".join(TARGETS))
+    parser.add_argument("--only", default=",".join([*BYTE_TARGETS, "fields"]))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder for inputs that broke a promise")
     args = parser.parse_args()
     until_s = time.monotonic() + args.seconds
     broken = _huge(args.huge_gb) if args.huge_gb else 0
-    names = args.only.split(",")
+    kinds = {"fields": FIELD_TARGETS, "commands": COMMAND_TARGETS}
+    names = [name for word in args.only.split(",") for name in kinds.get(word, (word,))]
     known = read_counts(args.record.read_text()) if args.record and args.record.exists() else {}
     counts = {name: known.get(name, Counts()) for name in names}
     with ProcessPoolExecutor(args.jobs, max_tasks_per_child=1) as pool:
