@@ -90,10 +90,11 @@ def _serve(config: Config, stop: Stop) -> None:
     beat_s = min(LONGEST_BEAT_S, watchdog_interval_s() or LONGEST_BEAT_S)
     MainLoop(core, storage, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
     notifier.stopping()
+    notifier.status(observer.ending())
     delay_learning.save()
     sensor_learning.save()
     observer.remove()
-    log.info("stopped: %d rows written", core.rows)
+    log.log(logging.ERROR if storage.log.rows_lost else logging.INFO, "%s", observer.ending())
 
 
 def make_log_folder(directory: Path) -> None:

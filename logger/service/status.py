@@ -94,7 +94,7 @@ class ServiceStatus:
     fix_valid       the receiver vouches for its last fix; None: there was none yet
     utc_known       rows carry true time
     current_file    the open log file; None while none can be written
-    rows_written    rows since the start of the service, in all files
+    rows_written    rows since the start of the service that are on the disk, in all files
     storage         how the disk takes them
     distance_m      travelled since the start of the service [m]
     free_bytes      room left where the logs are; None: not known

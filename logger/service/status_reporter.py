@@ -87,12 +87,23 @@ class StatusReporter:
         with suppress(OSError):
             self._config.status_file.unlink(missing_ok=True)
 
+    @property
+    def rows_on_disk(self) -> int:
+        """Rows of this service that are known to be on the disk: others wait for it, or were lost."""
+        return self._core.rows - self._storage.log.waiting - self._storage.log.rows_lost
+
+    def ending(self) -> str:
+        """What became of all rows, once the storage is closed."""
+        lost = self._storage.log.rows_lost
+        why = f", {lost} lost: {self._storage.log.trouble or 'the disk did not take them in time'}" if lost else ""
+        return f"stopped: {self.rows_on_disk} rows written{why}"
+
     def line(self) -> str:
         """The state in one line."""
         distance_km = self._pipeline.odometer.total_m / 1000.0
         sensors = ", ".join(f"{name} {part.state()}" for name, part in self._sensors.items())
         trouble = f", NOT WRITING: {self._storage.log.trouble}" if self._storage.log.trouble else ""
-        return f"{sensors}, {self._core.rows} rows, {distance_km:.1f} km{trouble}"
+        return f"{sensors}, {self.rows_on_disk} rows, {distance_km:.1f} km{trouble}"
 
     def snapshot(self, now_us: int) -> ServiceStatus:
         """Everything that ``ridelog status`` shows."""
@@ -114,7 +125,7 @@ class StatusReporter:
             utc_known=self._core.utc_known,
             log_directory=str(self._config.log.directory),
             current_file=self._storage.log.file_name,
-            rows_written=self._core.rows - storage.rows_waiting - storage.rows_lost,
+            rows_written=self.rows_on_disk,
             distance_m=self._pipeline.odometer.total_m,
             free_bytes=_free_bytes(str(self._config.log.directory)),
             last_window=self._core.last_record,

@@ -238,6 +238,32 @@ def may_write_no_more(folder: Path, case: None) -> Found:
     return found(reported=advice(full)[0], waited=full.storage.rows_waiting)
 
 
+def ends_while_it_may_not_write(folder: Path) -> tuple[str, list[str], int]:
+    """A service that is stopped while the system refuses longer files: the last words of its journal, what systemd
+    heard, and the rows in all its files."""
+    fast_drive(folder / "drive.dump.gz", 60.0)
+    service = KilledService(folder / "service", folder / "drive.dump.gz")
+    with (socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager,
+          patch.dict(os.environ, {"NOTIFY_SOCKET": str(folder / "notify")})):
+        manager.bind(str(folder / "notify"))
+        manager.setblocking(False)
+        process = service.start()
+        try:
+            _wait_for(service, process.pid, lambda status: status.rows_written > 20)
+            sidecar, *_ = service.log.glob("*.json")
+            limit = sidecar.stat().st_size - 1
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+            _wait_for(service, process.pid, lambda status: status.storage.rows_waiting > 10)
+            _drain(manager)  # what nobody reads leaves no room for the last words
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.wait(timeout=PATIENCE_S)
+            service.close()
+        heard = _drain(manager)
+    rows = {record.segment for path in service.log.glob("*.csv*") for record in read_log(path).records}
+    return (service.work / "stderr.txt").read_text().splitlines()[-1], heard, len(rows)
+
+
 def _wait_for(service: KilledService, pid: int, what: Callable[[ServiceStatus], bool]) -> ServiceStatus:
     until_s = time.monotonic() + PATIENCE_S
     status = None
