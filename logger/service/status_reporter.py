@@ -8,6 +8,8 @@ import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
+import numpy as np
+
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.listener import monotonic_us
@@ -26,6 +28,12 @@ RECENT_US = 15 * US_PER_S
 GRAVITY_TOLERANCE_G = 0.4
 LOOKS_WITHOUT_GRAVITY = 5
 UNREADABLE_S = 10.0
+_OTHER_UNITS = (
+    (STANDARD_GRAVITY_MPS2, "it seems to send m/s2, and is read as g. Choose the profile lines_mps2"),
+    (1 / STANDARD_GRAVITY_MPS2, "it seems to send g, and is read as m/s2. Choose the profile lines"),
+    (1000.0, "it seems to send thousandths of g, and is read as g. Have it send g"),
+)
+"""What gravity comes to in another unit than is read [g]."""
 log = logging.getLogger(__name__)
 
 
@@ -162,7 +170,11 @@ class StatusReporter:
         self._without_gravity += 1
         if self._without_gravity == LOOKS_WITHOUT_GRAVITY:
             axes = ", ".join(f"{name} {value:+.2f}" for name, value in zip("xyz", felt_g, strict=True))
-            self._gravity_advice = f"axis {word} does not feel 1 g ({axes} g): check vertical_axis, range and mounting"
+            in_g = float(np.hypot.reduce(felt_g))
+            near = GRAVITY_TOLERANCE_G / 2
+            unit = next((words for ratio, words in _OTHER_UNITS if abs(in_g / ratio - 1) <= near), "")
+            self._gravity_advice = (f"axis {word} does not feel 1 g ({axes} g): "
+                                    f"{unit or 'check vertical_axis, range and mounting'}")
             log.warning("accelerometer: %s", self._gravity_advice)
 
     def _look_at_stillness(self, now_us: int) -> None:

@@ -303,6 +303,18 @@ def test_a_receiver_without_fix_or_time_is_still_heard():
     assert [fix.valid for fix in decode(lines(*stuck))[0]] == [False] * 4
 
 
+@pytest.mark.parametrize("text", [
+    "GPRMC,::,V,0000.00000,S,0000.00000,W,---,,000000,,,N",
+    "GPRMC,235959.99,V,9999.9999,N,99999.9999,E,999.9,999.9,,,,N",
+    "GPGGA,------,,,,,0,-1,99.9,-,M,-,M,,",
+    "GPGLL,????.??,N,?????.??,E,,V",
+])
+def test_what_fills_the_fields_of_a_sentence_without_a_fix_may_be_anything(text):
+    fixes, counters = decode(lines(text) * 2)
+    assert [fix.valid for fix in fixes] == [False] * 2
+    assert (counters.malformed, counters.sentences) == (0, 2)
+
+
 def test_an_address_with_other_than_letters_and_digits_is_none():
     place = "120000,A,4807.038,N,01131.000,E,10.0,84.4,150626,,,A"
     assert parse_sentence(sentence(f"GNRMC,{place}")) is not None

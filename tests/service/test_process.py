@@ -343,3 +343,21 @@ def test_systemd_is_reported(
         assert service.terminate() == 0
         while (text := manager.recv(1000).decode()) != "STOPPING=1":
             assert text.startswith(("WATCHDOG", "STATUS"))
+
+
+@pytest.mark.slow
+def test_a_receiver_that_is_set_wrong_is_said_to_be(
+    ridelog: Path, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+) -> None:
+    """Whole sentences without a checksum, through real serial code: not "check the baud rate"."""
+    burst = b"$GPRMC,090000.00,A,1220.4000,N,04540.2000,E,19.44,45.0,040526,,,A\r\n"
+    receiver = SerialDevice(tmp_path / "gps", [Event(k * 1_000_000, "nmea", burst) for k in range(120)])
+    write_config(tmp_path, f"'dump:{short_dump}'")
+    service = start()
+    status = service.wait_for(lambda status: status["gps"]["state"] == "doubtful")
+    assert "come without a checksum" in status["gps"]["last_error"]
+    assert burst[:40].decode() in status["gps"]["last_error"]
+    shown = subprocess.run([ridelog, "status", "--config", tmp_path / "ridelog.yaml"], capture_output=True, text=True)
+    assert "GPS: for " in shown.stdout and "switch the checksum on in the receiver" in shown.stdout
+    assert service.terminate() == 0
+    receiver.pull()
