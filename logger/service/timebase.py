@@ -149,9 +149,11 @@ class Timebase:
                 self._stray = None  # later by and by, or less late than before, as some were lost that waited: no jump
                 return False
             stray = self._stray = _Stray(lag_us, fix.t_us, lag_us < floor_us, lag_us)
-            expected_us = max(1, round(passed_us / usual_us)) * usual_us if usual_us else 0
-            if usual_us and abs(passed_us - expected_us) < abs(own_passed_us - expected_us):
-                stray.is_jump, stray.floor_us = True, floor_us + expected_us - own_passed_us
+            if usual_us and abs(passed_us - usual_us) < abs(own_passed_us - usual_us):
+                stray.is_jump, stray.floor_us = True, floor_us + usual_us - own_passed_us
+            elif lag_us > floor_us and self.late_us > JUMP_US:
+                self._stray = None  # later than it was late already
+                return False
         stray.fixes += 1
         lasts = fix.t_us - stray.since_us >= LASTING_US and not fix.may_wait
         if stray.fixes < AGREEING_FIXES if stray.is_jump else not lasts:

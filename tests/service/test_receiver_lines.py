@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from datetime import datetime
+from statistics import fmean
 
 import pytest
 
 from logger.report.placed_rows import placed
 
-from ..support.drives.lines import SATELLITES, Receiver, drive, gga, gll, off_m, off_s, rmc, rmc_gga_and, vtg, zda
+from ..support.drives.lines import (
+    SATELLITES,
+    Receiver,
+    drive,
+    gga,
+    gll,
+    off_m,
+    off_mps,
+    off_s,
+    rmc,
+    rmc_gga_and,
+    vtg,
+    zda,
+)
 from ..support.drives.replay import core_for
 
 
@@ -58,6 +72,7 @@ def test_rows_have_the_place_and_time_of_their_instant(receiver: Receiver) -> No
     assert len(driven) > 110
     assert all(placed(row) for row in driven if row.distance_end_m != row.distance_start_m)
     assert max(abs(off_m(row)) for row in driven) < 1.5
+    assert fmean(abs(off_mps(row)) for row in driven) < 0.3
     jumped_us = max((at_s for at_s, _ in receiver.jumps), default=0) * 1e6 + 6e6
     assert max(abs(off_s(row)) for row in driven if row.t_us > jumped_us) < 0.1
 

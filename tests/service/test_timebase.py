@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 from datetime import UTC, datetime
 
+import pytest
+
 from drivers.readings import Fix
 from logger.service.timebase import DAY_US, Timebase
 
@@ -12,7 +14,7 @@ NOON_US = int(datetime(2026, 7, 4, 12, 0, 0, tzinfo=UTC).timestamp()) * 1_000_00
 BOOT_US = 500_000_000
 
 
-def fix_at(second: float, late_us: int, dated: bool = True, shift_us: int = 0) -> Fix:
+def fix_at(second: float, late_us: int, dated: bool = True, shift_us: int = 0, may_wait: bool = False) -> Fix:
     """A fix of the instant BOOT + second that arrived ``late_us`` later."""
     utc_us = NOON_US + round(second * 1e6) + shift_us
     return Fix(
@@ -27,6 +29,7 @@ def fix_at(second: float, late_us: int, dated: bool = True, shift_us: int = 0) -
         altitude_m=None,
         satellites=None,
         hdop=None,
+        may_wait=may_wait,
     )
 
 
@@ -99,3 +102,35 @@ def test_a_second_more_or_less_is_taken_over_after_three_fixes() -> None:
             placed = timebase.place(fix_at(second, 100_000, shift_us=leap_us))
             assert abs(placed.t_us - (BOOT_US + second * 1_000_000)) <= 1
         assert timebase.utc_offset_us() == NOON_US - BOOT_US + leap_us
+
+
+@pytest.mark.parametrize("may_wait", [True, False], ids=["a full line", "a queue that nobody sees"])
+def test_fixes_that_come_later_and_later_are_placed_by_their_own_times(may_wait: bool) -> None:
+    """Growing by a quarter of a second each to 3.2 s; then some are dropped for a while; at last all catch up."""
+    timebase = Timebase(0.1)
+    timebase.place(fix_at(0, 100_000))
+    for second in range(1, 120):
+        late_us = 100_000 + min(250_000 * second, 3_200_000) if second < 100 else 100_000
+        if 20 < second < 50 and second % 4 == 0:
+            continue
+        late_us -= 900_000 if 20 < second < 50 and second % 4 == 1 else 0
+        placed = timebase.place(fix_at(second, late_us, may_wait=may_wait))
+        assert abs(placed.t_us - (BOOT_US + second * 1_000_000)) < 20_000
+    assert timebase.time_jumps == 0
+
+
+def test_after_a_standstill_of_the_reader_fixes_are_placed_by_their_own_times() -> None:
+    """Five a second; what came in 3 s is read at once."""
+    timebase = Timebase(0.1)
+    for index in range(100):
+        second = index / 5
+        late_us = 100_000 + max(0, round(1e6 * (13 - second))) if 10 <= second < 13 else 100_000
+        assert abs(timebase.place(fix_at(second, late_us)).t_us - (BOOT_US + round(second * 1e6))) < 1000
+    assert timebase.time_jumps == 0
+
+
+def test_a_lone_early_time_does_not_move_those_after_it() -> None:
+    timebase = Timebase(0.1)
+    for second in range(20):
+        placed = timebase.place(fix_at(second, 100_000, shift_us=500_000 if second == 9 else 0))
+        assert abs(placed.t_us - (BOOT_US + second * 1_000_000)) < 1000

@@ -146,6 +146,12 @@ def off_m(row: WindowRecord) -> float:
     return (row.lat_deg - LAT_DEG) * M_PER_DEG * math.sqrt(2) - way_m(row.t_us / 1e6 + row.duration_s / 2)
 
 
+def off_mps(row: WindowRecord) -> float:
+    """How far a row's speed is beyond that of the car [m/s]."""
+    assert row.speed_mps is not None
+    return row.speed_mps - speed_mps(row.t_us / 1e6 + row.duration_s / 2)
+
+
 def off_s(row: WindowRecord) -> float:
     """How far a row's UTC is beyond what it was [s]."""
     assert row.utc_us is not None
