@@ -33,7 +33,7 @@ def main() -> int:
         within = 100 * (np.array(off) < 2).mean(axis=0)
         print(f"{method}: {count} records, {found} modes found, {missed} missed, {invented} that are not there")
         figures.at_most(f"{method}: modes that are not there", invented, 0, "")
-        figures.at_most(f"{method}: modes missed", missed, {"n4sid": 32, "ssi": 48}[method], "")
+        figures.at_most(f"{method}: modes missed", missed, {"n4sid": 12, "ssi": 20}[method], "")
         for what, share in zip(("frequency", "damping"), within.tolist(), strict=True):
             figures.at_least(f"{method}: {what} within 2 sd", share, 88, "%")
     return 1 if figures.missed else 0
