@@ -1,10 +1,12 @@
 """The command line: verbs, help, and faults that end in one line and a status."""
 
+import json
 import pkgutil
 import subprocess
 import sys
 import types
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +14,8 @@ import logger.commands
 from drivers.errors import DumpError, NotPresent, SettingsError
 from logger.commands import main
 from logger.errors import BadInput, CheckFailed
+
+from ..support.command import called
 
 
 def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file() -> None:
@@ -97,3 +101,22 @@ def test_a_closed_pipe_is_no_traceback() -> None:
         reported = process.stderr.read()
     assert reported == b""
     assert process.returncode == main.EXIT_PIPE_CLOSED
+
+
+def test_no_value_is_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What may repeat does all of it, and names each; what takes one value refuses a second, and does nothing."""
+    monkeypatch.chdir(tmp_path)
+    made = ["road", "generate", "--class", "B", "--length", "50", "--out", "road.csv"]
+    for twice in (["--out", "b.csv"], ["--length=60"]):
+        refused = called(*made, *twice)
+        assert refused.returncode == 2 and refused.stderr.count("\n") == 1
+        assert f"{twice[0].partition('=')[0]}: expected it once, found it twice" in refused.stderr
+    assert not list(tmp_path.iterdir())
+    assert called(*made).stderr.endswith("Wrote road.csv\n")
+    names = ["a.html", "a.svg", "b.html", "c.html"]
+    shown = called("iri", "road.csv", "--json", *(word for name in names for word in ("--out", name)))
+    assert shown.returncode == 0 and json.loads(shown.stdout)
+    assert shown.stderr.splitlines() == [f"Wrote {name}" for name in names]
+    assert {path.name for path in tmp_path.iterdir()} == {*names, "road.csv"}
+    again = called("iri", "road.csv", "--out", "a.html", "--out", "../" + tmp_path.name + "/a.html")
+    assert again.returncode == 2 and "expected every file to be another one" in again.stderr
