@@ -91,6 +91,12 @@ def test_a_car_that_shakes_itself_to_pieces(command: str, runs: list[str], tmp_p
                   str(tmp_path / "shakes.py")])
 
 
+def aimed(words: list[str], out: Path) -> list[str]:
+    """The same with another file to write."""
+    at = words.index("--out") + 1
+    return [*words[:at], str(out), *words[at + 1 :]]
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_what_cannot_be_written_is_refused_first(command: str, runs: list[str], tmp_path: Path) -> None:
     given, out = ["--vehicle", "rav4-2009", *runs], tmp_path / "none"
@@ -100,7 +106,7 @@ def test_what_cannot_be_written_is_refused_first(command: str, runs: list[str], 
     with pytest.raises(BadInput, match=words):
         main([*COMMANDS[command](out), *given])
     with pytest.raises(BadInput, match="a run's" if command != "lab" else "expected a folder"):
-        main([*COMMANDS[command](tmp_path), *given, "--out", str(Path(runs[0]) / "drive.csv")])
+        main([*aimed(COMMANDS[command](tmp_path), Path(runs[0]) / "drive.csv"), *given])
 
 
 def test_a_page_or_a_story_is_not_written_over_the_vehicle(runs: list[str], tmp_path: Path) -> None:
@@ -271,13 +277,13 @@ def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], 
     for more in ([], ["--out", str(tmp_path / "page.html")]):
         assert main(["compare", "--vehicle", "rav4-2009", str(tmp_path), "--json", *more]) == 0
         reported = capsys.readouterr()
-        assert reported.err == ""
+        assert reported.err == "".join(f"Wrote {path}\n" for path in more[1:])
     assert json.loads(reported.out)["error"] < 1
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
 def test_a_disk_that_is_full_is_named(command: str, fits: None, runs: list[str], tmp_path: Path) -> None:
-    done = called(*COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", runs[0], "--out", "/dev/full")
+    done = called(*aimed(COMMANDS[command](tmp_path), Path("/dev/full")), "--vehicle", "rav4-2009", runs[0])
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "ridelog: /dev/full: No space left on device\n"
 
