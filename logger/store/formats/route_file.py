@@ -77,7 +77,7 @@ def _post(path: Path | str, geometry: dict[str, Any], at_m: float | None) -> tup
     place = geometry.get("coordinates")
     try:
         lon_deg, lat_deg = (float(one) for one in place[:2])  # type: ignore[index]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         lon_deg, lat_deg = np.nan, np.nan
     if at_m is None or not (abs(lat_deg) <= 90 and abs(lon_deg) <= 360):
         raise BadInput(f"{path}: expected kilometre posts as points [longitude, latitude] with a number km, found "
