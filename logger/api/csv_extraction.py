@@ -31,6 +31,7 @@ from logger.api.extracted_runs import (
     write_runs,
 )
 from logger.bounds import ACCELERATION, samples_between
+from logger.dsp.repeated_samples import find_holds, still_until_s
 from logger.errors import BadInput
 from logger.left_out import LeftOut
 from logger.printable import counted, word
@@ -41,6 +42,7 @@ from logger.service.frozen_sensor import MOVING_MPS
 from logger.store.formats.logger_columns import Named, Recognised, advice, plain
 from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
 from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, units_of
+from logger.store.formats.record_checks import still_doubts
 from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
@@ -119,11 +121,11 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
         even = even_samples(time_s - origin_s, samples, RATE_HZ, range_end)
     except ValueError as error:
         raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
-    notes += [f"{role} is {axis[0]:.4g} m/s2 in every row, and a sensor that works shows some noise at least: check "
-              "that it was read" for role, axis in zip(AXES, samples.T, strict=False) if np.ptp(axis) == 0.0]
+    roles, held = AXES if samples.shape[1] > 1 else ("up",), find_holds(time_s, samples)
+    notes += [doubt.words for doubt in still_doubts(roles, time_s, samples, held) if "axis" in doubt.numbers]
     notes += _repairs(even)
     raw = _fixes(tables, asked, config, origin_s, even)
-    even = _without_standstill(even, raw, notes)
+    even, still_s = _without_standstill(even, raw, notes)
     receiver = receiver_of(config, even, raw, learns=has_gravity and samples.shape[1] == 3 and asked.speed_mps is None)
     if asked.speed_mps is not None:
         receiver = replace(receiver, delay_s=0.0, std_s=0.0)
@@ -134,7 +136,7 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
                         taken_hz=None if even.as_read else even.own_hz,
                         pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
     return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes),
-                    left_out=_left_out(even, len(time_s)))
+                    left_out=_left_out(even, len(time_s), still_s))
 
 
 # --- files ---
@@ -341,11 +343,12 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     return time_s[~twice], values[~twice]
 
 
-def _left_out(even: EvenSamples, count: int) -> tuple[LeftOut, ...]:
-    """Of so many samples."""
+def _left_out(even: EvenSamples, count: int, still_s: float) -> tuple[LeftOut, ...]:
+    """Of so many samples, and of as many seconds at the beginning in which nothing moved."""
+    still = LeftOut(sum(even.holds_s) + still_s, "s", "in which the sensor stood still on all axes")
     if even.holds_s:
-        return (LeftOut(sum(even.holds_s), "s", "in which the sensor stood still on all axes"),)
-    return (LeftOut(even.repeats * count, "sample", "that only repeated the one before"),)
+        return (still,)
+    return still, LeftOut(even.repeats * count, "sample", "that only repeated the one before")
 
 
 def _repairs(even: EvenSamples) -> list[str]:
@@ -371,17 +374,16 @@ def _repairs(even: EvenSamples) -> list[str]:
     return notes
 
 
-def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> EvenSamples:
-    """Without what a sensor said that stood still from the beginning, while the car drove."""
-    from logger.extraction.even_samples import still_until_s
+def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tuple[EvenSamples, float]:
+    """Without what a sensor said that stood still from the beginning, while the car drove; and how long it did [s]."""
     from logger.extraction.stretches import LONGEST_HOLE_S
 
     still = even.time_s <= still_until_s(even.time_s, even.samples)
     still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
     if (lasts_s := np.count_nonzero(still) / RATE_HZ) <= LONGEST_HOLE_S:
-        return even
+        return even, 0.0
     notes.append(f"the sensor stood still on all axes for the first {lasts_s:.3g} s, while the car drove; left out")
-    return replace(even, present=even.present & ~still)
+    return replace(even, present=even.present & ~still), lasts_s
 
 
 def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[str]) -> GridReadings:

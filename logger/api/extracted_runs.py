@@ -164,11 +164,14 @@ class Recorded:
 
 
 def apart(time_s: Array) -> npt.NDArray[np.bool_]:
-    """Which fixes (k,) come after those before them by as much as fixes do."""
+    """Which fixes (k,) come after those that are taken before them by as much as fixes do."""
     from logger.extraction.along_track import NEAREST_FIXES_S
 
-    before = np.maximum.accumulate(np.concatenate([[-np.inf], time_s[:-1] + NEAREST_FIXES_S]))
-    return np.asarray(time_s > before)
+    taken, last_s = np.zeros(len(time_s), dtype=np.bool_), -np.inf
+    for index, fix_s in enumerate(time_s.tolist()):
+        if fix_s > last_s + NEAREST_FIXES_S:
+            taken[index], last_s = True, fix_s
+    return taken
 
 
 def folder_of(source: Path, word: str) -> str:

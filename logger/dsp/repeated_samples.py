@@ -98,6 +98,11 @@ def fresh_samples(samples: Array) -> Bools:
     return fresh
 
 
+def still_until_s(time_s: Array, samples: Array) -> float:
+    """Until when samples (n, axes) are all the same as the first [s]: a parked car, or a sensor that does not work."""
+    return float(time_s[max(0, int(np.argmax(np.append(fresh_samples(samples)[1:], True))))])
+
+
 def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
     """Repeated samples (n, axes), all axes at once; None where there are none beyond chance, which
     gives some with a probability of ``false_alarm`` at most."""

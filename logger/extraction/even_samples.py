@@ -17,7 +17,7 @@ import numpy.typing as npt
 from logger.bounds import FASTEST_HZ
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import find_holds, find_repeats, fresh_samples, fresh_times, resolution
+from logger.dsp.repeated_samples import find_holds, find_repeats, fresh_times, resolution
 from logger.dsp.stretches import stretches_of
 from logger.dsp.uneven import mean_rate_hz, on_even_grid
 from logger.extraction.stretches import LONGEST_HOLE_S
@@ -66,11 +66,6 @@ def clipped_samples(samples: Array, range_end: float | None) -> Bools:
         for one in range_ends(axis):
             found |= np.sign(one.at) * axis >= abs(one.at) - half
     return found
-
-
-def still_until_s(time_s: Array, samples: Array) -> float:
-    """Until when samples (n, axes) are all the same as the first [s]: a parked car, or a sensor that does not work."""
-    return float(time_s[max(0, int(np.argmax(np.append(fresh_samples(samples)[1:], True))))])
 
 
 def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float | None = None) -> EvenSamples:

@@ -229,7 +229,7 @@ def test_a_folder_stands_for_the_file_in_it_or_is_refused_in_words(tmp_path: Pat
     at_m = 0.25 * np.arange(800)
     (run / "profile.csv").write_text("distance_m,elevation_m\n" + "\n".join(
         f"{one:.2f},{0.01 * np.sin(one):.5f}" for one in at_m))
-    for words, name in ((("comfort",), "drive.csv"), (("modes", "--method", "fft"), "drive.csv"),
+    for words, name in ((("comfort",), "drive.csv"), (("modes", "--method", "ssi"), "drive.csv"),
                         (("iri",), "profile.csv"), (("road", "classify"), "profile.csv")):
         of_folder, of_file = (called(*words, place, "--json") for place in (run, run / name))
         assert of_folder.returncode == 0, (words, of_folder.stderr)
@@ -244,6 +244,18 @@ def test_modes_refuses_sensors_that_stood_still_for_a_while(tmp_path: Path) -> N
     for one in (top, middle):
         one[1000:2000] = one[1000]
     path = write_record(tmp_path / "tower.csv", EVEN_S, top=top, middle=middle)
-    done = called("modes", path, "--method", "fft")
+    done = called("modes", path, "--method", "ssi")
     assert done.returncode == 2
     assert "tower.csv:1003: expected no hole above 0.5 s, found a sensor that stands still on all axes" in done.stderr
+
+
+def test_a_record_that_begins_with_a_sensor_at_rest_is_doubted(tmp_path: Path) -> None:
+    axes = [rounded(np.roll(at(EVEN_S, FINE), places), 0.001) for places in (0, 300, 600)]
+    for one in axes:
+        one[:1000] = one[0]
+    path = write_record(tmp_path / "record.csv", EVEN_S, accel_z_mps2=axes[0], accel_x_mps2=axes[1], accel_y_mps2=axes[2])
+    done = called("comfort", path, "--json")
+    assert done.returncode == 0, done.stderr
+    held = [one["seconds"] for one in json.loads(done.stdout)["doubts"] if one["what"] == "held"]
+    assert held == [pytest.approx(10, abs=0.02)]
+    assert "stands still on all axes for the first" in done.stderr

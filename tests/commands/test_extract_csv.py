@@ -277,9 +277,36 @@ def test_places_that_are_repeated_while_the_car_drives_on_are_no_fix_and_are_cou
 def test_a_sensor_that_stood_still_ends_a_run(still: tuple[int, int], runs: int, tmp_path: Path) -> None:
     log, _ = steady(tmp_path, slice(*still))
     done = called("extract", "--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o", "--json")
-    found = json.loads(done.stdout)["runs"]
-    assert len(found) == runs
-    assert sum(one["seconds"] for one in found) == pytest.approx(40 - (still[1] - still[0]) / 100, abs=1.5)
+    found = json.loads(done.stdout)
+    assert len(found["runs"]) == runs
+    stood_s = (still[1] - still[0]) / 100
+    assert sum(one["seconds"] for one in found["runs"]) == pytest.approx(40 - stood_s, abs=1.5)
+    (lost,) = found["left_out"]
+    assert lost["why"] == "in which the sensor stood still on all axes"
+    assert lost["amount"] == pytest.approx(stood_s, abs=0.1)
+
+
+def test_an_axis_that_stands_still_alone_is_named(tmp_path: Path) -> None:
+    log, _ = steady(tmp_path)
+    values = np.genfromtxt(log, delimiter=",", skip_header=1)
+    values[1000:2000, 3] = values[1000, 3]
+    log = table(tmp_path / "log.csv", "t,ax,ay,az,v", *values.T, form="%.3f")
+    found = json.loads(called("extract", "--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o",
+                              "--json").stdout)
+    assert [note for note in found["notes"] if note.startswith("z alone stands still for ")]
+
+
+@pytest.mark.parametrize("rate_hz", [10, 50, 100])
+def test_fixes_as_quick_as_readings_are_thinned_not_dropped(rate_hz: int, tmp_path: Path) -> None:
+    log, _ = steady(tmp_path)
+    fix_s = np.arange(0.0, 40.0, 1 / rate_hz)
+    obd = table(tmp_path / "obd.csv", "t_s,speed_mph", fix_s, 20 + 2 * np.sin(fix_s), form="%.4f")
+    found = json.loads(called("extract", "--csv", log, "--location", obd, "--columns", NAMES.replace("t=t:s", "t=t:s,t=t_s"),
+                              "--out", tmp_path / "o", "--json").stdout)
+    assert found["left_out"] == []
+    (run,) = found["runs"]
+    assert run["metres"] == pytest.approx(20 * 0.44704 * run["seconds"], rel=0.01)
+    assert run["seconds"] == pytest.approx(40, abs=0.6)
 
 
 def test_a_reading_a_second_is_no_record_and_one_that_is_all_clipped_no_run(tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ def find_table(data: bytes, file: str, fits: Callable[[Names], bool], unit_of: C
             names = _names(bare, delimiter)
             if fits(names):
                 return _below(data, file, head, number, end, line, names, delimiter, unit_of)
-    return _unknown(data, file, head, said)
+    return _unknown(data, file, head, said, unit_of)
 
 
 def _below(data: bytes, file: str, head: Sequence[tuple[int, int, str]], number: int, end: int, line: str,
@@ -152,17 +152,20 @@ def _below(data: bytes, file: str, head: Sequence[tuple[int, int, str]], number:
     return Table(file, number, line, names, units, delimiter, data[end:], number + 1)
 
 
-def _unknown(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: str | None) -> Table:
-    """By the first line of numbers: the header is the line of as many words above it."""
+def _unknown(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: str | None,
+             unit_of: Callable[[str], str | None] | None) -> Table:
+    """By the first line of numbers: the header is the line of as many words above it, or above a line of units."""
     above: list[tuple[int, int, str]] = []
     for number, end, line in head:
         for delimiter in _delimiters(line, said):
             cells = _names(line, delimiter)
             if len(cells) > 1 and any(map(_is_value, cells)) and all(_is_value(one) or _is_empty(one) for one in cells):
-                for before in reversed(above):
-                    names = _names(before[2], delimiter)
-                    if len(names) == len(cells) and not any(map(_is_value, names)):
-                        return _below(data, file, head, *before, names, delimiter, None)
+                alike = [(before, names) for before in reversed(above) for names in [_names(before[2], delimiter)]
+                         if len(names) == len(cells) and not any(map(_is_value, names))]
+                if len(alike) > 1 and unit_of is not None and any(map(unit_of, alike[0][1])):
+                    alike.pop(0)
+                if alike:
+                    return _below(data, file, head, *alike[0][0], alike[0][1], delimiter, unit_of)
                 if not above:
                     return Table(file, 0, line, (), (), delimiter, data, number)
                 return _first(data, file, above, said)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times
+from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times, still_until_s
 from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
 from logger.left_out import LeftOut, counting
@@ -131,7 +131,10 @@ def even_record(
     doubts += hold_doubts(t_s, held, file)
     if moving is None or moving.any():
         driven = slice(None) if moving is None else moving
-        doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven], file)
+        if not samples[driven, 0].any():
+            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
+                           "shows some noise at least; check that it was read")
+        doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven])
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
         raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
@@ -275,15 +278,17 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     return []
 
 
-def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools, file: str) -> list[Doubt]:
-    """Axes of samples (n, axes) that never move, or stand still for long where the others do not. BadInput where the
-    first is 0 all along."""
+def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) -> list[Doubt]:
+    """Axes of samples (n, axes) that never move, or stand still for long where the others, which were ``held`` (n,) at
+    times, do not; and a beginning in which none moves: a parked car or a sensor that was not read."""
     doubts = []
-    for axis, (name, values) in enumerate(zip(names, samples.T, strict=True)):
+    begin_s = still_until_s(t_s, samples) - t_s[0]
+    if begin_s > WIDEST_STEP_S and not held[1] and np.ptp(samples, axis=0).any():
+        doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, or "
+                            "it was not read; the ride after it is harder than the values say: cut it off",
+                            {"seconds": float(begin_s), "places": 1}))
+    for name, values in zip(names, samples.T, strict=True):
         if np.ptp(values) == 0.0:
-            if values[0] == 0.0 and axis == 0:
-                raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
-                               "shows some noise at least; check that it was read")
             doubts.append(Doubt("constant", f"every sample of {name} is {values[0]:.4g} m/s2: a sensor that works "
                                 "shows some noise at least; check that it was read",
                                 {"axis": name, "value_mps2": float(values[0])}))

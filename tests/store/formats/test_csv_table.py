@@ -168,3 +168,12 @@ def test_a_line_of_units_below_the_names_of_a_phone(tmp_path: Path) -> None:
     assert {role: column.unit for role, column in known.columns.items()} == {"t": "ms", "up": "g", "speed": "mph"}
     table = read_table(header, known)
     assert (table.columns["t"].tolist(), list(table.lines)) == ([0.5, 1.5], [3, 4])
+
+
+def test_units_below_names_that_nobody_knows_are_no_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("maker\nt,x,y,z\ns,m/s^2,m/s^2,m/s^2\n0,1,2,9.8\n0.01,1,2,9.8\n")
+    header = read_header(path)
+    assert (header.names, header.line) == (("t", "x", "y", "z"), 2)
+    path.write_text("g,s\n1,2\n")  # alone they are names
+    assert read_header(path).names == ("g", "s")
