@@ -253,7 +253,8 @@ def test_a_record_that_begins_with_a_sensor_at_rest_is_doubted(tmp_path: Path) -
     axes = [rounded(np.roll(at(EVEN_S, FINE), places), 0.001) for places in (0, 300, 600)]
     for one in axes:
         one[:1000] = one[0]
-    path = write_record(tmp_path / "record.csv", EVEN_S, accel_z_mps2=axes[0], accel_x_mps2=axes[1], accel_y_mps2=axes[2])
+    path = write_record(tmp_path / "record.csv", EVEN_S, accel_z_mps2=axes[0], accel_x_mps2=axes[1],
+                        accel_y_mps2=axes[2])
     done = called("comfort", path, "--json")
     assert done.returncode == 0, done.stderr
     held = [one["seconds"] for one in json.loads(done.stdout)["doubts"] if one["what"] == "held"]

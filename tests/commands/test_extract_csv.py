@@ -301,7 +301,7 @@ def test_fixes_as_quick_as_readings_are_thinned_not_dropped(rate_hz: int, tmp_pa
     log, _ = steady(tmp_path)
     fix_s = np.arange(0.0, 40.0, 1 / rate_hz)
     obd = table(tmp_path / "obd.csv", "t_s,speed_mph", fix_s, 20 + 2 * np.sin(fix_s), form="%.4f")
-    found = json.loads(called("extract", "--csv", log, "--location", obd, "--columns", NAMES.replace("t=t:s", "t=t:s,t=t_s"),
+    found = json.loads(called("extract", "--csv", log, "--location", obd, "--columns", f"{NAMES},t=t_s",
                               "--out", tmp_path / "o", "--json").stdout)
     assert found["left_out"] == []
     (run,) = found["runs"]

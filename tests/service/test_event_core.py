@@ -162,7 +162,7 @@ def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive, line
 
 
 def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
-    with pytest.raises(BadInput, match="expected --vehicle FILE.yaml or one of"):
+    with pytest.raises(BadInput, match=r"expected --vehicle FILE\.yaml or one of"):
         core_for(replace(short_drive.header, vehicle="hovercraft"))
 
 

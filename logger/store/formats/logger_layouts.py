@@ -99,5 +99,6 @@ LAYOUTS = (
     _layout("ridelog record", t="t_s|s", x="accel_x_mps2|m/s2", y="accel_y_mps2|m/s2", z="accel_z_mps2|m/s2"),
     _layout("ridelog record", t="t_s|s", up="accel_z_mps2|m/s2"),
     _layout("ridelog speed and place", t="t_s|s", lat="lat_deg|deg", lon="lon_deg|deg", speed="speed_mps|m/s"),
-    *(_layout("ridelog speed", t="t_s|s", speed=speed) for speed in ("speed_mps|m/s", "speed_kmh|km/h", "speed_mph|mph")),
+    *(_layout("ridelog speed", t="t_s|s", speed=speed)
+      for speed in ("speed_mps|m/s", "speed_kmh|km/h", "speed_mph|mph")),
 )

@@ -284,8 +284,8 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
     doubts = []
     begin_s = still_until_s(t_s, samples) - t_s[0]
     if begin_s > WIDEST_STEP_S and not held[1] and np.ptp(samples, axis=0).any():
-        doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, or "
-                            "it was not read; the ride after it is harder than the values say: cut it off",
+        doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, "
+                            "or it was not read; the ride after it is harder than the values say: cut it off",
                             {"seconds": float(begin_s), "places": 1}))
     for name, values in zip(names, samples.T, strict=True):
         if np.ptp(values) == 0.0:
