@@ -122,7 +122,8 @@ _PROTOCOLS = (
 )
 _LARGEST_FRAME = 2048
 _GARMIN_OR_TSIP = re.compile(rb"\x10([^\x03\x10])((?:[^\x10]|\x10\x10){1,255}?)\x10\x03")
-_MAVLINK = {0xFE: (8, "MAVLink messages (a flight controller)"), 0xFD: (12, "MAVLink messages (a flight controller)")}
+_MAVLINK = {0xFE: (8, 2), 0xFD: (12, 4)}
+"""First byte of a message of version 1 and 2: how many bytes it has beside its load, and where it is numbered."""
 
 
 def _folded(data: bytes) -> int:
@@ -176,8 +177,8 @@ def _frames(data: bytes) -> Contents | None:
             at = data.find(protocol.sync, at + (size if right else 1))
         found.append((covered, protocol.by, protocol.name))
     found += _stuffed_frames(data)
-    for sync, (more, name) in _MAVLINK.items():
-        found.append((_chained(data, sync, more), SENSOR, name))
+    found += [(_chained(data, sync, more, number_at), SENSOR, "MAVLink messages (a flight controller)")
+              for sync, (more, number_at) in _MAVLINK.items()]
     covered, by, name = max(found)
     return Contents(f"{by}_binary", name, "") if covered > _MOST * len(data) else None
 
@@ -193,12 +194,13 @@ def _stuffed_frames(data: bytes) -> list[tuple[int, str, str]]:
     return [(garmin + 1 if garmin else 0, RECEIVER, "Garmin binary packets"), (tsip, RECEIVER, "Trimble TSIP packets")]
 
 
-def _chained(data: bytes, sync: int, more: int) -> int:
-    """Bytes in frames whose second byte says their length and behind which the next one begins."""
+def _chained(data: bytes, sync: int, more: int, number_at: int) -> int:
+    """Bytes in frames whose second byte says their length and behind which the next one begins, numbered one higher."""
     covered, at = 0, data.find(sync)
-    while 0 <= at < len(data) - 1:
+    while 0 <= at < len(data) - number_at:
         end = at + data[at + 1] + more
-        right = end < len(data) and data[end] == sync
+        right = (end + number_at < len(data) and data[end] == sync
+                 and data[end + number_at] == (data[at + number_at] + 1) & 0xFF)
         covered += end - at if right else 0
         at = end if right else data.find(sync, at + 1)
     return covered

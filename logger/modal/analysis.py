@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.modal import subspace
 from logger.modal.decay import decay_modes
@@ -101,8 +102,22 @@ def find_modes(
     place = len(thinned) - 1
     found = diagram[place] if inputs is not None else _without_bias(diagram[place], len(samples) / rate_hz)
     covariance = jackknife(segments, lambda part: plan.models(part, [chosen])[0], found.poles)
+    if inputs is None:
+        covariance = _no_surer_than_the_record(covariance, found.poles, len(samples) / rate_hz)
     modes, rejected = judge(found, covariance, diagram[place + 1:], scale, len(samples) / rate_hz)
     return ModalResult(tuple(modes), tuple(rejected), chosen, how, tuple(diagram))
+
+
+def _no_surer_than_the_record(covariance: Array, poles: npt.NDArray[np.complex128], duration_s: float) -> Array:
+    """Covariance (n, 2, 2) whose variances are at least what random shaking of this length can show of a pole.
+
+    The envelope of a mode that is shaken by white noise is a complex Ornstein-Uhlenbeck process; over a time T its decay
+    rate a and its frequency are known to a variance of a / T at best each (S.-K. Au, Mechanical Systems and Signal
+    Processing 48, 2014, "Uncertainty law in ambient modal identification": zeta / (2 pi N) for N cycles, the same).
+    """
+    least = np.abs(poles.real)[:, None] / duration_s
+    wanting = np.maximum(least - np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return np.asarray(covariance + wanting[:, :, None] * np.eye(2))
 
 
 def _without_bias(found: OrderPoles, duration_s: float) -> OrderPoles:

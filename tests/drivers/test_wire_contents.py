@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import struct
 import zlib
@@ -98,8 +99,16 @@ def xsens() -> bytes:
     return b"\xfa" + body + bytes((-sum(body) % 256,))
 
 
+NUMBERS = itertools.cycle(range(256))
+
+
 def mavlink() -> bytes:
-    return b"\xfd" + bytes((28,)) + payload(8) + payload(28) + payload(2)
+    return b"\xfd" + bytes((28, 0, 0, next(NUMBERS))) + payload(5) + payload(28) + payload(2)
+
+
+def of_another_baud_rate() -> bytes:
+    """Bytes in which few edges fall: the same five again and again, 0xFE and others that begin frames among them."""
+    return bytes(RNG.choice((0x00, 0x80, 0xF8, 0xFE, 0xE6, RNG.randrange(256))) for _ in range(40))
 
 
 def lines(*texts: str) -> Callable[[], bytes]:
@@ -132,6 +141,7 @@ def damaged() -> bytes:
     (lines(">RPV54321+1234567-00123456712300012;ID=1;*7F<\r\n"), "text"),
     (lambda: b"\x00" * 40, "level"),
     (lambda: payload(40), "noise"),
+    (of_another_baud_rate, "noise"),
 ], ids=lambda value: getattr(value, "__name__", value))
 def test_what_comes_is_recognised_wherever_the_listening_began(make: Callable[[], bytes], kind: str) -> None:
     data = b"".join(make() for _ in range(60))
