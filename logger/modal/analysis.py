@@ -111,9 +111,10 @@ def find_modes(
 def _no_surer_than_the_record(covariance: Array, poles: npt.NDArray[np.complex128], duration_s: float) -> Array:
     """Covariance (n, 2, 2) whose variances are at least what random shaking of this length can show of a pole.
 
-    The envelope of a mode that is shaken by white noise is a complex Ornstein-Uhlenbeck process; over a time T its decay
-    rate a and its frequency are known to a variance of a / T at best each (S.-K. Au, Mechanical Systems and Signal
-    Processing 48, 2014, "Uncertainty law in ambient modal identification": zeta / (2 pi N) for N cycles, the same).
+    The envelope of a mode that is shaken by white noise is a complex Ornstein-Uhlenbeck process; over a time T its
+    decay rate a and its frequency are known to a variance of a / T at best each (S.-K. Au, Mechanical Systems and
+    Signal Processing 48, 2014, "Uncertainty law in ambient modal identification": zeta / (2 pi N) for N cycles, the
+    same).
     """
     least = np.abs(poles.real)[:, None] / duration_s
     wanting = np.maximum(least - np.diagonal(covariance, axis1=1, axis2=2), 0.0)

@@ -129,8 +129,15 @@ def test_every_option_that_names_a_file_to_write_is_tried() -> None:
         assert set(name.split()) & WRITE <= set(writer.words.split())
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW) if name.split()[0] in {
-    "extract", "plan", "diagnose", "learn", "calibrate"} else name for name in WRITERS])
+QUICK = ("road generate --out", "convert --to", "fleet ingest --to")  # a file, of another format, a folder
+
+
+RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out")  # the longest, by one writer more
+
+
+@pytest.mark.parametrize("name", [
+    name if name in QUICK else pytest.param(name, marks=pytest.mark.release if name in RELEASE else SLOW)
+    for name in WRITERS])
 def test_what_was_there_stays(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place, writer = tmp_path / "place", WRITERS[name]
     place.mkdir()

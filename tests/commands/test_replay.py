@@ -97,7 +97,7 @@ def test_a_recording_that_was_cut_gives_what_it_holds(
     same = [pair for pair in both if float(pair[0][2]) < float(both[-1][0][2]) - 8.0]
     assert len(same) > 15
     assert [one[2:-1] for one, _ in same] == [other[2:-1] for _, other in same]
-    # Rows from before the date was known are dated when their file is finished, by what its receiver had shown till then.
+    # Rows from before the date was known are dated when their file is finished, by what was known of the clocks then.
     apart_s = [abs((datetime.fromisoformat(one[1]) - datetime.fromisoformat(other[1])).total_seconds())
                for one, other in same]
     assert max(apart_s) < 0.01
