@@ -132,7 +132,7 @@ def test_every_option_that_names_a_file_to_write_is_tried() -> None:
 QUICK = ("road generate --out", "convert --to", "fleet ingest --to")  # a file, of another format, a folder
 
 
-RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out")  # the longest, by one writer more
+RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out")  # the longest
 
 
 @pytest.mark.parametrize("name", [
