@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,7 @@ from logger.commands.numbers import add_number, named_numbers
 from logger.commands.pictures import HELP, parted, write_pictures
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import together
+from logger.printable import printable
 
 if TYPE_CHECKING:
     from logger.profiles.excitation import Excitation
@@ -249,12 +251,18 @@ def _road(args: argparse.Namespace) -> Track:
     import numpy as np
 
     from logger.profiles.track import Track
+    from logger.roads.plausible import doubt_of
     from logger.simulation.virtual_drive import Obstacle, with_obstacles
     from logger.store.formats.drive_file import track_of
     from logger.store.formats.profile_file import read_profile
 
-    track = (Track(args.flat, np.zeros(2)) if args.flat is not None else
-             track_of(read_profile(args.profile, judged=True)))
+    if args.flat is not None:
+        track = Track(args.flat, np.zeros(2))
+    else:
+        profile = read_profile(args.profile, judged=True)
+        track = track_of(profile)
+        if words := doubt_of(profile.elevation_m, profile.spacing_m):
+            print(printable(f"ridelog: {args.profile}: {words}"), file=sys.stderr)
     wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
     try:
         return with_obstacles(track, wanted)

@@ -48,13 +48,22 @@ def doubts_of(iri_m_per_km: float) -> dict[str, list[dict[str, str]]]:
     return {"doubts": [{"what": "unit", "words": words}]} if (words := unit_doubt(iri_m_per_km)) else {}
 
 
+def doubt_of(elevation_m: Array, spacing_m: float) -> str:
+    """``unit_doubt`` of a profile (n,) [m]; nothing where it has no IRI."""
+    return unit_doubt(iri(elevation_m, spacing_m)) if _has_iri(elevation_m, spacing_m) else ""
+
+
+def _has_iri(elevation_m: Array, spacing_m: float) -> bool:
+    return spacing_m <= COARSEST_SPACING_M and (len(elevation_m) - 1) * spacing_m >= START_M
+
+
 def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
     """What is wrong with a profile (n,) [m] that cannot be one in metres ("expected ..., found ..."); else nothing."""
     if spacing_m < _FINEST_M:
         others = " or ".join(f"{spacing_m * UNITS_M[unit]:.3g} m in {unit}" for unit in ("km", "mi"))
         return (f"expected distances in m, found samples {spacing_m:.3g} m apart, finer than any profiler takes them "
                 f"(they are {others}): name the column by its unit, as distance_km or distance_mi")
-    if spacing_m <= COARSEST_SPACING_M and (len(elevation_m) - 1) * spacing_m >= START_M:
+    if _has_iri(elevation_m, spacing_m):
         found = iri(elevation_m, spacing_m)
         if found <= ROUGHEST_M_PER_KM:
             return ""

@@ -374,3 +374,14 @@ def test_the_effects_there_are(capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_a_drive_needs_is_asked_for(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"expected --profile or --flat, --out"):
         main(["simulate", "--vehicle", "rav4-2009", "--speed", "3"])
+
+
+def test_a_road_that_seems_to_be_in_another_unit_is_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    road, at_m = tmp_path / "road.csv", 0.25 * np.arange(1200)
+    for scale, words in ((1.0, ""), (100.0, "Elevation in cm?")):
+        write_profile(road, Track(0.25, scale * 0.0005 * np.sin(at_m / 0.4)))
+        main(["simulate", "--vehicle", "rav4-2009", "--profile", str(road), "--speed", "10", "--json",
+              "--out", str(tmp_path / "drive.csv")])
+        said = capsys.readouterr()
+        assert json.loads(said.out)["samples"] > 0
+        assert (f"{road}: {words}" in said.err) == bool(words), said.err
