@@ -26,9 +26,12 @@ from drivers.nmea_sentences import Checksum, MalformedError, check, parse_checke
 RECENT_BYTES = 4096
 SHOWN_CHARACTERS = 60
 _FEWEST_SENTENCES = 3
+_FEWEST_NUMBERS = 4
 _MOST = 0.5
 _TEXT_SHARE = 0.9
 _ONE_BYTE_SHARE = 0.9
+_ASCII_SHARE = 0.75
+"""Of random bytes 0.38 are printable ASCII; of a line with a degree or square sign at each of three numbers, 0.9."""
 
 RECEIVER, SENSOR = "receiver", "sensor"
 
@@ -136,10 +139,10 @@ def _folded(data: bytes) -> int:
 
 def recognise(data: bytes) -> Contents:
     """What some thousand bytes of a line are."""
-    if data and max(data.count(byte) for byte in set(data)) >= _ONE_BYTE_SHARE * len(data):
+    framed = _frames(data)
+    if framed is None and data and max(data.count(byte) for byte in set(data)) >= _ONE_BYTE_SHARE * len(data):
         byte = max(set(data), key=data.count)
         return Contents("level", f"hardly anything but the byte 0x{byte:02x}", "")
-    framed = _frames(data)
     sentences: dict[Checksum, list[bytes]] = {found: [] for found in Checksum}
     for line in _sentences(data):
         sentences[check(line)].append(line)
@@ -195,18 +198,22 @@ def _stuffed_frames(data: bytes) -> list[tuple[int, str, str]]:
 
 
 def _chained(data: bytes, sync: int, more: int, number_at: int) -> int:
-    """Bytes in frames whose second byte says their length and behind which the next one begins, numbered one higher."""
+    """Bytes in frames whose second byte says their length and behind which the next one begins, numbered one higher;
+    none where few numbers come: a line at a wrong baud rate has few values, which fit by chance."""
+    numbers: set[int] = set()
     covered, at = 0, data.find(sync)
     while 0 <= at < len(data) - number_at:
         end = at + data[at + 1] + more
         right = (end + number_at < len(data) and data[end] == sync
                  and data[end + number_at] == (data[at + number_at] + 1) & 0xFF)
-        covered += end - at if right else 0
+        if right:
+            covered += end - at
+            numbers.add(data[at + number_at])
         at = end if right else data.find(sync, at + 1)
-    return covered
+    return covered if len(numbers) >= _FEWEST_NUMBERS else 0
 
 
-_SENTENCE = re.compile(rb"[$!][A-Z][ -#%-~]*")
+_SENTENCE = re.compile(rb"[$!](?:P[A-Z]{2}|[A-Z]{2}[A-Z\d]{3},)[ -#%-~]*")
 
 
 def _sentences(data: bytes) -> list[bytes]:
@@ -242,11 +249,20 @@ def _text_lines(data: bytes) -> tuple[list[bytes], float]:
     return [part for part in whole if part], sum(map(len, texts)) / size if size else 0.0
 
 
+_ESCAPE = re.compile(rb"\x1b\[[\d;?]*[A-Za-z]")
+_NOT_ASCII = re.compile(rb"[\x80-\xff]")
+_CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
 def _is_text(line: bytes) -> bool:
+    """A line of UTF-8, or of ASCII with some other bytes: a degree sign of an older code, a terminal's colours."""
     try:
-        return line.decode("utf-8").replace("\t", " ").isprintable()
+        if line.decode("utf-8").replace("\t", " ").isprintable():
+            return True
     except UnicodeDecodeError:
-        return False
+        pass
+    plain = _ESCAPE.sub(b"", line)
+    return not _CONTROL.search(plain) and len(_NOT_ASCII.sub(b"", plain)) >= _ASCII_SHARE * len(plain)
 
 
 _PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} *)?")
@@ -254,7 +270,7 @@ _PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} 
 
 def _form_of_numbers(lines: list[bytes]) -> str:
     """How lines with three numbers or more differ from ``x,y,z``; empty where they are no such lines."""
-    texts = [line.decode("utf-8") for line in lines]
+    texts = [line.decode("utf-8", "replace") for line in lines]
     rows = [numbers_in(line) for line in lines]
     count = sorted(map(len, rows))[len(rows) // 2]
     same = [row for row in rows if len(row) == count]
@@ -289,8 +305,8 @@ _DAMAGED = ("{what} sentences have a wrong checksum{shown}, so they are damaged 
             "length of the cable, and that no other device is on this port")
 
 ADVICE = {
-    (RECEIVER, "sentences"): "it sends {what}, but no place{shown}: have it send RMC, which says time, date, place and "
-                             "speed in one sentence",
+    (RECEIVER, "sentences"): "it sends {what}{shown}, and places are taken from RMC, GGA and GLL alone: have it send "
+                             "RMC, which says time, date, place and speed in one sentence",
     (RECEIVER, "no_checksum"): "its sentences ({what}) come without a checksum{shown}, and are not taken, as a damaged "
                                "one would not be noticed: switch the checksum on in the receiver",
     (RECEIVER, "damaged"): _DAMAGED,

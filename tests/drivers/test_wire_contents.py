@@ -129,6 +129,7 @@ def damaged() -> bytes:
 
 @pytest.mark.parametrize(("make", "kind"), [
     *((make, "receiver_binary") for make in (ubx, sirf, rtcm, sbf, novatel, mediatek, tsip, garmin)),
+    (lambda: b"\xb5\x62" + (body := b"\x01\x07\x5c\x00" + bytes(92)) + fletcher(body), "receiver_binary"),
     *((make, "sensor_binary") for make in (witmotion, xsens, mavlink)),
     (nmea("GSV", numMsg=1, msgNum=1, numSV=0), "sentences"),
     (nmea("HDT", heading=12.5), "sentences"),
@@ -137,6 +138,9 @@ def damaged() -> bytes:
     (lines("{x:.3f},{y:.3f},{z:.3f}\r\n"), "numbers"),
     (lines("X: {x:.2f}  Y: {y:.2f}  Z: {z:.2f}  m/s^2 \r\n"), "numbers"),
     (lines('{{"ax": {x:.3f}, "ay": {y:.3f}, "az": {z:.3f}}}\n'), "numbers"),
+    (lambda: "X: 0.49\xb0  Y: -0.98\xb0  Z: 9.80\xb0\r\n".encode("latin-1"), "numbers"),
+    (lambda: b"\x1b[32m0.01,-0.02,0.98\x1b[0m\r\n", "text"),
+    (lambda: b"$ACC,0.01,-0.02,0.98\r\n", "numbers"),
     (lines("I (1234) boot: chip revision: v0.1\r\n", "E (99) sensor not found\r\n"), "text"),
     (lines(">RPV54321+1234567-00123456712300012;ID=1;*7F<\r\n"), "text"),
     (lambda: b"\x00" * 40, "level"),
@@ -150,19 +154,27 @@ def test_what_comes_is_recognised_wherever_the_listening_began(make: Callable[[]
         assert (port, kind) in ADVICE
 
 
-def test_sentences_at_a_wrong_baud_rate_are_noise() -> None:
-    """As a UART reads them at half their rate: each of its bits takes every other one of theirs."""
-    bits = [bit for byte in without_checksum() * 40 for bit in (0, *(byte >> k & 1 for k in range(8)), 1)]
-    found, at = bytearray(), 0
-    while at + 20 <= len(bits):
-        if bits[at]:
-            at += 1
+def at_another_rate(data: bytes, ratio: float, idle_bits: int) -> bytes:
+    """What a UART whose bits last ``ratio`` times as long reads, with so many idle bits behind each byte."""
+    bits = [bit for byte in data for bit in (0, *(byte >> k & 1 for k in range(8)), *[1] * (1 + idle_bits))]
+    found, at = bytearray(), 0.0
+    while at + 10 * ratio < len(bits):
+        if bits[int(at)]:
+            at = int(at) + 1
             continue
-        found.append(sum(bits[at + 1 + 2 * (k + 1)] << k for k in range(8) if at + 3 + 2 * k < len(bits)))
-        at += 20
-    assert recognise(bytes(found)).kind == "noise"
+        found.append(sum(bits[int(at + ratio * (k + 1.5))] << k for k in range(8)))
+        at += 9.5 * ratio
+    return bytes(found)
+
+
+@pytest.mark.parametrize("ratio", [1 / 6, 1 / 3, 1 / 2, 2, 3, 4])
+@pytest.mark.parametrize("idle_bits", [3, 40])
+def test_text_at_a_wrong_baud_rate_is_noise(ratio: float, idle_bits: int) -> None:
+    for make in (without_checksum, lines("{x:.3f},{y:.3f},{z:.3f}\r\n")):
+        found = at_another_rate(b"".join(make() for _ in range(200)), ratio, idle_bits)
+        assert recognise(found).kind in ("noise", "level")
     decoder = NmeaDecoder()
-    decoder.feed(0, bytes(found))
+    decoder.feed(0, at_another_rate(without_checksum() * 40, 2, 0))
     assert "check the baud rate" in decoder.unread
 
 
@@ -172,7 +184,9 @@ def test_at_the_receivers_port_it_says_what_comes_and_what_to_do() -> None:
         decoder.feed(0, b"".join(make() for _ in range(40)))
         return decoder.unread
 
-    assert "sends GSV, but no place" in said(nmea("GSV", numMsg=1, msgNum=1, numSV=0))
+    assert said(nmea("GSV", numMsg=1, msgNum=1, numSV=0)).startswith("it sends GSV (such as '$")
+    assert "places are taken from RMC, GGA and GLL alone: have it send RMC" in said(
+        nmea("GNS", posMode="AA", numSV=9, lat=45.0, NS="N", lon=7.0, EW="E"))
     assert "switch the checksum on" in said(without_checksum)
     assert "$GPRMC,090000.00,A" in said(without_checksum)
     assert "UBX frames" in said(ubx)
