@@ -569,3 +569,15 @@ def test_a_rollover_is_advised_with_the_date_that_it_gives_and_never_of_a_date_t
     assert "cannot be" in decoder.doubt
     assert ("week_rollovers" in decoder.doubt) == bool(advised)
     assert advised in decoder.doubt
+
+
+def test_a_receiver_that_names_no_date_is_told_what_to_send():
+    """GGA and VTG alone give places and speeds, and no row would ever have a date."""
+    decoder = NmeaDecoder()
+    for second in range(30):
+        decoder.feed(second * 1_000_000, lines(gga(clock=f"1200{second:02d}.00"), "GPVTG,84.4,T,,M,10.0,N,18.5,K,A"))
+    assert decoder.doubt.startswith("it sends GGA and VTG, but no date")
+    assert decoder.doubt.endswith("have it send RMC with its date, or ZDA sentences too")
+    for second in range(30, 60):
+        decoder.feed(second * 1_000_000, lines(rmc(clock=f"1200{second:02d}.00"), gga(clock=f"1200{second:02d}.00")))
+    assert decoder.doubt == ""
