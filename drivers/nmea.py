@@ -182,6 +182,9 @@ class _Epoch:
         return self.gsa.hdop if self.gsa else None
 
 
+SELDOM_US = 5_500_000
+"""Between fixes so far apart the motion is not known (the longest rhythm that is taken is 5 s, and some jitter)."""
+TELLING_INTERVALS = 3
 TELLING_FIXES = 10
 _MISSING = {
     "speed": ("no row has a distance", "RMC or VTG sentences too"),
@@ -221,6 +224,7 @@ class NmeaDecoder:
         self._too_early_us: int | None = None
         self._recent = RecentBytes()
         self._fixes_without = dict.fromkeys(_MISSING, 0)
+        self._long_intervals_us: list[int] = []
 
     @property
     def unread(self) -> str:
@@ -233,6 +237,9 @@ class NmeaDecoder:
         for what, (harm, sentences) in _MISSING.items():
             if self._fixes_without[what] >= TELLING_FIXES:
                 return f"it sends {self._recent.sentence_kinds()}, but no {what}, so {harm}: have it send {sentences}"
+        if len(self._long_intervals_us) == TELLING_INTERVALS:
+            return (f"it sends only each {min(self._long_intervals_us) / SECOND_US:.0f} s, too seldom to know the "
+                    "motion between, so rows have no place: have it send RMC each second")
         if self._too_early_us is None:
             return ""
         day = self._too_early_us // DAY_US
@@ -313,6 +320,8 @@ class NmeaDecoder:
         if time_of_day_us is not None:
             if self._epoch_at is not None and 0 < (for_us := time_of_day_us - self._epoch_at[1]) < MINUTE_US:
                 self.line.needs(at - self._epoch_at[0], for_us)
+                longer = [*self._long_intervals_us, for_us][-TELLING_INTERVALS:]
+                self._long_intervals_us = longer if for_us > SELDOM_US else []
             self._epoch_at = at, time_of_day_us
         closed = self._close()
         self._epoch = begun

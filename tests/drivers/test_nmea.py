@@ -581,3 +581,15 @@ def test_a_receiver_that_names_no_date_is_told_what_to_send():
     for second in range(30, 60):
         decoder.feed(second * 1_000_000, lines(rmc(clock=f"1200{second:02d}.00"), gga(clock=f"1200{second:02d}.00")))
     assert decoder.doubt == ""
+
+
+@pytest.mark.parametrize(("every_s", "doubt"), [(1, ""), (5, ""), (10, "it sends only each 10 s")])
+def test_a_receiver_that_sends_too_seldom_is_named(every_s, doubt):
+    decoder = NmeaDecoder()
+    for k in range(5):
+        at_s = k * every_s
+        decoder.feed(at_s * 1_000_000, lines(rmc(clock=f"1200{at_s:02d}.00")))
+    assert decoder.doubt.startswith(doubt)
+    assert bool(decoder.doubt) == bool(doubt)
+    decoder.feed(60_000_000, lines(rmc(clock=f"1200{at_s + 1:02d}.00")))
+    assert decoder.doubt == ""
