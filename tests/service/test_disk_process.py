@@ -29,6 +29,8 @@ def test_the_last_words_count_what_is_on_the_disk(tmp_path: Path) -> None:
     last, heard, rows = ends_while_it_may_not_write(tmp_path)
     said = re.search(r"stopped: (\d+) rows written, (\d+) lost: (.+)$", last)
     assert said is not None, last
-    assert int(said[1]) == rows > 20
-    assert int(said[2]) > 10
+    written, lost = int(said[1]), int(said[2])
+    # A row whose sync the disk refused is counted as lost, though it may be found in its file after all.
+    assert 20 < written <= rows <= written + lost
+    assert lost > 10
     assert f"STATUS={said[0]}" in heard
