@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 from threading import Barrier, Thread
@@ -87,3 +89,75 @@ def test_threads_that_leave_a_users_own_file_in_another_order_leave_stdout_as_it
         raise ValueError("wrong")
     thread.join()
     assert meanwhile == [sys.stderr] and sys.stdout is before
+
+
+EFFECT_OF_OTHERS = """
+from ridelog.effects import ForceEffect, Parameter, Scale
+
+class Theirs(ForceEffect):
+    name, title = "theirs", "a damper beside the damper"
+    parameters = (Parameter(name="damping_n_s_per_m", start=100.0, low=0.0, high=9000.0, null=0.0, scale=Scale.LINEAR,
+                            meaning="more damping", trials=(50.0,)),)
+    source, signature, shown_by = "nobody", "less motion", "any drive"
+
+    def laws(self, p, laws):
+        return laws.with_force(lambda travel_m, rate_mps: p.damping_n_s_per_m * rate_mps)
+
+EFFECT = Theirs()
+WRONG = 5
+"""
+
+
+def installed(root: Path, entry_points: str) -> Path:
+    """A folder as pip leaves it, with a package of others."""
+    (root / "their_package.py").write_text(EFFECT_OF_OTHERS)
+    about = root / "their_package-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: their-package\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(entry_points)
+    return root
+
+
+def listed_with(root: Path, ridelog: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([ridelog, "simulate", "--list-effects"], text=True, capture_output=True,
+                          env=os.environ | {"PYTHONPATH": str(root)})
+
+
+def test_an_installed_package_offers_an_effect_by_its_name(tmp_path: Path, ridelog: Path) -> None:
+    """Listed, simulated by its name and in a vehicle's file, as one that comes with ridelog."""
+    root = installed(tmp_path, "[ridelog.effects]\ntheirs = their_package:EFFECT\n")
+    assert "a damper beside the damper" in listed_with(root, ridelog).stdout
+    code = ("import ridelog; car = ridelog.read_vehicle('rav4-2009').with_effect('theirs', damping_n_s_per_m=300.0)\n"
+            "ridelog.write_vehicle('car.yaml', car)\n"
+            "road = ridelog.random_road(iso_class='C', length_m=60.0, seed=2)\n"
+            "run, plain = (ridelog.simulate(one, road, 9.0) for one in ('./car.yaml', 'rav4-2009'))\n"
+            "print(run.accel_z_mps2.std() / plain.accel_z_mps2.std())")
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, cwd=tmp_path,
+                          env=os.environ | {"PYTHONPATH": str(root)})
+    assert done.stderr == "" and float(done.stdout) != pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("entry", "complaint"), [
+    ("roll = their_package:EFFECT", "expected a name of its own, there is 'roll' already"),
+    ("others = their_package:EFFECT", "expected EFFECT to be named as its entry point is, found 'theirs'"),
+    ("theirs = their_package:NOWHERE", "found AttributeError"),
+    ("theirs = no_such_package:EFFECT", "found ModuleNotFoundError"),
+    ("theirs = their_package:WRONG", "expected EFFECT to be named as its entry point is, found 5"),
+])
+def test_an_installed_package_that_offers_something_wrong_is_named(
+    tmp_path: Path, ridelog: Path, entry: str, complaint: str
+) -> None:
+    done = listed_with(installed(tmp_path, f"[ridelog.effects]\n{entry}\n"), ridelog)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert complaint in done.stderr and entry.partition("= ")[2] in done.stderr
+
+
+@pytest.mark.parametrize("package", [
+    "drivers.accelerometers", "logger.dsp.weightings", "logger.lab.laws.families", "logger.exchange.formats"])
+def test_other_catalogues_have_a_group_too(package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    offer = {"families": "FAMILY"}.get(kind := package.rpartition(".")[2], kind.removesuffix("s").upper())
+    monkeypatch.syspath_prepend(installed(tmp_path, f"[ridelog.{kind}]\ntheirs = their_package:EFFECT\n"))
+    try:
+        assert list(catalogue(package, offer))[-1] == "theirs"
+    finally:
+        sys.modules.pop("their_package", None)

@@ -11,98 +11,45 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 ``docs/notebook.md`` goes through the lab.
 """
 
-from logger.api.calibration import Calibration, Slopes, calibrate
-from logger.api.conversion import Conversion, convert
-from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
-from logger.api.fleet import FleetReport, FleetSummary, Ingested, fleet_ingest, fleet_report, fleet_summarise
-from logger.api.identification import Identification, identify
-from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
-from logger.api.lab_loop import LabStory, lab
-from logger.api.learning import LearnedLaw, learn
-from logger.api.logs import Dump, Log, Samples, read_dump, read_log
-from logger.api.modal import Modes, modes
-from logger.api.passes import RepeatedDrives, passes
-from logger.api.plan import NextDrive, Plan, plan
-from logger.api.rides import Comfort, Record, comfort, read_record
-from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
-from logger.api.same_road import SameRoadDiagnosis, diagnose_same_road
-from logger.api.sections import Sections, sections
-from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
-from logger.api.vibration_records import Channels, make_channels, read_channels
-from logger.errors import BadInput
-from logger.identification.identifiability import NotIdentifiable
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "AddedEffect",
-    "BadInput",
-    "Calibration",
-    "Candidate",
-    "Channels",
-    "Comfort",
-    "Comparison",
-    "Conversion",
-    "Diagnosis",
-    "Dump",
-    "EffectInfo",
-    "Effects",
-    "Estimate",
-    "FleetReport",
-    "FleetSummary",
-    "Identification",
-    "Ingested",
-    "Iri",
-    "LabStory",
-    "LearnedLaw",
-    "Log",
-    "Model",
-    "Modes",
-    "NextDrive",
-    "NotIdentifiable",
-    "Plan",
-    "Profile",
-    "Record",
-    "RepeatedDrives",
-    "RoadClass",
-    "Run",
-    "SameRoadDiagnosis",
-    "Samples",
-    "Sections",
-    "ShiftedNumber",
-    "Slopes",
-    "add_effect",
-    "calibrate",
-    "classify",
-    "comfort",
-    "compare",
-    "convert",
-    "diagnose",
-    "diagnose_same_road",
-    "effects",
-    "estimate",
-    "fleet_ingest",
-    "fleet_report",
-    "fleet_summarise",
-    "identify",
-    "iri",
-    "lab",
-    "learn",
-    "make_channels",
-    "make_run",
-    "modes",
-    "passes",
-    "plan",
-    "random_road",
-    "read_channels",
-    "read_dump",
-    "read_log",
-    "read_profile",
-    "read_record",
-    "read_run",
-    "read_vehicle",
-    "sections",
-    "simulate",
-    "vehicles",
-    "write_profile",
-    "write_run",
-    "write_vehicle",
-]
+_HOMES = {
+    "logger.api.calibration": "Calibration Slopes calibrate",
+    "logger.api.conversion": "Conversion convert",
+    "logger.api.drives": "Estimate Run estimate make_run read_run simulate write_run",
+    "logger.api.fleet": "FleetReport FleetSummary Ingested fleet_ingest fleet_report fleet_summarise",
+    "logger.api.identification": "Identification identify",
+    "logger.api.lab": "AddedEffect Candidate Comparison Diagnosis ShiftedNumber add_effect compare diagnose",
+    "logger.api.lab_loop": "LabStory lab",
+    "logger.api.learning": "LearnedLaw learn",
+    "logger.api.logs": "Dump Log Samples read_dump read_log",
+    "logger.api.modal": "Modes modes",
+    "logger.api.passes": "RepeatedDrives passes",
+    "logger.api.plan": "NextDrive Plan plan",
+    "logger.api.rides": "Comfort Record comfort read_record",
+    "logger.api.roads": "Iri Profile RoadClass classify iri random_road read_profile write_profile",
+    "logger.api.same_road": "SameRoadDiagnosis diagnose_same_road",
+    "logger.api.sections": "Sections sections",
+    "logger.api.vehicles": "EffectInfo Effects Model read_vehicle vehicles write_vehicle",
+    "logger.api.vibration_records": "Channels make_channels read_channels",
+    "logger.errors": "BadInput",
+    "logger.identification.identifiability": "NotIdentifiable",
+}
+"""Where each name lives. What it is, type checkers read in ``__init__.pyi``."""
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+__all__ = [*_HOME, "effects"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for first, as all of it takes a second or more on a Pi (PEP 562)."""
+    if name == "effects":
+        return import_module("ridelog.effects")
+    if name not in _HOME:
+        raise AttributeError(f"module 'ridelog' has no attribute {name!r}")
+    globals()[name] = found = getattr(import_module(_HOME[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

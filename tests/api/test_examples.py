@@ -38,7 +38,8 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
     wrong = car.with_effect("sensor_gain", gain=1.15)
     runs = [ridelog.simulate(wrong, bumpy, speed_mps, noise_mps2=0.03, name=f"at {speed_mps:g} mps")
             for speed_mps in (9.0, 15.0)]
-    return {"folder": folder, "recording": short_dump, "car": car, "runs": runs, "np": np, **vars(ridelog)}
+    return {"folder": folder, "recording": short_dump, "car": car, "runs": runs, "np": np,
+            **{name: getattr(ridelog, name) for name in ridelog.__all__}}
 
 
 @pytest.mark.parametrize("module", [
@@ -54,8 +55,16 @@ def test_each_name_is_documented() -> None:
                 and not (one.__doc__ and (isinstance(one, type) or ">>>" in one.__doc__))]
 
 
+def test_what_effects_are_made_of_and_the_list_of_them_have_one_name() -> None:
+    """Python puts a module in the place of a function of its name, whichever was asked for first."""
+    listed = ridelog.effects()
+    kinds = importlib.import_module("ridelog.effects")
+    assert kinds.ForceEffect.__name__ == "ForceEffect" and callable(ridelog.effects)
+    assert list(ridelog.effects()) == list(listed) and "roll" in listed
+
+
 def test_importing_it_loads_nothing_that_takes_long_and_prints_nothing() -> None:
-    code = "import ridelog, sys; raise SystemExit(len({'scipy', 'numba'} & set(sys.modules)))"
+    code = "import ridelog, sys; raise SystemExit(len({'numpy', 'yaml', 'scipy', 'numba'} & set(sys.modules)))"
     reported = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (reported.returncode, reported.stdout, reported.stderr) == (0, "", "")
     assert set(ridelog.__all__) <= set(dir(ridelog))

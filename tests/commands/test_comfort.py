@@ -128,7 +128,7 @@ def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pyte
 @pytest.mark.parametrize(
     ("arguments", "rate_hz", "seconds", "complaint"),
     [
-        (["--weighting", "wx"], 100, 2, f"weighting 'wx': expected one of {WEIGHTINGS}"),
+        (["--weighting", "none"], 100, 2, f"weighting 'none': expected one of {WEIGHTINGS}"),
         (["--daily-hours", "25"], 100, 2, "at most 24 hours, found 25"),
         (["--daily-hours", "nan"], 100, 2, "at most 24 hours, found nan"),
         ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50 \(--resample takes 40 or more\)"),
@@ -143,7 +143,7 @@ def test_wrong_use(tmp_path: Path, arguments: list[str], rate_hz: float, seconds
 
 
 def test_the_command_exits_2_with_one_line(tmp_path: Path, ridelog: Path) -> None:
-    done = subprocess.run([ridelog, "comfort", tmp_path / "none.csv", "--weighting", "wx"], capture_output=True,
+    done = subprocess.run([ridelog, "comfort", tmp_path / "none.csv", "--weighting", "none"], capture_output=True,
                           text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert WEIGHTINGS in done.stderr

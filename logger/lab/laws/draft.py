@@ -88,7 +88,7 @@ class Draft:
         guard = f"{_AXLES[self.axle]}\n    return laws\n" if self.axle else ""
         signature, body = self.method.strip("\n").split("\n", 1)
         method = f"{signature}\n{indent(guard, '    ')}{body}"
-        lines = ["from logger.vehicle.effect import " + ", ".join(sorted({self.kind, "Parameter", "Scale"})),
+        lines = ["from ridelog.effects import " + ", ".join(sorted({self.kind, "Parameter", "Scale"})),
                  *self.imports]
         return "\n".join([
             f'"""{head}\n"""', "", "import numpy as np", "", *sorted(lines), "",

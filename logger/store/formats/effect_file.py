@@ -8,6 +8,7 @@ file.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from functools import cache, partial
 from pathlib import Path
@@ -26,20 +27,26 @@ from logger.vehicle.watched_effect import watched
 
 @cache
 def shipped_effects() -> Mapping[str, Effect]:
-    """The effects that come with ridelog, by name."""
-    return catalogue("logger.vehicle.effects", "EFFECT")
+    """The effects that come with ridelog and with other installed packages, by name; those of others are looked
+    through and watched, as users' own are."""
+    return {name: effect if type(effect).__module__.startswith("logger.") else
+            _looked_through(effect, Path(str(sys.modules[type(effect).__module__].__file__)))
+            for name, effect in catalogue("logger.vehicle.effects", "EFFECT").items()}
 
 
 def own_effect(path: Path) -> Effect:
     """The effect that a user's own Python file offers. Raises BadInput that names the file and what it lacks; so does
     the effect, whenever it is asked and fails or gives no answer."""
-    effect = offered_by(path, "EFFECT")
-    with blamed_on(path):
-        effect = watched(look_through(effect), partial(blamed_on, path))
+    effect = _looked_through(offered_by(path, "EFFECT"), path)
     if effect.name in shipped_effects():
         raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}; rename yours, "
                        "or name ridelog's own without a file")
     return effect
+
+
+def _looked_through(effect: object, path: Path) -> Effect:
+    with blamed_on(path):
+        return watched(look_through(effect), partial(blamed_on, path))
 
 
 def effect_named(text: str) -> tuple[Effect, str | None]:

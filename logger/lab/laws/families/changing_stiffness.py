@@ -56,7 +56,7 @@ def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
         source="a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1",
         signature=f"{what} faster, or slower, as a run goes on", shown_by=FAMILY.shown_by,
         method=_METHOD.format(between=between), functions=_FUNCTIONS.format(motion=motion), variant=of,
-        imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))
+        imports=("from types import SimpleNamespace", "from ridelog.effects import Between"))
 
 
 FAMILY = ChangingStiffness()

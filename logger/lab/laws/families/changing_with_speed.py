@@ -103,7 +103,7 @@ class ChangingWithSpeed(Family):
             signature="runs at different speeds ask for different numbers of one car", shown_by=self.shown_by,
             method=method, variant=variant, functions=functions, places=places, words=("needs_road = True",),
             imports=(*(("from types import SimpleNamespace",) if damps else ()),
-                     "from logger.vehicle.laws import Between"))
+                     "from ridelog.effects import Between"))
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.places:

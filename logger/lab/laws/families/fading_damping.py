@@ -36,7 +36,7 @@ class FadingDamping(Family):
                       source="J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7",
                       signature="the body and the wheels ring longer, or less long, as a run goes on",
                       shown_by=self.shown_by, method=_METHOD, functions=_FUNCTIONS, variant="settling",
-                      imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))]
+                      imports=("from types import SimpleNamespace", "from ridelog.effects import Between"))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"

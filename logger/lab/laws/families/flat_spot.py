@@ -88,7 +88,7 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
                "(Delft, 1998)",
         signature="short blows, once in each turn of a wheel, whatever the speed",
         method=_METHOD, functions=_FUNCTIONS.format(place=places), variant="spot" + EACH * (last > 0),
-        imports=("from logger.vehicle.laws import Between",), words=("needs_road = True",))
+        imports=("from ridelog.effects import Between",), words=("needs_road = True",))
     return draft.of_axle(axle) if axle else draft
 
 

@@ -18,7 +18,7 @@ def rates(p, seen):
 """
 HANDED_ON = ("def laws(self, p, laws):\n"
              "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))")
-BETWEEN = ("from logger.vehicle.laws import Between",)
+BETWEEN = ("from ridelog.effects import Between",)
 
 
 class FrictionWithMemory(Family):

@@ -47,7 +47,7 @@ class Skyhook(Family):
             family=self.name, kind="ForceEffect", title=f"{variant} {self.title}", parameters=parameters,
             source="D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)",
             signature="the body bounces less, and the wheels hop no less", shown_by=self.shown_by, method=_METHOD,
-            functions=functions, variant=variant, imports=("from logger.vehicle.laws import Between",))
+            functions=functions, variant=variant, imports=("from ridelog.effects import Between",))
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         said = f"{draft.variant} dampers that resist the body's own speed against the ground, {say('sky_n_s_per_m')}"

@@ -68,7 +68,7 @@ class WheelTurns(Family):
             signature="it repeats along the way, whatever the speed, and grows with the square of the speed",
             shown_by=self.shown_by, method=_METHOD.format(pick=_pick(axles, runs)),
             functions=_FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs)), variant=variant,
-            imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"),
+            imports=("from types import SimpleNamespace", "from ridelog.effects import Between"),
             words=("needs_road = True",))
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
