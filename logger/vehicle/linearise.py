@@ -89,10 +89,15 @@ def known_car(car: Car) -> KnownCar:
         return LinearCar(car.structure, output, sensors=car.sensors)
     for law in (law for one in car.laws for law in one.motions):
         _check_steady(law)
-    if all(map(_is_linear, car.laws)):
+    if is_linear(car):
         slopes = tuple(_linear_slopes(one) for one in car.laws)
         return LinearCar(car.structure, output, slopes, car.sensors)
     return MovedCar(car, output)
+
+
+def is_linear(car: Car) -> bool:
+    """Whether a car answers in proportion to the road; a damper is tested at some rates in both directions."""
+    return not car.records and all(map(_is_linear, car.laws))
 
 
 def _is_linear(one: CornerLaws) -> bool:

@@ -31,11 +31,12 @@ from logger.identification.unknown_road.road_state import Options, RoadState
 from logger.lab.likelihood.noise_floor import Noise, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
-from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, is_linear, responses_of
+from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, responses_of
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
+from logger.vehicle.linearise import is_linear
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

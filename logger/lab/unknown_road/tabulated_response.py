@@ -1,11 +1,10 @@
 """The linear frequency response of a car with effects, as a table: exact where it has one, else on the average.
 
-Problem: where nobody measured the road, it has to be integrated out, which is possible for a linear car. With most
-effects a car is linear, with some in ways that no constant matrix describes (a spring in series with a damper, a
-delay). Solution: the response is computed frequency by frequency from the same parts as simulations; whether a corner's
-laws are linear is tested at some motions. Where they are not, each drive over each stretch of road moves them by an
-amplitude of its own, and has the response of the linear car that comes nearest there (``vehicle.linearise``): what
-friction does is then no damping, but one that falls from stretch to stretch as the motion grows.
+Problem: where nobody measured the road, it has to be integrated out, which is possible for a linear car. Solution: the
+response of a car with linear laws is tabulated. Where laws are not linear, each drive over each stretch of road moves
+them by an amplitude of its own, and has the response of the linear car that comes nearest there
+(``vehicle.linearise``): what friction does is then no damping, but one that falls from stretch to stretch as the motion
+grows.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ import numpy.typing as npt
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
 from logger.identification.unknown_road.road_state import displacement_psd_m3
 from logger.vehicle.compose import Car
-from logger.vehicle.laws import CornerLaws
-from logger.vehicle.linearise import known_car, linearised
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import is_linear, known_car, linearised
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output
@@ -30,15 +29,6 @@ Complex = npt.NDArray[np.complex128]
 
 _STEP_HZ = 0.025
 """Step of the table: eight are as wide as a resonance at 1 Hz with a damping ratio of 0.1."""
-
-
-def _is_linear(laws: CornerLaws) -> bool:
-    """Whether all forces of a corner are linear in its motion; a damper is tested at some rates in both directions."""
-    if laws.springs or laws.others or laws.motions or laws.tires or laws.rubs or not laws.tire_pulls:
-        return False
-    rates_mps = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
-    slopes = laws.damper(rates_mps) / rates_mps
-    return bool(np.ptp(slopes) <= 1e-9 * np.abs(slopes).max())
 
 
 def frequencies_of(rate_hz: float) -> Array:
@@ -53,18 +43,15 @@ def response_of(car: Car, rate_hz: float) -> Complex:
     """
     if not is_linear(car):
         raise ValueError("expected a car that answers in proportion to the road")
-    f_hz = frequencies_of(rate_hz)
-    structure, s = car.structure, np.asarray(2j * np.pi * f_hz, np.complex128)
-    axles = np.unique(structure.behind_m, return_inverse=True)[1]
-    dampers = np.stack([_damper(one, s) for one in car.laws], axis=1) - s[:, None] * structure.dampers
-    tires = s[:, None] * np.array([one.tire_damping_n_s_per_m for one in car.laws])
-    dynamic = (s * s)[:, None, None] * structure.mass + s[:, None, None] * structure.damping + structure.stiffness
-    dynamic = dynamic + np.einsum("fw,wi,wj->fij", dampers, structure.travel, structure.travel)
-    dynamic = dynamic + np.einsum("fw,wi,wj->fij", tires, structure.wheels, structure.wheels)
-    forces = (structure.road + tires[:, None, :] * structure.wheels.T) @ np.eye(axles.max() + 1)[axles]
-    motion = np.linalg.solve(dynamic, forces)
-    behind = recorder_gain(f_hz / rate_hz) * car.factor(s) * s * s
-    return np.asarray(behind * np.einsum("n,fnx->xf", car.row, motion))
+    linear = known_car(car)
+    assert isinstance(linear, LinearCar)
+    return _by_axle(linear, rate_hz)
+
+
+def _by_axle(linear: LinearCar, rate_hz: float) -> Complex:
+    f_hz, axles = frequencies_of(rate_hz), np.unique(linear.structure.behind_m, return_inverse=True)[1]
+    by_axle = linear.by_wheel(f_hz) @ np.eye(axles.max() + 1)[axles]
+    return np.asarray(recorder_gain(f_hz / rate_hz) * by_axle.T)
 
 
 @dataclass(frozen=True)
@@ -74,11 +61,6 @@ class Motion:
     speed_mps: float
     level: float
     waviness: float
-
-
-def is_linear(car: Car) -> bool:
-    """Whether a car answers in proportion to the road."""
-    return not car.records and all(map(_is_linear, car.laws))
 
 
 def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion], highest_cpm: float = 4.0,
@@ -96,28 +78,17 @@ def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion], highest_cp
     if car.records:
         raise ValueError("expected a car whose record is what its sensor felt")
     known_car(car)  # refuses laws that no linear ones stand in for
-    f_hz = frequencies_of(rate_hz)
-    axles = np.unique(car.structure.behind_m, return_inverse=True)[1]
-    by_axle = np.eye(axles.max() + 1)[axles]
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
-    behind = recorder_gain(f_hz / rate_hz)
     moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, highest_cpm, waves)
     found = []
     for motion in motions:
         psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, moving_cpm))[1:]
-        linear = linearised(car, output, motion.speed_mps, moving_cpm, psd_m3)
-        found.append(behind * (linear.by_wheel(f_hz) @ by_axle).T)
+        found.append(_by_axle(linearised(car, output, motion.speed_mps, moving_cpm, psd_m3), rate_hz))
     return np.asarray(found)
 
 
 def _shape(car: Car, rate_hz: float) -> tuple[int, int]:
     return len(np.unique(car.structure.behind_m)), len(frequencies_of(rate_hz))
-
-
-def _damper(laws: CornerLaws, s: Complex) -> Complex:
-    """Force per extension of a damper in series with its mount."""
-    alone = s * float(laws.damper(np.ones(1))[0])
-    return alone if np.isinf(laws.mount_n_per_m) else alone / (1 + alone / laws.mount_n_per_m)
 
 
 @dataclass(frozen=True, eq=False)

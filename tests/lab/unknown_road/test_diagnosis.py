@@ -17,7 +17,7 @@ from logger.lab.unknown_road.fisher_scoring import fit
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import screen
-from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, is_linear, response_of, responses_of
+from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, response_of, responses_of
 from logger.profiles.track import Track
 from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
@@ -27,6 +27,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.linearise import is_linear
 from logger.vehicle.passage import Passage
 
 Array = npt.NDArray[np.float64]
