@@ -108,6 +108,6 @@ class DriveReadings:
     def _judge(self, part: GridSamples) -> None:
         """Keep readings, as missing where the sensor or the speed is known by now not to have been right."""
         if len(part):
-            doubtful = self._stillness.during(part.t_us) | self.repetition.during(part.t_us)
-            doubtful |= self.speed_check.during(part.t_us)
+            doubtful = self._stillness.spans.during(part.t_us) | self.repetition.spans.during(part.t_us)
+            doubtful |= self.speed_check.spans.during(part.t_us)
             self._parts.append(replace(part, present=part.present & ~doubtful))

@@ -12,23 +12,24 @@ for half a minute too; what it says then is too little to judge a road by.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
+from logger.service.doubted_spans import DoubtedSpans
 from logger.units import US_PER_S
 
 FROZEN_S = 30.0
 MOVING_MPS = 3.0
 LONGEST_BETWEEN_FIXES_US = 3 * US_PER_S
-_SPANS_KEPT = 8
 
 
 class Stillness:
-    """Follows readings and fixes, each in order of time."""
+    """Follows readings and fixes, each in order of time.
+
+    spans    in which the sensor was frozen
+    """
 
     def __init__(self) -> None:
         self._last: tuple[float, ...] | None = None
@@ -36,7 +37,7 @@ class Stillness:
         self._heard_us = 0
         self._moving_us: int | None = None
         self._fix_us = 0
-        self._frozen: deque[tuple[int, int]] = deque(maxlen=_SPANS_KEPT)
+        self.spans = DoubtedSpans()
         self._lasting = False
 
     def take(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> None:
@@ -47,7 +48,7 @@ class Stillness:
             self._take_block(block)
         if not self._lasting and self.frozen_s:
             self._lasting = True
-            self._frozen.append((self._span_us()[0], self._heard_us))
+            self.spans.begin(self._span_us()[0], self._heard_us)
 
     @property
     def frozen_s(self) -> float:
@@ -55,17 +56,6 @@ class Stillness:
         begin_us, end_us = self._span_us()
         still_s = (end_us - begin_us) / US_PER_S
         return still_s if still_s >= FROZEN_S else 0.0
-
-    def covers(self, begin_us: int, end_us: int) -> bool:
-        """Tell whether the sensor was frozen in some of [begin, end)."""
-        return any(begin_us < last_us and first_us < end_us for first_us, last_us in self._frozen)
-
-    def during(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Tell of instants (n,) [us] whether the sensor was frozen."""
-        frozen = np.zeros(len(t_us), dtype=np.bool_)
-        for first_us, last_us in self._frozen:
-            frozen |= (first_us <= t_us) & (t_us <= last_us)
-        return frozen
 
     def _span_us(self) -> tuple[int, int]:
         if self._moving_us is None:
@@ -90,8 +80,7 @@ class Stillness:
         self._last = tuple(readings[-1])
         self._heard_us = int(block.t_us[-1])
         if self._lasting:
-            last_us = int(changes_us[0]) - 1 if len(changes_us) else self._heard_us
-            self._frozen[-1] = (self._frozen[-1][0], last_us)
+            self.spans.end_at(int(changes_us[0]) - 1 if len(changes_us) else self._heard_us)
         if len(changes_us):
             self._changed_us = int(changes_us[-1])
             self._lasting = False

@@ -212,8 +212,8 @@ class Pipeline:
             moving = np.flatnonzero(speed_mps > 0.0)
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
-            doubtful = self.stillness.during(part.t_us) | self.speed_check.during(part.t_us)
-            doubtful |= self.repetition.during(part.t_us)
+            doubtful = self.stillness.spans.during(part.t_us) | self.speed_check.spans.during(part.t_us)
+            doubtful |= self.repetition.spans.during(part.t_us)
             believed = replace(part, present=part.present & ~doubtful)
             self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
@@ -249,10 +249,10 @@ class Pipeline:
             flags.add("time_unset")
         end_us = window.t_us + round(window.duration_s * US_PER_S)
         for word, found in (("frozen", self.stillness), ("repeated", self.repetition)):
-            if found.covers(window.t_us, end_us):
+            if found.spans.covers(window.t_us, end_us):
                 flags.add(word)
                 window = window.without_figures()
-        if window.start_m is not None and self.speed_check.covers(window.t_us, end_us):
+        if window.start_m is not None and self.speed_check.spans.covers(window.t_us, end_us):
             flags.add("speed_doubtful")
         unsure_us = self.timebase.unsure_until_us
         if window.start_m is not None and unsure_us is not None and window.t_us <= unsure_us:

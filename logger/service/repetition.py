@@ -10,13 +10,12 @@ hardly any are, or which shows that none are held, or until no window has shown 
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
+from logger.service.doubted_spans import DoubtedSpans
 
 WINDOW = 2048
 FALSE_ALARM = 1e-10
@@ -24,19 +23,19 @@ FALSE_ALARM = 1e-10
 PROOF_LASTS = 15
 """Windows, five minutes: a coarse sensor that rightly repeats some samples on a quiet road cannot show that it is well
 again; what it was found to do does not count for longer."""
-_SPANS_KEPT = 8
 
 
 class Repetition:
     """Follows readings in order of time. What it finds does not depend on how they were cut into blocks.
 
+    spans    in which samples were repeated
     share    of the samples of the last window that repeat the one before, while they are found to; else 0
     """
 
     def __init__(self) -> None:
         self._t_us = np.empty(0, dtype=np.int64)
         self._accel_mps2 = np.empty((0, 3))
-        self._spans: deque[tuple[int, int]] = deque(maxlen=_SPANS_KEPT)
+        self.spans = DoubtedSpans()
         self._unproven = 0
         self.share = 0.0
 
@@ -50,7 +49,7 @@ class Repetition:
             self._judge(self._t_us[:WINDOW], self._accel_mps2[:WINDOW])
             self._t_us, self._accel_mps2 = self._t_us[WINDOW:], self._accel_mps2[WINDOW:]
         if self.share and len(self._t_us):
-            self._spans[-1] = (self._spans[-1][0], int(self._t_us[-1]))
+            self.spans.end_at(int(self._t_us[-1]))
 
     @property
     def doubt(self) -> str:
@@ -60,17 +59,6 @@ class Repetition:
         return (f"{100 * self.share:.0f} of 100 samples repeat the one before: no figures are made of them. Have the "
                 "sensor, or what brings its samples, send each reading once")
 
-    def covers(self, begin_us: int, end_us: int) -> bool:
-        """Tell whether samples were repeated in some of [begin, end)."""
-        return any(begin_us <= last_us and first_us < end_us for first_us, last_us in self._spans)
-
-    def during(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Tell of instants (n,) [us] whether samples were repeated."""
-        repeated = np.zeros(len(t_us), dtype=np.bool_)
-        for first_us, last_us in self._spans:
-            repeated |= (first_us <= t_us) & (t_us <= last_us)
-        return repeated
-
     def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
         share = float((~fresh_samples(accel_mps2)[1:]).mean())
         repeats = share >= LEAST_SHARE and find_repeats(accel_mps2, FALSE_ALARM) is not None
@@ -79,8 +67,8 @@ class Repetition:
             over = share < LEAST_SHARE or are_fresh(accel_mps2) or self._unproven > PROOF_LASTS
             self.share = 0.0 if over else share
             if self.share:
-                self._spans[-1] = (self._spans[-1][0], int(t_us[-1]))
+                self.spans.end_at(int(t_us[-1]))
             return
         if repeats:
             self.share = share
-            self._spans.append((int(t_us[0]), int(t_us[-1])))
+            self.spans.begin(int(t_us[0]), int(t_us[-1]))

@@ -21,13 +21,10 @@ A stretch in which they disagree is doubtful, and so is what follows until they 
 
 from __future__ import annotations
 
-from collections import deque
 from math import sqrt
 
-import numpy as np
-import numpy.typing as npt
-
 from logger.geodesy import ground_distance_m
+from logger.service.doubted_spans import DoubtedSpans
 from logger.service.timebase import TimedFix
 from logger.units import US_PER_S
 
@@ -45,11 +42,10 @@ LONGEST_M = 1500.0
 AGREES_M = 100.0
 LONGEST_BETWEEN_FIXES_US = 3 * US_PER_S
 LASTING_US = 60 * US_PER_S
-_SPANS_KEPT = 64
 
 
 class SpeedCheck:
-    """Follows fixes in order of time, and says which stretches are doubtful."""
+    """Follows fixes in order of time. ``spans`` are the stretches that are doubtful."""
 
     def __init__(self) -> None:
         self._first: TimedFix | None = None
@@ -59,7 +55,7 @@ class SpeedCheck:
         self._was_held = False
         self._steps: list[tuple[float, float]] = []
         self._nodes: list[TimedFix] = []
-        self._doubtful: deque[tuple[int, int]] = deque(maxlen=_SPANS_KEPT)
+        self.spans = DoubtedSpans()
         self._lasts = False
         self._said = ""
 
@@ -81,7 +77,7 @@ class SpeedCheck:
         self._was_held |= is_held
         self._last = timed
         if self._lasts:
-            self._doubtful[-1] = (self._doubtful[-1][0], timed.t_us)
+            self.spans.end_at(timed.t_us)
         by_places_m = _apart_m(node, timed)
         if max(self._since_node_m, by_places_m) < STEP_M or is_held:
             return
@@ -103,7 +99,7 @@ class SpeedCheck:
         moves = by_places_m < by_speed_m or self._straight_m() > JUMP_M
         if moves and abs(by_places_m - by_speed_m) > limit_m:
             if not self._lasts:
-                self._doubtful.append((first.t_us, timed.t_us))
+                self.spans.begin(first.t_us, timed.t_us)
             self._lasts = True
             self._said = (f"its speed and its places disagree: over {lasted_us / US_PER_S:.0f} s the speed makes "
                           f"{by_speed_m:.0f} m, the places {by_places_m:.0f} m. Such rows have no IRI. Check what the "
@@ -123,20 +119,10 @@ class SpeedCheck:
     @property
     def doubt(self) -> str:
         """What is wrong with the receiver, while it lasted until a minute ago; empty: nothing."""
-        if not self._doubtful or self._last is None or self._last.t_us - self._doubtful[-1][1] > LASTING_US:
+        last_us = self.spans.last_us
+        if last_us is None or self._last is None or self._last.t_us - last_us > LASTING_US:
             return ""
         return self._said
-
-    def covers(self, begin_us: int, end_us: int) -> bool:
-        """Tell whether some of [begin, end) is doubtful."""
-        return any(begin_us < last_us and first_us < end_us for first_us, last_us in self._doubtful)
-
-    def during(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Tell of instants (n,) [us] whether they are doubtful."""
-        doubtful = np.zeros(len(t_us), dtype=np.bool_)
-        for first_us, last_us in self._doubtful:
-            doubtful |= (first_us <= t_us) & (t_us <= last_us)
-        return doubtful
 
     def _begin(self, timed: TimedFix) -> None:
         self._first = self._last = self._node = timed

@@ -40,7 +40,7 @@ def main() -> int:
         for timed in town_drive(3600, seed):
             check.take(timed)
             times_us.append(timed.t_us)
-        alarm_s += int(check.during(np.array(times_us)).sum())
+        alarm_s += int(check.spans.during(np.array(times_us)).sum())
     figures.at_most(f"false alarms in {GOOD_HOURS} h of a good receiver", alarm_s, 60, "s")
     return 1 if figures.missed else 0
 

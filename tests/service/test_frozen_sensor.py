@@ -36,39 +36,39 @@ def frozen_for(seconds: int) -> Stillness:
 
 def test_nothing_is_said_before_half_a_minute_and_from_then_on_all_since_the_first_reading() -> None:
     stillness = frozen_for(round(FROZEN_S))
-    assert not stillness.covers(0, 100 * US)
+    assert not stillness.spans.covers(0, 100 * US)
     stillness.take(block(31), [fix(31)])
-    assert stillness.covers(1 * US, 2 * US)
-    assert not stillness.covers(0, 1 * US)
+    assert stillness.spans.covers(1 * US, 2 * US)
+    assert not stillness.spans.covers(0, 1 * US)
 
 
 def test_it_lasts_to_the_very_reading_that_changes() -> None:
     stillness = frozen_for(40)
     stillness.take(block(41, until_s=41.75), [])
-    assert stillness.covers(41 * US + 740_000, 41 * US + 745_000)
-    assert not stillness.covers(41 * US + 750_000, 60 * US)
+    assert stillness.spans.covers(41 * US + 740_000, 41 * US + 745_000)
+    assert not stillness.spans.covers(41 * US + 750_000, 60 * US)
     instants = 41 * US + np.array([0, 740_000, 750_000, 990_000])
-    assert stillness.during(instants).tolist() == [True, True, False, False]
+    assert stillness.spans.during(instants).tolist() == [True, True, False, False]
 
 
 @pytest.mark.parametrize("fixes", [[], [fix(41, 0.0)], [fix(41, None)]])
 def test_a_frozen_sensor_stays_frozen_without_a_fix_and_at_a_halt(fixes: list[Fix]) -> None:
     stillness = frozen_for(40)
     stillness.take(block(41), fixes)
-    assert stillness.covers(41 * US + 500_000, 42 * US)
+    assert stillness.spans.covers(41 * US + 500_000, 42 * US)
 
 
 def test_the_same_reading_after_a_silence_is_no_news_and_another_is() -> None:
     stillness = frozen_for(40)
     stillness.take(block(50), [])
-    assert stillness.covers(50 * US, 51 * US)
+    assert stillness.spans.covers(50 * US, 51 * US)
     stillness.take(block(60, 9.2), [])
-    assert not stillness.covers(60 * US, 61 * US)
+    assert not stillness.spans.covers(60 * US, 61 * US)
 
 
 def test_it_can_freeze_again() -> None:
     stillness = frozen_for(40)
     for second in range(41, 80):
         stillness.take(block(second, 9.2), [fix(second)])
-    assert stillness.covers(45 * US, 46 * US)
-    assert stillness.covers(78 * US, 79 * US)
+    assert stillness.spans.covers(45 * US, 46 * US)
+    assert stillness.spans.covers(78 * US, 79 * US)

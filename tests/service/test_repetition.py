@@ -39,7 +39,7 @@ def test_no_honest_sensor_repeats(step: float) -> None:
         found = Repetition()
         found.take(samples(120, 100, step, seed=seed))
         assert (found.share, found.doubt) == (0.0, "")
-        assert not found.covers(0, 10**9)
+        assert not found.spans.covers(0, 10**9)
 
 
 def test_any_cut_into_blocks_finds_the_same() -> None:
@@ -50,8 +50,8 @@ def test_any_cut_into_blocks_finds_the_same() -> None:
     for begin, end in pairwise(ends):
         cut.take(part(block, begin, end))
     assert whole.share == cut.share == pytest.approx(0.5, abs=0.01)
-    assert (whole.during(block.t_us) == cut.during(block.t_us)).all()
-    assert whole.during(block.t_us).all()
+    assert (whole.spans.during(block.t_us) == cut.spans.during(block.t_us)).all()
+    assert whole.spans.during(block.t_us).all()
 
 
 def test_it_ends_when_the_repeats_do() -> None:
@@ -62,8 +62,8 @@ def test_it_ends_when_the_repeats_do() -> None:
     later = AccelerationBlock(good.t_us + 60_000_000, good.accel_mps2, good.clipped)
     found.take(later)
     assert found.doubt == ""
-    assert not found.during(later.t_us[3 * WINDOW:]).any()
-    assert found.during(bad.t_us).all()
+    assert not found.spans.during(later.t_us[3 * WINDOW:]).any()
+    assert found.spans.during(bad.t_us).all()
 
 
 @pytest.mark.parametrize("step", [0.001, 0.613])

@@ -77,7 +77,7 @@ def doubted(drive: Iterator[TimedFix]) -> tuple[float, list[float]]:
         times_us.append(timed.t_us)
         driven_s += (timed.fix.speed_mps or 0.0) > 2.0
         first_s = min(first_s, driven_s) if check.doubt else first_s
-    during = check.during(np.array(times_us))
+    during = check.spans.during(np.array(times_us))
     return first_s, [t_us / 1e6 for t_us, is_doubtful in zip(times_us, during, strict=True) if is_doubtful]
 
 
