@@ -15,15 +15,14 @@ import logger
 import ridelog
 
 ROOT = Path(__file__).parents[1]
-FILES = {
-    path: ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts))
+SOURCES = {
+    ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): path
     for package in (drivers, logger, ridelog) for root in [Path(str(package.__file__)).parent]
     for path in root.rglob("*.py")
 }
-"""Sources and their modules; the public package, which in a repository lies inside ``logger``, by its own name."""
+"""Modules and their sources; the public package, which in a repository lies inside ``logger``, by its own name."""
 OUTWARD = ("ridelog.", "logger.public.")
 """Names of the public package: as others know it, and by its folder in a repository."""
-TREES = {module: ast.parse(path.read_text("utf-8")) for path, module in FILES.items()}
 FLOORS = (
     "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "left_out", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
@@ -42,9 +41,15 @@ CARRIED = {
     "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
-ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [
+ON_BOARD = [name for name in SOURCES if name.startswith("logger.service.")] + [
     f"logger.commands.{name}" for name in ("main", "run", "status", "export", "verify", "capture", "install")
 ]
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """A module as it is written."""
+    return ast.parse(SOURCES[module].read_text("utf-8"))
 
 
 def floor_of(module: str) -> str:
@@ -52,7 +57,7 @@ def floor_of(module: str) -> str:
     return module.split(".")[1]
 
 
-MODULES = [name for name in TREES if name.startswith("logger.") and floor_of(name) != "__init__"]
+MODULES = [name for name in SOURCES if name.startswith("logger.") and floor_of(name) != "__init__"]
 DESK = {floor_of(name) for name in MODULES} - CARRIED
 
 
@@ -60,7 +65,7 @@ DESK = {floor_of(name) for name in MODULES} - CARRIED
 def imports(module: str) -> frozenset[str]:
     """Every module or name that a module imports, wherever in it the import stands."""
     found = set()
-    for node in ast.walk(TREES[module]):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -74,7 +79,7 @@ def closure(start: list[str]) -> set[str]:
     found, new = set(), set(start)
     while new:
         found |= new
-        new = {name for module in new for name in imports(module) if name in TREES} - found
+        new = {name for module in new for name in imports(module) if name in SOURCES} - found
     return found
 
 
@@ -89,8 +94,8 @@ def has_number(value: ast.AST) -> bool:
 
 def named_numbers(module: str) -> Iterator[tuple[str, bool]]:
     """Names that a module gives to numbers, and whether a reason stands with each: a docstring or a comment."""
-    text = next(path for path, name in FILES.items() if name == module).read_text("utf-8").splitlines()
-    body = TREES[module].body
+    text = SOURCES[module].read_text("utf-8").splitlines()
+    body = tree(module).body
     for node, after in zip(body, [*body[1:], None], strict=True):
         if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and has_number(node.value):
             is_said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
@@ -126,7 +131,7 @@ def test_imports_inside_the_store_run_downwards() -> None:
 
 def test_every_folder_with_code_is_installed() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    packages = {name.rpartition(".")[0].removesuffix(".__init__") for name in TREES}
+    packages = {name.rpartition(".")[0].removesuffix(".__init__") for name in SOURCES}
     assert packages <= set(settings["tool"]["setuptools"]["packages"])
 
 
@@ -136,7 +141,7 @@ def test_numerical_folders_know_no_files_and_no_clocks() -> None:
 
 
 def test_drivers_know_nothing_of_the_logger() -> None:
-    of_drivers = [name for name in TREES if name.startswith("drivers.")]
+    of_drivers = [name for name in SOURCES if name.startswith("drivers.")]
     assert not [(module, name) for module in of_drivers for name in imports(module) if name.split(".")[0] == "logger"]
 
 
@@ -149,11 +154,11 @@ def test_the_public_interface_names_what_the_api_has_and_nothing_of_ours_uses_it
     assert all(getattr(importlib.import_module(module), name) is getattr(ridelog, name)
                for name, module in homes.items() if name != "effects")
     assert {floor_of(name) for name in homes.values()} - {"errors", "identification"} == {"api"}
-    assert not {module for module in TREES for name in imports(module) if f"{name}.".startswith(OUTWARD)}
+    assert not {module for module in SOURCES for name in imports(module) if f"{name}.".startswith(OUTWARD)}
 
 
 def test_no_file_imports_itself_through_others() -> None:
-    loads = {module: imports(module) & set(TREES) - {module} for module in TREES}
+    loads = {module: imports(module) & set(SOURCES) - {module} for module in SOURCES}
     while loose := {module for module, needs in loads.items() if not needs & set(loads)}:
         loads = {module: needs for module, needs in loads.items() if module not in loose}
     assert not loads
@@ -193,15 +198,15 @@ print(json.dumps(sorted(sys.modules)))
 
 
 def test_only_commands_print() -> None:
-    elsewhere = [module for module in TREES if not module.startswith("logger.commands.")]
-    assert not [(module, node.lineno) for module in elsewhere for node in ast.walk(TREES[module])
+    elsewhere = [module for module in SOURCES if not module.startswith("logger.commands.")]
+    assert not [(module, node.lineno) for module in elsewhere for node in ast.walk(tree(module))
                 if isinstance(node, ast.Name) and node.id == "print"]
 
 
 def test_nothing_asks_the_system_for_the_date() -> None:
     """A Pi boots without a date and its clock may jump; time comes from the monotonic clock and the GPS."""
     forbidden = {("time", "time"), ("time", "time_ns"), ("datetime", "now"), ("datetime", "utcnow"), ("date", "today")}
-    assert not [(module, node.lineno) for module, tree in TREES.items() for node in ast.walk(tree)
+    assert not [(module, node.lineno) for module in SOURCES for node in ast.walk(tree(module))
                 if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
                 and (node.value.id, node.attr) in forbidden]
 
@@ -243,7 +248,7 @@ def writes(node: ast.AST) -> bool:
 
 
 def test_files_are_written_in_one_place() -> None:
-    found = {module for module, tree in TREES.items() if any(map(writes, ast.walk(tree)))}
+    found = {module for module in SOURCES if any(map(writes, ast.walk(tree(module))))}
     assert found == set(WRITERS_OF_FILES)
     for words in ("open(a, 'w')", "a.open(mode='x')", "a.write_text(b)", "np.savetxt(a, b)", "figure.savefig(a)",
                   "ZipFile(a, 'w')", "a.replace(b)", "os.open(a, os.O_WRONLY)", "pq.write_table(b, a)"):
