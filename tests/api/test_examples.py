@@ -20,7 +20,7 @@ import logger.api
 import ridelog
 
 MODULES = [importlib.import_module(f"logger.api.{one.name}") for one in pkgutil.iter_modules(logger.api.__path__)]
-SLOW = ("logger.api.lab_loop", "logger.api.same_road", "logger.api.learning")
+SLOW = ("logger.api.lab", "logger.api.lab_loop", "logger.api.same_road", "logger.api.learning")
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +166,7 @@ def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys:
     assert capsys.readouterr().out.rstrip() == repr(found).rstrip()
 
 
+@pytest.mark.slow
 def test_a_calibration_is_the_commands(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,11 +40,13 @@ def driven(tmp_path: Path, road: str, speed_mps: float, effect: str) -> Simulate
     return lab_runs([folder])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("road", "friction_n"), [("A", 200), ("A", 300), ("B", 500)])
 def test_a_suspension_that_sticks_is_no_wrong_input(tmp_path: Path, road: str, friction_n: int) -> None:
     check_model("rav4-2009", MODEL, stuck(tmp_path, road, friction_n), silent, EFFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["sensor_offset:offset_m=-1.2", "cg_shift:shift_m=0.47", "cg_shift:shift_m=-0.47"])
 @pytest.mark.parametrize("speed_mps", [4.5, 5.5, 6.2])
 def test_a_sensor_far_from_the_centre_of_gravity_is_no_wrong_input(tmp_path: Path, effect: str,

@@ -160,6 +160,7 @@ def test_the_screen(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "950 kg" in "\n".join(lines)
 
 
+@pytest.mark.slow
 def test_a_load_as_json_and_csv(car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "table.csv"
     plain = Call(capsys, car, "--json").json()

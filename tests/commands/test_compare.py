@@ -57,6 +57,7 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert all(len(line) <= 80 for line in reported[reported.index("Where"):].splitlines())
 
 
+@pytest.mark.slow
 def test_numbers_are_far_off_by_their_prior(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     reported = []
     for tolerance in ("0.01", "0.4"):

@@ -31,6 +31,7 @@ def diagnose(*arguments: str) -> int:
     return main(["diagnose", "--vehicle", "rav4-2009", *arguments])
 
 
+@pytest.mark.slow
 def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
                                      capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
@@ -93,6 +94,7 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     assert reported["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                                           ) -> None:
     assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0

@@ -41,6 +41,7 @@ def reported(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_drive_is_judged_by_the_file_that_has_its_effects(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -92,6 +93,7 @@ def test_the_service_takes_them_too(short_dump: Path, tmp_path: Path) -> None:
     assert sidecar["vehicle"]["effects"][0]["friction_force_n"] == 100
 
 
+@pytest.mark.slow
 def test_a_gain_is_in_the_calibration_and_friction_in_the_modes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

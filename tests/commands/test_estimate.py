@@ -63,6 +63,7 @@ EFFECT = Written()
 """
 
 
+@pytest.mark.slow
 def test_the_road_that_an_effect_makes_of_the_profile_is_compared_with(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "written.py").write_text(OWN, "utf-8")
@@ -189,6 +190,7 @@ def test_the_noise_is_learnt_from_the_drive(
     assert lines[2].startswith("Assumed: ")
 
 
+@pytest.mark.slow
 def test_the_step_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path,
                                                  capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("drive.csv", "profile.csv"):
@@ -322,6 +324,7 @@ def test_a_speed_that_does_not_go_with_the_distance(
     assert "infinitely many times the 0 m of distance_m" in refusal(standing)
 
 
+@pytest.mark.slow
 def test_readings_that_may_be_in_g_are_said_to_be(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -68,6 +68,7 @@ def test_a_comparison_says_where_the_record_ends_and_finds_nothing(
     assert "The record was low-passed at about 25 Hz: above" in words(capsys, "compare", *drives["filtered"])
 
 
+@pytest.mark.slow
 def test_a_record_as_it_was_recorded_is_compared_whole(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "compare", *drives["plain"])

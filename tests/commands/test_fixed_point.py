@@ -72,7 +72,8 @@ def hard_input(name: str, bits: int) -> np.ndarray:
     return np.rint(np.concatenate([*noise, worst * largest, square, np.zeros(1000)])).astype(np.int64)
 
 
-@pytest.mark.parametrize("options", [["-O2"], ["-O0", *SANITIZER]], ids=["fast", "sanitized"])
+@pytest.mark.parametrize("options", [
+    pytest.param(["-O2"], id="fast"), pytest.param(["-O0", *SANITIZER], id="sanitized", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("bits", [32, 16])
 @pytest.mark.parametrize("name", SOS)
 def test_c_gives_the_bits_of_python(tmp_path: Path, name: str, bits: int, options: list[str]) -> None:
@@ -89,6 +90,7 @@ def test_c_gives_the_bits_of_python(tmp_path: Path, name: str, bits: int, option
     assert np.frombuffer(ran.stdout, dtype=np.int32).tolist() == fixed.process_counts(counts).tolist()
 
 
+@pytest.mark.slow
 def test_the_headers_stand_side_by_side(tmp_path: Path) -> None:
     assert main(["fixed-point", "--out", str(tmp_path)]) == 0
     assert main(["fixed-point", "--weighting", "wd", "--data-bits", "16", "--out", str(tmp_path)]) == 0

@@ -155,6 +155,7 @@ def rows(short_dump: Path) -> list[WindowRecord]:
         return expected_rows(wired(reader.header, reader, None, "x"), serial, "x")
 
 
+@pytest.mark.slow
 def test_what_is_expected_is_what_a_replay_of_the_lines_gives(short_dump: Path, rows: list[WindowRecord]) -> None:
     with open_dump(short_dump) as reader:
         recording = wired(reader.header, reader, None, "x")

@@ -28,18 +28,19 @@ WORDS = ("<script>alert(1)</script>", "=cmd|' /C calc'!A0", "+1+1", "-1+1", "@SU
 COMPUTED = re.compile(r"[\s]*[-=+@＝＋－＠]")
 
 
-@pytest.fixture
-def stick(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def stick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """For each word a car's folder that is called so, as far as a file's name can be, with a log that says it."""
+    place = tmp_path_factory.mktemp("words")
     rows = "\n".join([HEADER, *map(format_row, repeated_drives(2, 60, (2.0, 5.0))), ""])
     for number, word in enumerate(WORDS, start=1):
-        folder = tmp_path / "stick" / word.replace("/", "_")[:60]
+        folder = place / word.replace("/", "_")[:60]
         folder.mkdir(parents=True)
         (folder / f"{number:05d}-001.csv").write_text(rows, "ascii")
         (folder / f"{number:05d}-001.json").write_text(json.dumps({
             "vehicle": {"name": word[:900_000], word[:50_000]: 1}, "ridelog_version": word[:9000],
             "sensor": {"driver": word[:9000], "verified": False}, "iri_m_per_km": word[:9000]}))
-    return tmp_path / "stick"
+    return place
 
 
 def check(text: str, what: str) -> None:

@@ -167,6 +167,7 @@ def test_a_simulation_without_noise(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert [reported["parameters"][name] for name in (MASS, DAMPERS)] == pytest.approx([875, 1776], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     drives = []

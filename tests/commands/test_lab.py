@@ -78,6 +78,7 @@ class _Whole(HTMLParser):
             assert self.open.pop() == tag
 
 
+@pytest.mark.slow
 def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
                        monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", StringIO())

@@ -281,6 +281,7 @@ def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], 
     assert json.loads(reported.out)["error"] < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
 def test_a_disk_that_is_full_is_named(command: str, fits: None, runs: list[str], tmp_path: Path) -> None:
     done = called(*aimed(COMMANDS[command](tmp_path), Path("/dev/full")), "--vehicle", "rav4-2009", runs[0])
@@ -314,6 +315,7 @@ PRINTS = OWN.replace("class Bracket", "print('HELLO from the file')\n\n\nclass B
 EFFECT =""")
 
 
+@pytest.mark.slow
 def test_what_an_own_effect_prints_is_no_json(fits: None, runs: list[str], tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(PRINTS, "utf-8")
     new = tmp_path / "new.yaml"
@@ -339,6 +341,7 @@ def test_an_own_effects_file_that_is_not_there(fits: None, runs: list[str], tmp_
                            "directory)\n")
 
 
+@pytest.mark.slow
 def test_a_centre_of_gravity_beyond_an_axle(fits: None, runs: list[str], tmp_path: Path) -> None:
     done = called("add-effect", "cg_shift:shift_m=0.9", "--vehicle", "ford-escort", runs[0], "--out",
                   tmp_path / "new.yaml")

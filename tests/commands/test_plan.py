@@ -35,6 +35,7 @@ def plan(*arguments: object) -> int:
     return main(["plan", "--vehicle", "rav4-2009", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_for_a_program_and_as_a_page(road: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert plan("--profile", road, "--speed", 8, "--speed", 12, "--json", "--out", page) == 0

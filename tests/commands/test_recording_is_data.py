@@ -196,6 +196,7 @@ def test_a_dump_s_name_leads_to_no_other_folder(name: str, trap: Trap, dump_of: 
         assert "rename it" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_is_not_written_through_a_link(trap: Trap, dump_of: Callable[..., Path]) -> None:
     Path("out").mkdir()
     Path("out/drive").symlink_to(trap.folder)

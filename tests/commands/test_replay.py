@@ -74,6 +74,7 @@ def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
     assert sidecar["sensor"]["verified"] is True
 
 
+@pytest.mark.slow
 def test_the_rate_changes_nothing_but_the_time_it_takes(
     ridelog: Path, short_dump: Path, replayed: tuple[Path, str], tmp_path: Path
 ) -> None:
@@ -81,6 +82,7 @@ def test_the_rate_changes_nothing_but_the_time_it_takes(
     assert rows(replayed[0]) == rows(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_recording_that_was_cut_gives_what_it_holds(
     ridelog: Path, short_dump: Path, replayed: tuple[Path, str], tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def reported(capsys: pytest.CaptureFixture[str], *words: object) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_a_comparison_falls_to_the_noise_and_knows_no_speed_and_no_place(
         bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = bench / "compare.html"
@@ -66,6 +67,7 @@ def test_the_true_rig_is_right_without_a_fit(bench: Path) -> None:
     assert found.error < 1.1 * NOISE_MPS2 / float(np.sqrt((measured**2).mean()))
 
 
+@pytest.mark.slow
 def test_what_needs_a_road_cannot_be_tried_and_nothing_is_missing(
         bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", bench / "random")

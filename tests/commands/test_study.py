@@ -54,6 +54,7 @@ def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["figures"][0]["printed"].startswith("peaks for heights of 101.6 to 203.2 mm")
 
 
+@pytest.mark.slow
 def test_all_with_one_that_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

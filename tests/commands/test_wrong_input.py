@@ -50,6 +50,7 @@ def test_the_other_direction_and_another_beginning(runs: list[str], tmp_path: Pa
             main(["compare", "--vehicle", "rav4-2009", with_track(runs[0], tmp_path, track)])
 
 
+@pytest.mark.slow
 def test_who_wants_to_go_on_is_warned(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = read_run(runs[0]).track
     wrong = with_track(runs[0], tmp_path, Track(own.spacing_m, np.roll(own.elevation_m, 900), own.start_m))
@@ -58,6 +59,7 @@ def test_who_wants_to_go_on_is_warned(runs: list[str], tmp_path: Path, capsys: p
     assert "does not follow it" in said.err and "error" in said.out
 
 
+@pytest.mark.slow
 def test_an_estimate_beside_another_road_goes_on_only_where_it_is_asked_to(
     runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:

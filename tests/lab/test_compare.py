@@ -62,6 +62,7 @@ def test_missing_friction_is_physics(lacking: Comparison) -> None:
     assert f"error {lacking.plain.error:.3f}" in headline(lacking)[0]
 
 
+@pytest.mark.slow
 def test_the_effect_in_the_model_leaves_noise() -> None:
     residuals = beside_with(recorded_by([FRICTION], NOISE_MPS2), 5, lasts_s=12.0)
     name, values = FRICTION

@@ -73,6 +73,7 @@ def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics() -> Non
     assert nothing_is_missing(diagnosed(SimulatedRuns(runs, 500.0)))
 
 
+@pytest.mark.slow
 def test_a_clock_that_runs_a_little_fast_lacks_no_physics(flawless: SimulatedRuns) -> None:
     fast = SimulatedRuns([replace(one, distance_m=1.0008 * one.distance_m) for one in flawless.runs], 500.0)
     found = diagnosed(fast, (*FEW, "speed_scale"))
@@ -148,6 +149,7 @@ def test_an_effect_that_is_there_is_refitted_and_not_tried() -> None:
     assert found.baseline_error > 1.1 * found.final_error
 
 
+@pytest.mark.slow
 def test_one_effect_is_enough_to_ask_for() -> None:
     found = diagnosed(secret_runs([hidden("sensor_gain", gain=1.2)]), ["sensor_gain"])
     assert found.verdict == ("sensor_gain",) and not found.unexplained
@@ -161,6 +163,7 @@ def test_none_can_be_asked_for_too(flawless: SimulatedRuns) -> None:
 # --- what is not explained ---
 
 
+@pytest.mark.slow
 def test_what_only_another_car_would_explain_is_unexplained() -> None:
     stiff = changed(CAR, {name: 1.35 * read(CAR, name) for name in SPRINGS})
     found = diagnosed(secret_runs(car=stiff), ("sensor_gain", "sensor_mount_resonance"))

@@ -41,6 +41,7 @@ def test_coarse_readings_are_bounds_where_the_file_says_so() -> None:
     assert found.error_after == pytest.approx(plain.error_after, rel=0.02)  # of readings as they were read
 
 
+@pytest.mark.slow
 def test_places_that_are_off_are_found_and_their_errors_are_counted() -> None:
     run = drive(3, 0.0, 0.1, PLACE_STD_M)
     exact = ridelog.identify("rav4-2009", drive(3, 0.0, 0.1, 0.0), list(TRUE))

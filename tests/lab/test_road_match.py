@@ -40,6 +40,7 @@ def test_the_right_road_is_clear(seed: int, gain: float, noise: float, late: int
     assert turned.is_upside_down and not turned.is_refuted
 
 
+@pytest.mark.slow
 def test_by_chance_one_road_in_a_thousand_is_taken_for_another() -> None:
     """Of unrelated pairs hardly any is above what chance gives, and nearly all are refuted."""
     found = [road_match(run_of(ride(2 * k)), ride(2 * k + 1), BAND_HZ) for k in range(300)]

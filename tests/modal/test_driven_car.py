@@ -41,6 +41,7 @@ def found(name: str, run: Run):
                      run.rate_hz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed", "speed_mps", "iso_class", "least"), [
     ("golden-car", 1, 20.0, "B", 2), ("rav4-2009", 2, 12.0, "C", 3), ("ford-escort", 3, 24.0, "B", 3)])
 def test_each_mode_is_one_of_the_cars_own(name: str, seed: int, speed_mps: float, iso_class: str, least: int) -> None:
@@ -54,6 +55,7 @@ def test_each_mode_is_one_of_the_cars_own(name: str, seed: int, speed_mps: float
                        abs(ratio - one.damping_ratio) / one.damping_std) for hz, ratio in own) < SURE
 
 
+@pytest.mark.slow
 def test_the_pitch_of_a_sensor_amid_an_even_car_is_not_reported() -> None:
     model = read_vehicle("rav4-2009")
     run = simulate(model, random_road(iso_class="B", length_m=900.0, seed=4), 15.0, noise_mps2=0.02)

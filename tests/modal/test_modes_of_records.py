@@ -48,6 +48,7 @@ def test_five_light_modes_in_a_noisy_decay(share: float, seed: int) -> None:
     assert all(one.reason for one in result.rejected)
 
 
+@pytest.mark.slow
 def test_the_truth_lies_within_two_errors_as_often_as_it_should() -> None:
     clean = free_decay(five([0.03] * 5), np.eye(5)[0], RATE_HZ, 600)
     inside = []
@@ -110,6 +111,7 @@ def test_poles_that_grow_do_no_harm_in_a_long_decay() -> None:
     np.testing.assert_allclose([mode.frequency_hz for mode in found], [3.0, 3.06], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_heavy_and_light_damping_under_random_forces() -> None:
     ratios = [0.35, 0.10, 0.05, 0.30, 0.03]
     result = find_modes(random_record(five(ratios), 200.0, 1), RATE_HZ)
@@ -174,6 +176,7 @@ def test_what_kind_of_record_it_is() -> None:
     assert not any(decays(random_record(masses, 60.0, seed)) for seed in range(5))
 
 
+@pytest.mark.slow
 def test_an_order_that_cannot_be() -> None:
     record = random_record(five([0.02] * 5), 60.0, 3)
     with pytest.raises(ValueError, match="expected an order out of 2 to 48 in steps of 2, found 7"):

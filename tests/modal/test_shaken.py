@@ -14,6 +14,7 @@ from logger.modal.analysis import find_modes
 from .shaken import RATE_HZ, Shaken, matched, quarter_car, record, records
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_measured", [True, False])
 def test_no_mode_is_made_up_and_errors_hold(is_measured: bool) -> None:
     """Without noise, and with noise as loud as the signal."""

@@ -63,6 +63,7 @@ VALUES = [
 ]
 
 
+@pytest.mark.slow
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.dictionaries(st.integers(0, len(COLUMNS) - 1), st.sampled_from(VALUES), max_size=4),
                         min_size=1, max_size=5))

@@ -24,7 +24,7 @@ from ..support.browser import CHROMIUM, NO_BROWSER, browser, opened
 from ..support.drives.logged_rows import repeated_drives, rows_of_drive
 from ..support.drives.town import rows_of_town
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_BROWSER)
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason=NO_BROWSER)]
 
 DESK = {"viewport": {"width": 1100, "height": 1000}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
@@ -333,7 +333,6 @@ def test_places_that_lie_close_together_share_a_mark(open_page: Open) -> None:
     assert numbers[-1][0] == "1"
 
 
-@pytest.mark.slow
 def test_repeated_drives_are_one_street_and_each_can_be_looked_at(open_page: Open) -> None:
     rows = repeated_drives(3, 60, iri=(2.0, 3.0, 4.0))
     tab = open_page(rows)

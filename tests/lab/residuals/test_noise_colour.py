@@ -67,6 +67,7 @@ def test_the_nearest_levels_that_rise_are_those_of_least_squares() -> None:
         assert rising_levels(levels, weights) == pytest.approx(np.cumsum(steps.x), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_sensor_whose_noise_has_a_colour_lacks_no_physics() -> None:
     runs = secret_runs(seed=2, lasts_s=40.0)
     rng = np.random.default_rng(7)
@@ -82,6 +83,7 @@ def test_a_sensor_whose_noise_has_a_colour_lacks_no_physics() -> None:
     assert "louder at some frequencies" in " ".join(summary(found))
 
 
+@pytest.mark.slow
 def test_physics_that_nothing_explains_is_no_noise() -> None:
     runs = secret_runs([hidden("damper_asymmetry", rebound_to_bump_ratio=2.0)], lasts_s=40.0)
     found = diagnose(posterior_of(runs), FEW)

@@ -28,6 +28,7 @@ def drifting_sensors(run: Run) -> Run:
     return measuring(run, run.measured_mps2 + 0.28 * np.exp(-run.time_s / 9))
 
 
+@pytest.mark.slow
 def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     found, clean = compared(drifting_sensors), compared(lambda run: run)
     removed = found.removed
@@ -66,6 +67,7 @@ def test_a_wrong_place_is_named_with_its_share() -> None:
     assert not found.missing and conclusion(found).startswith("Nothing else is missing")
 
 
+@pytest.mark.slow
 def test_what_lies_outside_of_the_pass_band_has_its_share() -> None:
     made = beside_with(lambda run, _, rng: rng.normal(0, NOISE_MPS2, run.count), 2003, 30.0)
     runs = with_pass_bands(made.runs, made.predictions, low_pass_hz=25.0)

@@ -39,6 +39,7 @@ def plus_noise(residual: Residual) -> Residual:
     return lambda run, prediction, rng: residual(run, prediction, rng) + white(run, prediction, rng)
 
 
+@pytest.mark.slow
 def test_noise_bears_no_marks() -> None:
     """2 % of false alarms for each mark at most: of 25 residuals none is wrong more than 3 times (p < 0.002 at 2 %)."""
     count: Counter[str] = Counter()
@@ -222,6 +223,7 @@ def test_a_model_that_leaves_nothing() -> None:
     assert not marks(residuals).found
 
 
+@pytest.mark.slow
 def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
     for seed in range(6):
         residuals = beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)

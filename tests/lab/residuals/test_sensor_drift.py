@@ -53,6 +53,7 @@ def test_a_random_walk_is_followed() -> None:
     assert np.std((found.curve_mps2 - walk)[200:]) < 0.2 * walk[200:].std()
 
 
+@pytest.mark.slow
 def test_noise_alone_hardly_ever_drifts() -> None:
     assert sum(found_in(np.zeros_like, 30.0, seed).found for seed in range(2000, 2099)) <= 1
 

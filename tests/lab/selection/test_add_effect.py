@@ -43,6 +43,7 @@ def test_the_number_that_was_hidden_is_found_within_its_error(added: AddedEffect
     assert one.values["offset_m"] == pytest.approx(OFFSET_M, abs=4 * error)
 
 
+@pytest.mark.slow
 def test_where_a_search_ended_changes_nothing_of_where_the_fit_ends(runs: SimulatedRuns, added: AddedEffects) -> None:
     posterior, one = posterior_of(runs), hidden("sensor_offset", offset_m=0.2)
     near = fit(align(posterior, posterior.start([one]))).state
@@ -65,6 +66,7 @@ def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedR
     assert added.noise_floor_error == pytest.approx(NOISE_MPS2 / np.sqrt((counted**2).mean()), rel=0.05)
 
 
+@pytest.mark.slow
 def test_how_often_noise_would_gain_as_much_is_by_the_evidence_of_both_models(runs: SimulatedRuns) -> None:
     posterior, one = posterior_of(secret_runs(noise_mps2=0.3, lasts_s=12.0)), hidden("sensor_offset", offset_m=0.1)
     without, there = (fit(align(posterior, posterior.start(some))) for some in ([], [one]))
@@ -91,6 +93,7 @@ def test_what_is_written_is_the_vehicle_that_holds_on_to_what_was_given(added: A
         assert abs(one.written / one.nominal - 1) < 0.08
 
 
+@pytest.mark.slow
 def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends(runs: SimulatedRuns) -> None:
     found = add(posterior_of(runs), [], [chosen(EFFECTS["wheel_lift"], {})])
     assert any(abs(one.written - one.found) > 2 * one.standard_error for one in found.numbers)  # it was held
@@ -107,6 +110,7 @@ def test_effects_that_are_there_stay_and_are_fitted_too(runs: SimulatedRuns) -> 
     assert not found.helps
 
 
+@pytest.mark.slow
 def test_distances_are_reported_only_where_they_are_off_by_more_than_usual(runs: SimulatedRuns,
                                                                           added: AddedEffects) -> None:
     assert added.removed.distance_error_m == 0
@@ -131,6 +135,7 @@ def test_between_first_and_last_numbers_move_from_without_any_to_with_all(added:
         assert (found.without, found.found, found.written) == (one.without, now.found, now.written)
 
 
+@pytest.mark.slow
 def test_what_numbers_of_a_rough_file_do_as_well_is_no_effect() -> None:
     """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
     runs, tires = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0), [hidden("tire_damping")]

@@ -36,6 +36,7 @@ def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: Linea
     assert hidden.deviations == pytest.approx(np.sqrt(left), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_most_hidden_come_first_and_none_that_stands_out(loud: LinearModel) -> None:
     found = undetectable_effects(loud, list(EFFECTS.values()))
     deviations = [one.deviations for one in found]

@@ -31,6 +31,7 @@ def filtered(way: Callable[..., Array], order: int, cutoff_hz: float) -> Posteri
         for run in secret_runs([], noise_mps2=0.01).runs], 500.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "cutoff_hz"), [pytest.param(2, 16.0, marks=pytest.mark.release), (4, 20.0)])
 def test_one_that_was_run_forth_and_back_is_named_by_nothing_and_ends_the_band(
         order: int, cutoff_hz: float, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,6 +50,7 @@ def test_one_that_was_run_forth_and_back_is_named_by_nothing_and_ends_the_band(
     assert found.band.cutoff_hz == pytest.approx(cutoff_hz, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "cutoff_hz"), [pytest.param(2, 16.0, marks=pytest.mark.release), (4, 20.0)])
 def test_one_that_delays_stays_what_it_is(order: int, cutoff_hz: float) -> None:
     posterior = filtered(sosfilt, order, cutoff_hz)

@@ -194,6 +194,7 @@ def test_a_model_without_one_of_its_effects_has_all_else_as_it_was() -> None:
     assert screen(out, EFFECTS["sensor_gain"], [STILL]).gain > min_gain(len(EFFECTS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "cutoff_hz"), [(4, 20.0), (6, 28.0), (8, 16.0)])
 def test_a_delay_that_the_distances_absorbed_does_not_hide_the_order_of_a_filter(order: int, cutoff_hz: float) -> None:
     """A filter by scipy delays by up to half a wave; noise behind it hides from spectra what it took away."""

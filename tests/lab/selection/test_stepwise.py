@@ -92,6 +92,7 @@ def test_two_that_are_missing_are_both_found_and_each_gains_beside_the_other() -
         assert gain == pytest.approx(sought.without(selection.now, name).score - selection.now.score)
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_where_it_had_found_as_many_as_it_might() -> None:
     base = base_of(secret_runs([hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.1)], lasts_s=12.0))
     two = search(FEW).run(base)
@@ -153,6 +154,7 @@ def test_without_an_effect_the_model_is_what_it_was_before(offset_base: Baseline
     assert away.score == pytest.approx(offset_base.score, abs=5.0)
 
 
+@pytest.mark.slow
 def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) -> None:
     posterior = offset_base.posterior
     effects = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.0), hidden("tire_damping")]

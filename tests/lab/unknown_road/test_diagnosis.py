@@ -163,6 +163,7 @@ def deviance(problem: SameRoad, state: RoadFitState) -> float:
     return total
 
 
+@pytest.mark.slow
 def test_gains_are_those_of_dense_likelihoods() -> None:
     problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
     assert len(problem.stretches) == 1
@@ -207,6 +208,7 @@ def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
     assert certain_two_roads(road_agreements(two, two.start())) == (0, 1)
 
 
+@pytest.mark.slow
 def test_the_one_drive_over_another_road_is_named() -> None:
     runs = [run_of([], 9.0, 85.0, 1), run_of([], 14.0, 85.0, 2, OTHER), run_of([], 15.0, 85.0, 3)]
     bandwidth = shipped_effects()["sensor_bandwidth"]

@@ -44,6 +44,7 @@ def test_the_second_follows_the_first(true_runs: list[Run]) -> None:
     assert errors[1] < errors[0] / 2
 
 
+@pytest.mark.slow
 def test_a_delay_is_not_tried_on_distances_that_follow_the_road(true_runs: list[Run]) -> None:
     problem = SameRoad(true_runs, CAR, TOLERANCE, exact_places=False)
     effects = {name: shipped_effects()[name] for name in ("time_offset", "sensor_gain")}
