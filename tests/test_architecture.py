@@ -15,11 +15,11 @@ import logger
 import ridelog
 
 ROOT = Path(__file__).parents[1]
-SOURCES = {
-    ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): path
+SOURCES = {module: path for path, module in {
+    path: ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts))
     for package in (drivers, logger, ridelog) for root in [Path(str(package.__file__)).parent]
     for path in root.rglob("*.py")
-}
+}.items()}
 """Modules and their sources; the public package, which in a repository lies inside ``logger``, by its own name."""
 OUTWARD = ("ridelog.", "logger.public.")
 """Names of the public package: as others know it, and by its folder in a repository."""
