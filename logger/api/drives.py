@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.api.bench import Notify, silent
-from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
+from logger.api.ranges import ADDED, AUTO, NOISE, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, car_on, model_of
@@ -303,7 +303,7 @@ class Estimate(CommandResult):
 
 
 def estimate(
-    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] = NOISE_MPS2,
+    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] | None = None,
     step_mps2: float | None = None, window_m: float = WINDOW_M, unit: str | None = None,
     resample_hz: float | None = None, anyway: bool = False,
 ) -> Estimate:
@@ -313,7 +313,8 @@ def estimate(
     run           as ``read_run``; its distance may go back by up to 1 m, and is then computed again from the speed
     vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
-                  its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
+                  its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``; None: what the run's
+                  ``run.yaml`` says, or learnt
     step_mps2     step that readings are rounded to; 0: none; None: what the run's ``run.yaml`` says, or none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
     unit, resample_hz    as ``comfort``
@@ -327,17 +328,17 @@ def estimate(
     >>> found.iri_m_per_km.shape == found.iri_exact_m_per_km.shape == (len(found.flags),)
     True
     """
-    from logger.estimation.sensor_noise import Sensor
-
     model = model_of(vehicle)
-    learns = noise_mps2 == "auto"
-    given_mps2 = NOISE_MPS2 if noise_mps2 == "auto" else noise_mps2
-    NOISE.check("noise_mps2", given_mps2)
+    if isinstance(noise_mps2, str):
+        if noise_mps2 != AUTO:
+            raise BadInput(f"noise_mps2: expected {AUTO} or a number, found {noise_mps2!r}")
+    elif noise_mps2 is not None:
+        NOISE.check("noise_mps2", noise_mps2)
     if step_mps2 is not None:
         ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
-    found = assessed(drive, model, Sensor(given_mps2, step_of(drive, step_mps2)), window_m, learns, anyway=anyway)
+    found = assessed(drive, model, *sensor_of(drive, noise_mps2, step_mps2), window_m, anyway=anyway)
     return estimate_by(found, checked, str(drive.path))
 
 
@@ -357,12 +358,18 @@ def estimate_by(found: Assessment, checked: EvenRecord, name: str, files: Sequen
                     tuple(doubt.words for doubt in checked.doubts))
 
 
-def step_of(run: Run, said_mps2: float | None) -> float:
-    """The step that readings are rounded to, as somebody said it, or as the run's facts say; 0: none [m/s2]."""
-    return (run.facts.step_mps2 or 0.0) if said_mps2 is None else said_mps2
+def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float | None = None) -> tuple[Sensor, bool]:
+    """What a reading is, by what somebody said, or where that is None by the run's facts; and whether its noise is a
+    guess and to be learnt: where nobody knows it, or ``AUTO`` is said."""
+    from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
+
+    step_mps2 = (run.facts.step_mps2 or 0.0) if step_mps2 is None else step_mps2
+    known_mps2 = run.facts.noise_mps2 if noise_mps2 is None else noise_mps2
+    learns = known_mps2 is None or isinstance(known_mps2, str)
+    return Sensor(NOISE_MPS2 if learns else float(known_mps2), step_mps2), learns
 
 
-def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False,
+def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, learns_noise: bool, window_m: float,
              warn: Notify = silent, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on

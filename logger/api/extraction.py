@@ -86,11 +86,10 @@ def _facts(sensor: Instrument, config: Config) -> RecordFacts:
 
 
 def _noise_mps2(sensor: Instrument, config: Config) -> float | None:
-    """Of the sensor, where it was set or learnt; None: nobody knows."""
-    if config.accelerometer.noise_mps2 is None:
+    """Of the sensor, where the settings say it; None: whoever reads the run learns it from the readings."""
+    if not isinstance(config.accelerometer.noise_mps2, float):
         return None
-    of_one = sensor.noise.noise_rms_mps2 if sensor.noise is not None else sensor.sensor.noise_rms_mps2
-    return sensor.on_grid(of_one).noise_rms_mps2
+    return sensor.on_grid(sensor.sensor.noise_rms_mps2).noise_rms_mps2
 
 
 class _NoRows:

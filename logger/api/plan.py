@@ -11,12 +11,13 @@ import numpy as np
 
 from logger.api.bench import Bench, Notify, among, bench_of, planned_bench, silent, tolerance_of
 from logger.api.lab import Runs, lab_drives, word_of
-from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, SPEED
+from logger.api.ranges import ADDED, NOISE, SPEED
 from logger.api.roads import Profile, read_profile
 from logger.api.run_checks import LEAST_S, checked_runs
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
+from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.store.formats import drive_file, vehicle_file
 
 if TYPE_CHECKING:

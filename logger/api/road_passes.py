@@ -18,9 +18,8 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from logger.api.csv_extraction import Asked, extract_csv
-from logger.api.drives import assessed, read_run, step_of
+from logger.api.drives import assessed, read_run, sensor_of
 from logger.api.extracted_runs import read_measured_profile
-from logger.api.ranges import NOISE_MPS2
 from logger.errors import BadInput
 from logger.extraction.measured_line import MeasuredLine, passes
 from logger.shipped import vehicle_path
@@ -150,12 +149,10 @@ def _write(path: Path, header: str, *columns: Array) -> None:
 
 def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
     """The windows of a drive, for each length; noise is learnt once. Raises BadInput."""
-    from logger.estimation.sensor_noise import Sensor
-
-    sensor, learns = Sensor(NOISE_MPS2, step_of(run, None)), True
+    sensor, learns = sensor_of(run)
     found = []
     for window_m in windows_m:
-        one = assessed(run, model, sensor, window_m, learns, anyway=True)
+        one = assessed(run, model, sensor, learns, window_m, anyway=True)
         sensor, learns = one.sensor, False  # learnt once
         edges_m = one.windows.edges_m
         if len(edges_m) < 2:

@@ -100,7 +100,7 @@ class _Commands:
                 f"ridelog extract {self._fourth} --out {runs} --profile {self._out / BEYOND}")
 
     def estimate(self, folder: Path, vehicle: str) -> str:
-        return f"ridelog estimate {folder} --vehicle {vehicle} --noise auto"
+        return f"ridelog estimate {folder} --vehicle {vehicle}"
 
     def explain(self, chapter: str, effect: str, vehicle: str) -> str:
         """Of the steps of ``lab_loop.go_through``."""
@@ -145,9 +145,7 @@ def _run(folder: Path) -> Run:
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import assessed, step_of
-    from logger.api.ranges import NOISE_MPS2
-    from logger.estimation.sensor_noise import Sensor
+    from logger.api.drives import assessed, sensor_of
     from logger.report.estimate_text import as_json, lines
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
@@ -157,8 +155,7 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
     with progress() as say:
         say("estimating the road")
         drive = _run(folder)
-        found = assessed(drive, read_model(vehicle_path(vehicle)), Sensor(NOISE_MPS2, step_of(drive, None)), WINDOW_M,
-                         learns_noise=True)
+        found = assessed(drive, read_model(vehicle_path(vehicle)), *sensor_of(drive), WINDOW_M)
     tell(_essential(lines(found, as_json(str(folder), found))))
     return found
 

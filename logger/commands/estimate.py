@@ -5,7 +5,7 @@ the folder, the estimates are compared with its exact IRI. Beside them stands th
 that knew the road's spectrum, the sensor's noise and the car exactly.
 
   ridelog estimate run --vehicle rav4-2009
-  ridelog estimate drive.csv --vehicle mycar.yaml --noise auto --step 0.613 --profile-out road.csv
+  ridelog estimate drive.csv --vehicle mycar.yaml --step 0.613 --profile-out road.csv
 
 A distance may go back by up to 1 m, as one corrected by GPS does; it is then computed again, as the integral of
 speed_mps plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.outputs import check_outs
-from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, WINDOW
+from logger.api.ranges import ADDED, AUTO, NOISE, WINDOW
 from logger.commands.lab_model import add_anyway, warned
 from logger.commands.numbers import add_number
 from logger.commands.pictures import HELP, parted, write_pictures
@@ -37,8 +37,6 @@ from logger.files import together, write_text
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
 
-AUTO = "auto"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -46,9 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
                              "also says where the sensor sits")
-    parser.add_argument("--noise", type=_noise, default=NOISE_MPS2, metavar="auto|MPS2",
-                        help="r.m.s. noise of one reading before rounding [m/s2] "
-                             f"(default: {NOISE_MPS2:g}); auto: learnt from the drive, with a standard error")
+    parser.add_argument("--noise", type=_noise, metavar="auto|MPS2",
+                        help="r.m.s. noise of one reading before rounding [m/s2]; auto: learnt from the drive, with a "
+                             "standard error (default: what the run's run.yaml says, or auto)")
     add_number(parser, "--step", *ADDED, metavar="MPS2",
                help="step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)")
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
@@ -60,10 +58,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
-def _noise(text: str) -> float | None:
-    """A noise, or None for one to be learnt. BadInput for a number out of range."""
+def _noise(text: str) -> float | str:
+    """A noise, or ``AUTO``. BadInput for a number out of range."""
     if text == AUTO:
-        return None
+        return text
     value = float(text)
     NOISE.check("--noise", value)
     return value
@@ -74,8 +72,7 @@ _noise.__name__ = "auto or float"  # argparse names it when a text is neither
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
-    from logger.api.drives import assessed, checked_run, estimate_by, step_of
-    from logger.estimation.sensor_noise import Sensor
+    from logger.api.drives import assessed, checked_run, estimate_by, sensor_of
     from logger.report.estimate_text import window_lines
     from logger.shipped import vehicle_path
     from logger.store.formats.record_checks import Asked
@@ -88,9 +85,7 @@ def run(args: argparse.Namespace) -> int:
     pictures, tables = parted(args.out)
     _check_files(args, vehicle_yaml)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
-    learns = args.noise is None
-    sensor = Sensor(NOISE_MPS2 if learns else args.noise, step_of(drive, args.step))
-    found = assessed(drive, model, sensor, window_m, learns, warned, args.anyway)
+    found = assessed(drive, model, *sensor_of(drive, args.noise, args.step), window_m, warned, args.anyway)
     with together():
         files = [] if args.profile_out is None else _write_road(args.profile_out, found)
         for path in tables:

@@ -18,10 +18,11 @@ import json
 from pathlib import Path
 
 from logger.api.outputs import check_out
-from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, SPEED
+from logger.api.ranges import ADDED, NOISE, SPEED
 from logger.commands.lab_model import add_lab_options, bench, progress
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE
+from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.files import write_text
 
 

@@ -12,13 +12,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivers.dump import open_dump
 from logger.errors import BadInput
 from logger.files import make_folder, note
 from logger.printable import counted
 from logger.service.config import Config, load_config
+
+if TYPE_CHECKING:
+    from logger.service.noise_learning import NoiseLearning
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 1e6
 
@@ -49,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 @dataclass(frozen=True)
 class Outcome:
     """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive
-    showed of the receiver's delay, of which the rows took ``known``."""
+    showed of the receiver's delay, of which the rows took ``known``, and of the sensor's noise."""
 
     directory: Path
     files: list[Path]
@@ -60,6 +63,7 @@ class Outcome:
     summary: Any
     receiver: dict[str, Any]
     known: Any
+    noise: NoiseLearning
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, SI units in the names."""
@@ -73,6 +77,7 @@ class Outcome:
             "wall_s": self.wall_s,
             "torn_tail": self.torn_tail,
             "receiver": self.receiver,
+            "noise": self.noise.fields(),
             "summary": summary_json(self.summary),
         }
 
@@ -84,7 +89,7 @@ class Outcome:
         lines = [screen(self.summary, sys.stdout.encoding or "ascii")]
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
-        lines += drive_words(self.receiver, self.known)
+        lines += [*drive_words(self.receiver, self.known), f"Sensor's noise: {self.noise.words()}"]
         lines.append(f"Logs: {self.directory} ({counted(len(self.files), 'file')}, {counted(self.rows, 'row')})")
         return "\n".join(lines)
 
@@ -94,6 +99,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service import wiring
     from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
+    from logger.service.noise_learning import NoiseLearning
     from logger.service.receiver_learning import drive_fields
     from logger.service.recorded_rate import check_recorded_rate
     from logger.store.formats.vehicle_file import read_on_board
@@ -126,7 +132,9 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     for file in files:
         note(file)
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
-    return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known)
+    learning = NoiseLearning(out, pipeline, config.accelerometer, noise)
+    return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known,
+                   learning)
 
 
 def _written(out: Path, session: int) -> tuple[list[Path], Any]:

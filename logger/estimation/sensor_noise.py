@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+NOISE_MPS2 = 0.05
+"""Of a reading, where nobody says another [m/s2]; where it is to be learnt, a guess to begin with."""
+
 
 @dataclass(frozen=True)
 class Sensor:

@@ -11,6 +11,7 @@ import numpy as np
 
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
 from logger.estimation.road_profile import RESOLVED_SHARE
+from logger.estimation.sensor_noise import NOISE_MPS2
 
 _FAR_ABOVE = 1.5
 _MOVING_MPS = 1.0
@@ -131,10 +132,10 @@ def _unit_hint(found: Assessment) -> str:
     mean, rms = float(drive.accel_z_mps2[moving].mean()), float(drive.accel_z_mps2[moving].std())
     if abs(abs(mean) - 1) < _G_NEAR and rms < _G_CALM_MPS2:
         return f"Acceleration in g? On the way it is {mean:.2f} on the mean and {rms:.3g} r.m.s. about it."
-    if rms < found.sensor.noise_rms_mps2:
+    noise_mps2 = NOISE_MPS2 if found.learns_noise else found.sensor.noise_rms_mps2
+    if rms < noise_mps2:
         return (f"Acceleration in g? On the way it is {rms:.3g} r.m.s., less than the noise of "
-                f"{found.sensor.noise_rms_mps2:g} "
-                "(--noise).")
+                f"{noise_mps2:g} {'that sensors have' if found.learns_noise else '(--noise)'}.")
     return ""
 
 

@@ -37,13 +37,14 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 class AccelerometerConfig:
     """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
     ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used;
-    ``noise_mps2`` the r.m.s. noise of one reading (None: what is usual of it, ``AUTO``: learnt)."""
+    ``noise_mps2`` the r.m.s. noise of one reading (``AUTO``: learnt; None, in no settings but those of recordings by
+    loggers that did not learn it: what is usual of it)."""
 
     driver: str = DEFAULT
     vertical_axis: str = "+z"
     sections: Mapping[str, Any] = field(
         default_factory=lambda: {name: kind.settings() for name, kind in accelerometers().items()})
-    noise_mps2: float | str | None = None
+    noise_mps2: float | str | None = AUTO
 
     @property
     def kind(self) -> Accelerometer[Any]:
@@ -176,10 +177,10 @@ def _or_none(word: str, read: Read) -> Read:
     return read_or_none
 
 
-def _or_word(word: str, read: Read) -> Read:
-    """Let ``word`` stand for itself."""
-    read_rest = _or_none(word, read)
-    return lambda node: word if node.content == word else read_rest(node)
+def _noise(node: Node) -> float | str:
+    """A noise, or ``AUTO``; ``null``, as earlier versions shipped, says nothing."""
+    noise = None if node.is_null() else _or_none(AUTO, _number(LEAST_NOISE_MPS2, MOST_NOISE_MPS2))(node)
+    return AUTO if noise is None else float(noise)
 
 
 def _file_to_write(node: Node) -> Path:
@@ -241,7 +242,7 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     readers: dict[str, Read] = {
         "driver": lambda entry: entry.choice(*kinds),
         "vertical_axis": lambda entry: entry.choice(*AXES),
-        "noise_mps2": _or_none("null", _or_word(AUTO, _number(LEAST_NOISE_MPS2, MOST_NOISE_MPS2))),
+        "noise_mps2": _noise,
         **{name: _section_of(kind) for name, kind in kinds.items()},
     }
     read = {key: readers[key](entry) for key, entry in node.mapping(optional=readers).items()}

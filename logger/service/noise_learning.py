@@ -1,9 +1,9 @@
 """The accelerometer's noise from drive to drive: what a drive begins with, what it learns, and the file in between.
 
-Problem: ``accelerometer.noise_mps2: auto`` shall mean what was learnt of this very sensor, and a replay shall make the
-same rows. Solution: where the service begins is in the dump's header and the sidecars; from there on the pipeline
-learns from the readings themselves, in a replay as on board. What it comes to goes into ``FILE_NAME`` in the folder of
-the logs (``learnt_file``), for the next start, with what the sensor was set to: of another range it says nothing.
+Problem: nobody states the noise of this very sensor, so it is learnt, and a replay shall make the same rows. Solution:
+where the service begins is in the dump's header and the sidecars; from there on the pipeline learns from the readings
+themselves, in a replay as on board. What it comes to goes into ``FILE_NAME`` in the folder of the logs
+(``learnt_file``), for the next start, with what the sensor was set to: of another range it says nothing.
 """
 
 from __future__ import annotations
@@ -120,6 +120,11 @@ class NoiseLearning:
         if now is not None and now is not self._known:
             self._file.save({**header_fields(now), _OF: _identity(self._config)})
 
+    def fields(self) -> dict[str, Any]:
+        """The same for a program: noise and standard error in m/s2, None where they are not learnt."""
+        now = self.now
+        return header_fields(now) if now is not None else dict(zip(_KEYS, (None, None, 0), strict=True))
+
     def words(self) -> str:
         """One line for ``ridelog status``, with what to do where the steps are too large."""
         step_mps2 = self._config.kind.readings(self._config.settings).step_mps2
@@ -128,13 +133,10 @@ class NoiseLearning:
         return f"{self._noise_words()}; steps of {step_mps2:.2g} m/s2 hide smooth roads: set a smaller range"
 
     def _noise_words(self) -> str:
-        noise = self._config.noise_mps2
-        if noise is None:
-            usual = self._config.kind.readings(self._config.settings).noise_mps2
-            return f"{usual:.3g} m/s2, usual of this sensor (noise_mps2: auto learns it)"
-        if noise != AUTO:
+        noise, now = self._config.noise_mps2, self.now
+        if isinstance(noise, float):
             return f"{noise:.3g} m/s2 by the settings"
-        now = self.now
         if now is None:
-            return "not known yet, it is learnt while driving"
+            usual = self._config.kind.readings(self._config.settings).noise_mps2
+            return f"{usual:.2g} m/s2 assumed{'; it is learnt while driving' if noise == AUTO else ''}"
         return f"{now.belief.noise_rms_mps2:.2g} +- {now.belief.std_mps2:.1g} m/s2, {drives_words(now.drives)}"

@@ -41,6 +41,11 @@ def header_fields(known: Belief) -> dict[str, Any]:
     return dict(zip(_KEYS, (known.delay_s, known.std_s, known.drives), strict=True))
 
 
+def is_loggers(fields: Mapping[str, Any]) -> bool:
+    """Whether a recording's header is by a logger that knew of the delay, and not written by hand or a simulation."""
+    return _KEYS[0] in fields
+
+
 def from_fields(fields: Mapping[str, Any]) -> Belief | None:
     """What ``header_fields`` said; None where nothing is said. ValueError for what cannot be."""
     if not isinstance(fields, Mapping):

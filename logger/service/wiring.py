@@ -33,7 +33,7 @@ from logger.service.comfort_columns import ComfortColumns
 from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
 from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
-from logger.service.receiver_learning import at_start, from_fields, header_fields
+from logger.service.receiver_learning import at_start, from_fields, header_fields, is_loggers
 from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
 from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
 from logger.store.formats.vehicle_file import Model
@@ -229,7 +229,7 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
     try:
         kind = accelerometers()[said.name("driver", "", tuple(accelerometers()))]
         if given is None:
-            axis, noise_mps2 = said.name("vertical_axis", axis, AXES), _noise_setting(said)
+            axis, noise_mps2 = said.name("vertical_axis", axis, AXES), _noise_setting(said, is_loggers(header.gps))
         sections = config.accelerometer.sections
         settings = kind.recorded(said, sections[kind.name], is_given=given is not None)
         sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings}, noise_mps2)
@@ -266,12 +266,15 @@ def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") ->
         raise BadInput(f"{place}: {error}") from None
 
 
-def _noise_setting(said: RecordedWords) -> float | str | None:
-    """The setting that a recording was made with, by its header. SettingsError for what cannot be."""
+def _noise_setting(said: RecordedWords, by_logger: bool) -> float | str | None:
+    """The setting that a recording was made with, by its header. A logger that says what it knew of the receiver and
+    nothing of the noise did not learn it; a header that says neither is no logger's. SettingsError for what cannot
+    be."""
     noise = said.group("noise")
     if noise.says("noise_std_mps2") or noise.says("noise_mps2", AUTO):
         return AUTO
-    return noise.number_or_none("noise_mps2", None, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
+    number = noise.number_or_none("noise_mps2", None, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
+    return AUTO if number is None and not by_logger else number
 
 
 def _as_written(config: Config) -> dict[str, Any]:

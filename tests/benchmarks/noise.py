@@ -4,7 +4,7 @@
 
 drives: every drive goes through the real pipeline with a receiver of 1 Hz whose position wanders by 0.8 m: noise x
 range x speed x roads of several IRI, with gravity at another place within a step each time. Four times each: with
-an assumed 0.1 m/s2 (``noise_mps2: null``), with the true noise given, learning from a guess ("first drive"), and once
+an assumed 0.1 m/s2, with the true noise given, learning from a guess ("first drive"), and once
 more with what was learnt carried on ("learnt"). Roads, car and receiver are those of tests/benchmarks/estimator.py.
 
 limit: ISO roads with exact places and the noise given, beside the best that anybody could say (``rounding_limit``),

@@ -177,17 +177,29 @@ def test_the_noise_is_learnt_from_the_drive(
     assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
                  f"{noise}", "--step", f"{step}", "--rate", f"{rate}", "--out", str(tmp_path / "drive.csv")]) == 0
     (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
-    result = reported(capsys, tmp_path, "--noise", "auto", "--step", step)
+    result = reported(capsys, tmp_path, "--step", step)
     assert abs(result["noise_mps2"] - noise) < 2.5 * result["noise_std_mps2"]
     assert 0.02 * noise < result["noise_std_mps2"] < 0.2 * noise
-    taken = reported(capsys, tmp_path, "--step", step)
+    taken = reported(capsys, tmp_path, "--step", step, "--noise", 0.05)
     assert taken["noise_mps2"] == 0.05 and taken["noise_std_mps2"] is None
     assert result["comparison"]["r2"] > taken["comparison"]["r2"] - 0.01
-    assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
+    assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--step", str(step)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} +- "
                         f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
     assert lines[2].startswith("Assumed: ")
+
+
+@pytest.mark.slow
+def test_the_noise_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+                                                 ) -> None:
+    for name in ("drive.csv", "profile.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    write_run_facts(tmp_path, RecordFacts(noise_mps2=0.08))
+    said = reported(capsys, tmp_path)
+    assert (said["noise_mps2"], said["noise_std_mps2"], said["noise_learnt"]) == (0.08, None, None)
+    assert reported(capsys, tmp_path, "--noise", "auto")["noise_learnt"]
+    assert reported(capsys, tmp_path, "--noise", "0.06")["noise_mps2"] == 0.06
 
 
 @pytest.mark.slow
@@ -211,7 +223,7 @@ def test_a_drive_that_tells_nothing_of_the_noise_says_so(
     columns["distance_m"] *= 0.0
     columns["accel_z_mps2"] = np.random.default_rng(1).normal(0, 0.5, len(columns["t_s"]))
     write(tmp_path, columns)
-    result = reported(capsys, tmp_path, "--noise", "auto", "--step", step)
+    result = reported(capsys, tmp_path, "--step", step)
     assert (result["noise_learnt"], result["noise_std_mps2"], result["noise_mps2"]) == (False, None, 0.05)
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
     assert "This drive shows nothing of the noise. Assumed: 0.05 m/s2" in capsys.readouterr().out
@@ -232,8 +244,9 @@ def test_a_distance_that_goes_back_a_little_is_computed_from_the_speed(
 def test_the_screen_says_what_was_assumed_and_what_is_possible(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = reported(capsys, folder)
-    done = called("estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out", tmp_path / "p.csv")
+    result = reported(capsys, folder, "--noise", 0.05)
+    done = called("estimate", folder, "--vehicle", vehicle_file(CAR), "--noise", 0.05, "--profile-out",
+                  tmp_path / "p.csv")
     assert (done.returncode, done.stderr) == (0, f"Wrote {tmp_path / 'p.csv'}\n")
     assert "noise of 0.05 m/s2 in a reading (--noise), not rounded (--step)" in done.stdout
     assert f"IRI {result['iri_m_per_km']:.2f} m/km on the mean" in done.stdout
@@ -250,7 +263,7 @@ def test_more_in_the_readings_than_is_explained_is_said(
     columns = read(folder)
     columns["accel_z_mps2"] += 0.4 * np.random.default_rng(3).standard_normal(len(columns["t_s"]))
     drive = write(tmp_path, columns)
-    assert main(["estimate", str(drive), "--vehicle", CAR]) == 0
+    assert main(["estimate", str(drive), "--vehicle", CAR, "--noise", "0.05"]) == 0
     assert "there may be more in the readings than vehicle and noise explain" in capsys.readouterr().out
 
 
@@ -344,6 +357,9 @@ def test_readings_that_may_be_in_g_are_said_to_be(
     assert hints["m/s2"] == hints["enough"] == []
     assert hints["nearly gravity"][0].startswith("Acceleration in g? On the way it is 1.06 on the mean and ")
     assert hints["little"][0].endswith(f"less than the noise of {1.05 * rms:.4f} (--noise).")
+    drive = write(tmp_path, columns | {"accel_z_mps2": 0.04 / rms * in_g})
+    assert main(["estimate", str(drive), "--vehicle", CAR]) == 0
+    assert "0.04 r.m.s., less than the noise of 0.05 that sensors have." in capsys.readouterr().out
 
 
 def test_a_road_without_any_roughness_in_places_has_a_limit_all_the_same(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+import re
 import subprocess
 import zlib
 from datetime import datetime
@@ -17,6 +18,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from ..support.command import called
 
 PATIENCE_S = 60
+DRIVEN_MPS2 = 0.1  # noise of the demo's sensor
 CONTRACT = (
     "segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,iri_std_m_per_km,"
     "iri_rms_m_per_km,a_w_mps2,mtvv_mps2,vdv_mps175,crest_factor,comfort,iri_class,flags"
@@ -46,6 +48,7 @@ def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path)
     assert done.returncode == 0, done.stderr
     assert "Roughest places" in done.stdout
     assert "Receiver's delay: 0." in done.stdout
+    assert re.search(r"Sensor's noise: 0\.\d+ \+- 0\.\d+ m/s2, learnt over 1 drive\n", done.stdout)
     assert str(tmp_path / "out") in done.stdout
     assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
     assert len(rows(tmp_path / "out")) > 400
@@ -67,6 +70,9 @@ def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
     assert outcome["receiver"]["delay_s"] is None  # a minute and a half: too short
     assert outcome["receiver"]["unknown_because"] == "too little has been driven"
     assert outcome["receiver"]["mounting"] == []
+    noise = outcome["noise"]
+    assert noise["noise_drives"] == 1
+    assert abs(noise["noise_mps2"] - DRIVEN_MPS2) < 3 * noise["noise_std_mps2"] < DRIVEN_MPS2
     records = list(csv.DictReader(text.splitlines()))
     assert outcome["rows"] == len(records)
     assert [int(record["segment"]) for record in records] == list(range(1, len(records) + 1))

@@ -13,7 +13,7 @@ from drivers.accelerometers.bma220 import Bma220Config
 from drivers.dump import DumpHeader, Event, open_dump
 from logger.errors import BadInput
 from logger.estimation.noise_belief import NoiseBelief
-from logger.service import wiring
+from logger.service import receiver_learning, wiring
 from logger.service.config import AUTO, AccelerometerConfig, Config, load_config
 from logger.service.noise_learning import (
     FILE_NAME,
@@ -29,7 +29,7 @@ from logger.store.formats.vehicle_file import read_model
 
 from ..support.drives.replay import parts_for, rows_of
 
-LEARNS = AccelerometerConfig(noise_mps2=AUTO)
+LEARNS = AccelerometerConfig()
 KNOWN = KnownNoise(NoiseBelief(log(0.15), 0.06), 3)
 USUAL_MPS2 = 0.1 * sqrt(125 / 32)  # of one of four reads, whose filter is wider than that of one
 DRIVEN_MPS2 = 0.1  # that of the demo's drives
@@ -58,8 +58,8 @@ def recorded(short_dump: Path) -> tuple[DumpHeader, list[Event]]:
         return reader.header, list(reader)
 
 
-@pytest.mark.parametrize(("text", "noise"), [("", None), ("noise_mps2: null", None), ("noise_mps2: auto", AUTO),
-                                             ("noise_mps2: 0.15", 0.15)])
+@pytest.mark.parametrize(("text", "noise"), [("", AUTO), ("noise_mps2: null", AUTO), ("noise_mps2:", AUTO),
+                                             ("noise_mps2: auto", AUTO), ("noise_mps2: 0.15", 0.15)])
 def test_the_setting(tmp_path: Path, text: str, noise: float | str | None) -> None:
     config = config_of(f"accelerometer:\n  driver: bma220\n  {text}\n", tmp_path).accelerometer
     assert config.noise_mps2 == noise
@@ -83,7 +83,7 @@ def test_what_was_learnt_of_the_mean_of_several_readings_is_not_taken_for_that_o
 
 @pytest.mark.parametrize("value", ["Auto", "0", "-0.1", "1000", "0.1 m/s2", "[]", "nan"])
 def test_a_setting_that_cannot_be_is_refused(tmp_path: Path, value: str) -> None:
-    with pytest.raises(BadInput, match=r"ridelog\.yaml:2: expected (null or auto or )?a number"):
+    with pytest.raises(BadInput, match=r"ridelog\.yaml:2: expected (auto or )?a number"):
         config_of(f"accelerometer:\n  noise_mps2: {value}\n", tmp_path)
 
 
@@ -98,7 +98,7 @@ def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
     NoiseLearning(tmp_path, LEARNT, LEARNS, begun).save()
     again = read_learnt(tmp_path, LEARNS)
     assert again is not None and again.drives == 2
-    assert at_start(tmp_path, AccelerometerConfig()) is None  # it is not to be learnt
+    assert at_start(tmp_path, AccelerometerConfig(noise_mps2=0.15)) is None  # it is not to be learnt
 
 
 def test_of_a_sensor_that_is_set_otherwise_nothing_is_known(tmp_path: Path) -> None:
@@ -131,16 +131,32 @@ def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
     found = wiring.noise_for_dump(header, config)
     assert found is not None and found.drives == 3
     assert found.belief.noise_rms_mps2 == pytest.approx(0.15) and found.belief.log_std == pytest.approx(0.06)
-    assert wiring.noise_for_dump(header, Config()) is None  # settings that do not want it learnt
+    assert wiring.noise_for_dump(header, Config(accelerometer=AccelerometerConfig(noise_mps2=0.2))) is None
     car = read_model(vehicle_file("rav4-2009"))
     facts = wiring.sidecar(config, wiring.instrument(LEARNS, KNOWN), car, noise=KNOWN)
     assert from_fields(facts["noise"]) == from_fields(header_fields(KNOWN))
-    assert "noise" not in wiring.sidecar(Config(), wiring.instrument(AccelerometerConfig()), car)
     first = wiring.dump_header(config)
     assert wiring.config_for_dump(first, None, None).accelerometer.noise_mps2 == AUTO
     assert wiring.noise_for_dump(first, config) is None
     fixed = wiring.dump_header(Config(accelerometer=AccelerometerConfig(noise_mps2=0.2)))
     assert wiring.config_for_dump(fixed, None, None).accelerometer.noise_mps2 == 0.2
+
+
+def test_a_recording_by_a_logger_that_did_not_learn_replays_with_what_it_took() -> None:
+    """Such loggers said what they knew of the receiver, and of the noise only a number out of the settings. What says
+    neither is by no logger: it is played as one would drive today."""
+    said = header_fields(KNOWN)
+    by_logger = {"baud": 9600, "latency_s": 0.1, "latency_std_s": 0.1, "latency_drives": 0}
+    for gps, noise, setting in ((by_logger, {}, None), ({"baud": 9600}, {}, AUTO), (by_logger, {"noise": said}, AUTO),
+                                (by_logger, {"noise": {"noise_mps2": 0.2}}, 0.2)):
+        header = DumpHeader(None, {"driver": "bma220", "oversample": 4, **noise}, gps, "rav4-2009")
+        config = wiring.config_for_dump(header, None, None)
+        assert config.accelerometer.noise_mps2 == setting
+        sensor = wiring.instrument(config.accelerometer)
+        assert (sensor.noise is not None) == (setting == AUTO)
+        assert sensor.sensor.noise_rms_mps2 == pytest.approx(setting if isinstance(setting, float) else USUAL_MPS2)
+    written = wiring.dump_header(Config())  # of today, before it learnt anything
+    assert "latency_s" in written.gps and written.accelerometer["noise"] == {"noise_mps2": AUTO}
 
 
 @pytest.mark.parametrize("noise", ["loud", 3, {"noise_mps2": -1}, {"noise_mps2": True}, {"noise_mps2": [1]},
@@ -175,16 +191,16 @@ def test_a_recording_replays_with_what_its_drive_began_with(recorded: tuple[Dump
     assert rows == rows_of(said, events).rows
     assert rows != rows_of(header, events).rows
     usual = {**header.accelerometer, "noise": {"noise_mps2": 0.1}}
-    assert rows_of(replace(header, accelerometer=usual), events).rows == rows_of(header, events).rows
+    old = replace(header, gps={"baud": 9600, **receiver_learning.header_fields(receiver_learning.UNKNOWN)})
+    assert rows_of(replace(header, accelerometer=usual), events).rows == rows_of(old, events).rows
 
 
 def test_status_says_it_in_words(tmp_path: Path) -> None:
     def words(config: AccelerometerConfig, drive: Drive = NOTHING, known: KnownNoise | None = None) -> str:
         return NoiseLearning(tmp_path, drive, config, known).words()
 
-    assert words(AccelerometerConfig()) == "0.198 m/s2, usual of this sensor (noise_mps2: auto learns it)"
     assert words(AccelerometerConfig(noise_mps2=0.15)) == "0.15 m/s2 by the settings"
-    assert words(LEARNS) == "not known yet, it is learnt while driving"
+    assert words(LEARNS) == "0.2 m/s2 assumed; it is learnt while driving"
     assert words(LEARNS, known=KNOWN) == "0.15 +- 0.009 m/s2, learnt over 3 drives"
     ranged = replace(AccelerometerConfig(noise_mps2=0.15), sections={"bma220": Bma220Config(range_g=8)})
     assert words(ranged) == "0.15 m/s2 by the settings; steps of 2.5 m/s2 hide smooth roads: set a smaller range"
