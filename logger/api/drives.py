@@ -365,8 +365,9 @@ def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float 
 
     step_mps2 = (run.facts.step_mps2 or 0.0) if step_mps2 is None else step_mps2
     known_mps2 = run.facts.noise_mps2 if noise_mps2 is None else noise_mps2
-    learns = known_mps2 is None or isinstance(known_mps2, str)
-    return Sensor(NOISE_MPS2 if learns else float(known_mps2), step_mps2), learns
+    if known_mps2 is None or isinstance(known_mps2, str):
+        return Sensor(NOISE_MPS2, step_mps2), True
+    return Sensor(float(known_mps2), step_mps2), False
 
 
 def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, learns_noise: bool, window_m: float,

@@ -148,6 +148,7 @@ def test_a_header_that_cannot_be_is_refused(gps: dict[str, Any]) -> None:
 def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> None:
     with open_dump(short_dump) as reader:
         header, events = reader.header, list(reader)[:6000]
+    header = replace(header, accelerometer={**header.accelerometer, "noise": {"noise_mps2": "auto"}})
     learnt = replace(header, gps={**header.gps, **header_fields(Belief(0.25, 0.0, 3))})
     rows = rows_of(learnt, events).rows
     assert rows == rows_of(header, events, config_of(header, SET)).rows

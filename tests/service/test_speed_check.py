@@ -49,8 +49,10 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     car.receiver = lambda second: epoch(second, car.speed_mps, car.travelled_m)
     status = car.drive(90)
     assert status.gps.state == "ok"
-    assert "speed_doubtful" not in car.rows.records[-1].flags
-    assert car.rows.records[-1].iri_m_per_km is not None
+    last = car.rows.records[-1]
+    assert "speed_doubtful" not in last.flags
+    assert last.iri_rms_m_per_km is not None
+    assert last.iri_m_per_km is not None or "faint" in last.flags  # this car's readings are white: learnt as noise
 
 
 @pytest.mark.parametrize("factor", [1.0, *slow(0.93, 1.07)])
