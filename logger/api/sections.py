@@ -93,8 +93,8 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
 
     localized_m_per_km    list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)
 
-    The standard error of a section is that of independent windows. It holds nothing of what all windows of a car share:
-    a vehicle file that is wrong. Rows flagged ``unsettled`` stand in no mean.
+    The standard error of a section counts what its windows' errors share; where the logs of an older version do not say
+    what that is, neighbours count as sharing all. Rows flagged ``unsettled`` stand in no mean.
 
     Raises BadInput for no log, none with an intact row, lengths from under 25 ft or beyond 100 km, and a file that is
     no route.

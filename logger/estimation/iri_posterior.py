@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -131,8 +131,8 @@ def _by_lag(spacing_m: float, lags: int) -> Array:
 
 @dataclass(frozen=True)
 class WindowIri:
-    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
-    ``shared`` with neighbours.
+    """IRI of a window [m/km]; its standard error is its ``own``, that of the road's ``level``, which the neighbours
+    share, and that of the numbers of vehicle and sensor, ``common`` to all windows.
 
     begins_with, ends_with    IRI over the way by which the window may be misplaced, at its beginning and at its end
                               [m/km]: a window further on loses as much at the one and gains as much at the other
@@ -141,7 +141,8 @@ class WindowIri:
 
     iri_m_per_km: float
     own_std_m_per_km: float
-    shared_std_m_per_km: float
+    level_std_m_per_km: float
+    common_std_m_per_km: float
     begins_with_m_per_km: float
     ends_with_m_per_km: float
     scatter: float
@@ -175,11 +176,11 @@ def window_iri(
                                             np.stack([deviation, _deviation(louder, unseen)]))
     mean, more = float(weight @ absolute), float(weight @ more_absolute)
     own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
-    shared = hypot((more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std)
+    level, common = abs(more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std
     points = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
     begins, ends = float(absolute[:points].mean()), float(absolute[-points:].mean())
     parts = absolute[: len(absolute) // points * points].reshape(-1, points).mean(axis=1)
-    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * shared, PER_KM * begins, PER_KM * ends,
+    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * level, PER_KM * common, PER_KM * begins, PER_KM * ends,
                      PER_KM**2 * float(parts.var(ddof=1)))
 
 

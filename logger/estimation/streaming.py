@@ -65,7 +65,10 @@ class WindowEstimate:
 
     iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
                         this speed, ``unsettled`` next to the start of the readings or a hole in them
-    iri_std_m_per_km    its standard error [m/km], NaN likewise
+    iri_std_m_per_km    its standard error [m/km], NaN likewise; of it:
+    iri_level_std_m_per_km     the road's level is not known better; neighbours share this error
+    iri_common_std_m_per_km    nor are the numbers of vehicle and sensor; all windows share it
+    iri_place_std_m_per_km     nor is the place: what is gained at one end the neighbour loses
     resolved            share of the variance of the IRI's slope that the readings resolve, 0 to 1
     ride                figures of the weighted acceleration without noise and rounding; nan where they are not known
     """
@@ -76,6 +79,9 @@ class WindowEstimate:
     resolved: float
     flags: frozenset[str]
     ride: RideFigures = NO_FIGURES
+    iri_level_std_m_per_km: float = nan
+    iri_common_std_m_per_km: float = nan
+    iri_place_std_m_per_km: float = nan
 
 
 @dataclass(frozen=True)
@@ -394,7 +400,7 @@ class RoadEstimator:
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, self._misplaced_m(speed_mps))
         like_noise = iri.iri_m_per_km * self._road.scale_log_std
-        iri = replace(iri, shared_std_m_per_km=hypot(iri.shared_std_m_per_km, like_noise))
+        iri = replace(iri, common_std_m_per_km=hypot(iri.common_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)
 
     def _misplaced_m(self, speed_mps: float) -> float:
@@ -402,8 +408,8 @@ class RoadEstimator:
         return hypot(self._place_std_m, self._late_std_s * speed_mps)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
-        """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
-        road's level, which they share, adds."""
+        """The window that this piece completes. Errors of neighbouring pieces count as independent, but for those
+        that they share."""
         self._gathered.append(piece)
         if len(self._gathered) < self._pieces_per_window:
             return []
@@ -415,7 +421,8 @@ class RoadEstimator:
             return [WindowEstimate(number // self._pieces_per_window, nan, nan, resolved, flags, ride)]
         iri = [one.iri for one in pieces]
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
-        shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
+        level = sum(one.level_std_m_per_km for one in iri) / len(iri)
+        common = sum(one.common_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
         mean_speed_mps = sum(one.speed_mps for one in pieces) / len(pieces)
         # Ends that happen to be alike do not make a place certain: what they differ by counts half, the other half is
@@ -423,8 +430,9 @@ class RoadEstimator:
         change = sqrt((iri[-1].ends_with_m_per_km - iri[0].begins_with_m_per_km) ** 2 / 2
                        + sum(one.scatter for one in iri) / len(iri))
         misplaced = self._misplaced_m(mean_speed_mps) * change / (len(iri) * self._piece_m)
-        std = hypot(own, shared, misplaced)
-        return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride)]
+        std = hypot(own, level, common, misplaced)
+        return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride, level, common,
+                               misplaced)]
 
     def _give_road(
         self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum
@@ -439,7 +447,7 @@ class RoadEstimator:
 
 
 def _nothing(missing: str) -> _Piece:
-    return _Piece(WindowIri(nan, nan, nan, nan, nan, nan), 0.0, missing)
+    return _Piece(WindowIri(*[nan] * 7), 0.0, missing)
 
 
 def _joined_ride(pieces: list[_Piece]) -> RideFigures:

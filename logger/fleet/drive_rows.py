@@ -17,12 +17,15 @@ import numpy.typing as npt
 from logger.fleet.road_cells import SEGMENT_M
 from logger.geodesy import EARTH_RADIUS_M
 from logger.report.summary import NOT_COUNTED
+from logger.roads.window_errors import WindowErrors, errors_of_means
 
 Array = npt.NDArray[np.float64]
 Columns = dict[str, npt.NDArray[Any]]
 Keyed = Callable[[Array, Array, Array, npt.NDArray[np.intp]], npt.NDArray[np.int64]]
 """Latitudes, longitudes, directions (n,) [degrees] and numbers of drives, to keys of roads (n,)."""
 
+ERRORS = ("iri_std_m_per_km", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
+"""Columns of the IRI's standard error and its parts."""
 _LEAST_MOVE_M = 1.0
 _AGAIN_M = 5 * SEGMENT_M
 
@@ -108,7 +111,10 @@ def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
 
     windows[middle] = size
     found["pass_iri_m_per_km"][middle] = total(rows["iri_m_per_km"]) / size
-    found["pass_iri_std_m_per_km"][middle] = np.sqrt(total(rows["iri_std_m_per_km"] ** 2)) / size
+    length_m = rows["length_m"]
+    errors = errors_of_means(WindowErrors(*(rows[name] for name in ERRORS)), rows["iri_m_per_km"],
+                             along_m - length_m / 2, length_m, row, length_m[row], number, len(size))
+    found["pass_iri_std_m_per_km"][middle] = errors.std
     felt = total(np.isfinite(rows["a_w_mps2"]).astype(np.float64))
     square = total(np.nan_to_num(rows["a_w_mps2"]) ** 2)
     found["pass_a_w_mps2"][middle] = np.sqrt(np.divide(square, felt, out=np.full(len(size), np.nan), where=felt > 0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from logger.chart_data import Array
 from logger.records import WindowRecord
-from logger.report.placed_rows import column, placed, trace_of
+from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.laid_traces import lay
 from logger.roads.places_to_visit import Place, places_to_visit
@@ -27,6 +27,7 @@ from logger.roads.repeated_drives import (
     way_and_cell,
 )
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
+from logger.roads.window_errors import WindowErrors
 from logger.store.log.log_reader import split_drives
 from logger.units import US_PER_S
 
@@ -85,23 +86,23 @@ def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_pe
                      for name in ("way", "along_m"))
     half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
 
-    def cells(values: Array, errors: Array) -> Passes:
+    def cells(values: Array, errors: WindowErrors) -> Passes:
         return passes_of(way.astype(np.intp), middle_m - half_m, middle_m + half_m, number, time_s, values, errors,
                          length_m)
 
     time_s = column(rows, lambda one: None if one.utc_us is None else one.utc_us / US_PER_S)
     iri = column(rows, lambda one: one.iri_m_per_km if counts(one) else None)
-    std = column(rows, lambda one: one.iri_std_m_per_km)
-    passes = cells(iri, std)
+    errors = iri_errors(rows)
+    passes = cells(iri, errors)
     scatter = scatter_of(passes)
     mean = means(passes, scatter)
     felt = cells(column(rows, lambda one: one.a_w_mps2 if counts(one) else None),
-                 column(rows, lambda one: one.a_w_std_mps2 or 0.0))
+                 WindowErrors.undivided(column(rows, lambda one: one.a_w_std_mps2 or 0.0)))
     comfort = means(felt, scatter_of(felt))
     a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
-    driven = cells(column(rows, lambda one: one.speed_mps), np.zeros(len(rows)))
+    driven = cells(column(rows, lambda one: one.speed_mps), WindowErrors.undivided(np.zeros(len(rows))))
     speed = means(driven, scatter_of(driven))
-    place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(std), 0.0, np.nan), cells, mean)
+    place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(errors.std), 0.0, np.nan), cells, mean)
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
     return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
                           a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
@@ -120,17 +121,18 @@ def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
 
 
 def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord]], usable: Array,
-            cells: Callable[[Array, Array], Passes], mean: Means) -> tuple[Array, Array, Array]:
+            cells: Callable[[Array, WindowErrors], Passes], mean: Means) -> tuple[Array, Array, Array]:
     """Latitudes, longitudes and headings of cells, as means of points of the sphere and of directions."""
     traces = [trace_of(drive) for drive in drives]
     points = [on_sphere(one.lat_deg, one.lon_deg) for one in traces]
     heads = [np.nan_to_num(directions(point, one.distance_m)) for point, one in zip(points, traces, strict=True)]
-    _, cell = np.unique(cells(usable, usable).key, return_inverse=True)
+    exact = WindowErrors.undivided(usable)
+    _, cell = np.unique(cells(usable, exact).key, return_inverse=True)
 
     def mean_of(parts: Sequence[Array]) -> Array:
         columns = np.concatenate([*parts, np.zeros((0, 3))])
         return np.column_stack([
-            np.bincount(cell, cells(columns[:, axis] + usable, usable).iri_m_per_km, len(mean.key))
+            np.bincount(cell, cells(columns[:, axis] + usable, exact).iri_m_per_km, len(mean.key))
             / np.maximum(np.bincount(cell, minlength=len(mean.key)), 1) for axis in range(3)])
 
     point, head = mean_of(points), mean_of(heads)

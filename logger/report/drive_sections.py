@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
 
 from logger.chart_data import Array
 from logger.records import WindowRecord
-from logger.report.placed_rows import placed, trace_of
+from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts, expected_square
 from logger.roads.linear_reference import ALONG, on_route
 from logger.roads.localized_roughness import Area, areas
@@ -21,7 +21,6 @@ from logger.store.log.log_reader import LoggedFile, split_drives
 
 _GAP_M = 1000.0  # between neighbours on a route: beyond it they are two passes
 _REACH = 1.2  # of a window against its length: measures are places, and scatter by less
-_NONE = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +87,9 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
     start_m = np.maximum(start_m, first_m)
     windows = replace(windows, start_m=start_m, end_m=end_m)
     kept = end_m > start_m
-    windows = Windows(*(getattr(windows, one.name)[kept] for one in fields(windows)))
     if not kept.any():
         return
+    windows = windows.of(np.flatnonzero(kept))
     first = int(np.floor((windows.start_m[0] - first_m) / length_m))
     edges_m = first_m + length_m * first + even_edges(
         float(windows.end_m[-1] - first_m - length_m * first), length_m)
@@ -104,15 +103,11 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
 def windows_of(records: Sequence[WindowRecord]) -> Windows:
     """Rows with a distance as arrays, from the first one's beginning on."""
     origin_m = records[0].distance_start_m or 0.0
-
-    def column(of: Callable[[WindowRecord], float | None]) -> Array:
-        return np.array([_NONE if (value := of(one)) is None else value for one in records], dtype=np.float64)
-
     return Windows(
-        column(lambda one: one.distance_start_m) - origin_m, column(lambda one: one.distance_end_m) - origin_m,
-        column(lambda one: one.duration_s), column(lambda one: one.iri_m_per_km if counts(one) else None),
-        column(lambda one: one.iri_std_m_per_km),
-        column(lambda one: expected_square(one) if counts(one) else None))
+        column(records, lambda one: one.distance_start_m) - origin_m,
+        column(records, lambda one: one.distance_end_m) - origin_m, column(records, lambda one: one.duration_s),
+        column(records, lambda one: one.iri_m_per_km if counts(one) else None), iri_errors(records),
+        column(records, lambda one: expected_square(one) if counts(one) else None))
 
 
 def localized(drive: DriveSections, limit_m_per_km: float) -> list[Area]:
@@ -120,7 +115,7 @@ def localized(drive: DriveSections, limit_m_per_km: float) -> list[Area]:
     has no value; windows of other lengths than 25 ft slide by their own."""
     windows = windows_of(drive.records)
     beyond_m = _REACH * float(np.median(windows.end_m - windows.start_m))
-    return areas(drive.middle_m, windows.iri_m_per_km, limit_m_per_km, windows.iri_std_m_per_km, beyond_m)
+    return areas(drive.middle_m, windows.iri_m_per_km, limit_m_per_km, windows.iri_errors.std, beyond_m)
 
 
 def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:

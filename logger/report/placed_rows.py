@@ -9,6 +9,7 @@ import numpy as np
 from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.roads.road_network import Trace
+from logger.roads.window_errors import WindowErrors
 from logger.units import US_PER_S
 
 _NOT_PLACED = frozenset(("gps_lost", "gps_late"))
@@ -31,3 +32,10 @@ def trace_of(drive: Sequence[WindowRecord]) -> Trace:
 def column(rows: Sequence[WindowRecord], of: Callable[[WindowRecord], float | None]) -> Array:
     """Of each row one number, NaN for None."""
     return np.array([np.nan if (value := of(one)) is None else value for one in rows], dtype=np.float64)
+
+
+def iri_errors(rows: Sequence[WindowRecord]) -> WindowErrors:
+    """Standard errors of their IRI."""
+    return WindowErrors(
+        column(rows, lambda one: one.iri_std_m_per_km), column(rows, lambda one: one.iri_level_std_m_per_km),
+        column(rows, lambda one: one.iri_common_std_m_per_km), column(rows, lambda one: one.iri_place_std_m_per_km))

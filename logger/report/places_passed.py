@@ -9,7 +9,7 @@ import numpy as np
 
 from logger.chart_data import Array
 from logger.records import WindowRecord
-from logger.report.placed_rows import column, placed, trace_of
+from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
@@ -51,7 +51,7 @@ def places_passed(drives: Sequence[Sequence[WindowRecord]]) -> PlacesPassed | No
     half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
     passes = passes_of(way, middle_m - half_m, middle_m + half_m, number, np.zeros(len(rows)),
                        column(rows, lambda one: one.iri_m_per_km if counts(one) else None),
-                       column(rows, lambda one: one.iri_std_m_per_km), WINDOW_M)
+                       iri_errors(rows), WINDOW_M)
     mean = means(passes, scatter_of(passes))
     key = place_key(way, middle_m, WINDOW_M)
     several = mean.drives > 1

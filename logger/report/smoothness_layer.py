@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import astuple
 
 import numpy as np
 
 from logger.exchange.geometry import cut
 from logger.exchange.layer import Feature, Field, Kind, Layer
 from logger.records import WindowRecord
-from logger.report.placed_rows import column, placed, trace_of
+from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import passes_of, scatter_of
 from logger.roads.road_matching import match
 from logger.roads.road_network import Array, RoadNetwork, on_sphere
 from logger.roads.smoothness import LEAST_COVERED, suggestion, way_means
+from logger.roads.window_errors import WindowErrors
 from logger.store.formats.road_lines import MapWay
 from logger.store.log.log_reader import split_drives
 
@@ -62,12 +64,12 @@ def _features(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Iterat
         start_m, end_m = np.maximum(at_m - half_m, 0.0), np.minimum(at_m + half_m, length_m)
         parts.append((np.where(on, number_on, -1.0), start_m, end_m, np.full(len(rows), float(number)),
                       column(rows, lambda one: one.iri_m_per_km if counts(one) else None),
-                      column(rows, lambda one: one.iri_std_m_per_km)))
+                      *astuple(iri_errors(rows))))
     if not parts:
         return
-    on_way, start_m, end_m, driven, iri, std = (np.concatenate(one) for one in zip(*parts, strict=True))
-    passes = passes_of(on_way.astype(np.intp), start_m, end_m, driven.astype(np.intp), np.zeros(len(on_way)), iri, std,
-                       _CELL_M)
+    on_way, start_m, end_m, driven, iri, *errors = (np.concatenate(one) for one in zip(*parts, strict=True))
+    passes = passes_of(on_way.astype(np.intp), start_m, end_m, driven.astype(np.intp), np.zeros(len(on_way)), iri,
+                       WindowErrors(*errors), _CELL_M)
     mean = way_means(passes, scatter_of(passes), _CELL_M)
     for index, number in enumerate(mean.way.tolist()):
         yield _feature(usable[number], lengths[number], float(mean.covered_m[index]), int(mean.drives[index]),

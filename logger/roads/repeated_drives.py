@@ -1,12 +1,13 @@
 """What several passes over one place say together: a mean, its standard error, and what changed.
 
 The model of a value y of pass i over cell k of the road: y_ik = mu_k (1 + d_i + e_ik) + s_ik. s is the estimate's own
-error, whose standard error stands in the log. d is common to a drive: calibration, tire pressure, load, temperature. e
+error, whose standard error follows from those in the log (``window_errors``). d is common to a drive: calibration, tire pressure, load, temperature. e
 is of the pass alone: its lane, and the metres by which it was laid wrong. The last two are not known beforehand; their
 variances are estimated from all cells that were passed more than once (moments of the random-effects model; DerSimonian
 & Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and stand in each standard error. The
 variance of d does not fall with the passes of one drive over a place, nor with the length of a stretch: it falls with
-the number of drives.
+the number of drives. Of s, what is common to all windows of a car and its sensor does not fall with anything; the
+difference of two periods does not have it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from logger.roads.window_errors import WindowErrors, errors_of_means
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -43,7 +46,7 @@ class Passes:
     key           of the cell
     drive         number of the drive
     time_s        when, seconds since 1970; NaN: not known
-    iri_m_per_km  mean over the windows of the drive in the cell, by length, with the standard error of that
+    iri_m_per_km  mean over the windows of the drive in the cell, by length, and ``iri_errors`` of that
     known_m       how much of the road that is: twice the cell where the drive came twice [m]
     """
 
@@ -51,15 +54,25 @@ class Passes:
     drive: Ints
     time_s: Array
     iri_m_per_km: Array
-    iri_std_m_per_km: Array
+    iri_errors: WindowErrors
     known_m: Array
 
+    @property
+    def own_variance(self) -> Array:
+        """Of each, without what is common to all [(m/km)2]."""
+        return self.iri_errors.std**2 - self.iri_errors.parts()[1] ** 2
 
-def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Array, iri: Array, iri_std: Array,
+    def of(self, which: npt.NDArray[np.bool_]) -> Passes:
+        """Some of them, as marked (p,)."""
+        return Passes(self.key[which], self.drive[which], self.time_s[which], self.iri_m_per_km[which],
+                      self.iri_errors.of(np.flatnonzero(which)), self.known_m[which])
+
+
+def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Array, iri: Array, errors: WindowErrors,
               length_m: float) -> Passes:
     """Windows (n,) from and to measures of ways, in cells of a length; a window across a limit counts in each cell by
     its part. NaN in ``iri`` or its error, and negative ways, are left out."""
-    known = (way >= 0) & np.isfinite(iri) & np.isfinite(iri_std) & (end_m > start_m)
+    known = (way >= 0) & np.isfinite(iri) & np.isfinite(errors.std) & (end_m > start_m)
     first = np.floor(np.where(known, start_m, 0.0) / length_m).astype(np.int64)
     count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - 1e-9).astype(np.int64) - first, 0)
     window = np.repeat(np.arange(len(way)), count)
@@ -69,10 +82,11 @@ def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Arra
     key = place_key(way[window], (cell + 0.5) * length_m, length_m)
     order = np.lexsort((drive[window], key))
     window, key, piece_m = window[order], key[order], piece_m[order]
-    begins = np.flatnonzero(np.diff(key, prepend=-2).astype(bool) | np.diff(drive[window], prepend=-1).astype(bool))
+    begin = np.diff(key, prepend=-2).astype(bool) | np.diff(drive[window], prepend=-1).astype(bool)
+    begins = np.flatnonzero(begin)
     if not len(begins):
         none = np.zeros(0)
-        return Passes(np.zeros(0, np.int64), np.zeros(0, np.intp), none, none, none, none)
+        return Passes(np.zeros(0, np.int64), np.zeros(0, np.intp), none, none, WindowErrors.undivided(none), none)
 
     def total(values: Array) -> Array:
         return np.asarray(np.add.reduceat(values, begins), dtype=np.float64)
@@ -80,7 +94,8 @@ def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Arra
     known_m = total(piece_m)
     return Passes(key[begins], drive[window][begins], total(time_s[window] * piece_m) / known_m,
                   total(iri[window] * piece_m) / known_m,
-                  np.sqrt(total((iri_std[window] * piece_m)**2)) / known_m, known_m)
+                  errors_of_means(errors, iri, (start_m + end_m) / 2, end_m - start_m, window, piece_m,
+                                  np.cumsum(begin) - 1, len(begins)), known_m)
 
 
 @dataclass(frozen=True)
@@ -106,7 +121,7 @@ def scatter_of(passes: Passes) -> Scatter:
     mean = np.bincount(cell, passes.iri_m_per_km) / np.maximum(count, 1)
     several &= mean[cell] > 0
     ratio = passes.iri_m_per_km[several] / mean[cell][several] - 1.0
-    own = (passes.iri_std_m_per_km[several] / mean[cell][several])**2
+    own = passes.own_variance[several] / mean[cell][several]**2
     # Residuals against a mean of c passes have (c - 1) / c of the variance.
     share = 1.0 - 1.0 / count[cell][several]
     all_of_it = max(float(np.sum(ratio**2 - share * own) / np.sum(share)), 0.0)
@@ -129,6 +144,7 @@ class Means:
 
     drives              how many passed each
     iri_m_per_km        mean, weighted by the variances of the passes, with its standard error
+    common_std_m_per_km    what of that is common to all cells, and to all drives
     first_s, last_s     of the passes [s since 1970]; NaN: not known
     """
 
@@ -136,15 +152,17 @@ class Means:
     drives: Ints
     iri_m_per_km: Array
     iri_std_m_per_km: Array
+    common_std_m_per_km: Array
     first_s: Array
     last_s: Array
 
 
 def variances(passes: Passes, scatter: Scatter) -> Array:
-    """Of each pass (p,): its own, and what the scatter adds at the level of its cell [(m/km)2]."""
+    """Of each pass (p,): its own, and what the scatter adds at the level of its cell [(m/km)2]; without what is common
+    to all."""
     _, cell = np.unique(passes.key, return_inverse=True)
     level = (np.bincount(cell, passes.iri_m_per_km) / np.maximum(np.bincount(cell), 1))[cell]
-    return np.asarray(passes.iri_std_m_per_km**2
+    return np.asarray(passes.own_variance
                       + (np.nan_to_num(scatter.drive)**2 + np.nan_to_num(scatter.passes)**2) * level**2)
 
 
@@ -156,8 +174,10 @@ def means(passes: Passes, scatter: Scatter) -> Means:
     first, last = np.full(len(key), np.inf), np.full(len(key), -np.inf)
     np.fmin.at(first, cell, passes.time_s)
     np.fmax.at(last, cell, passes.time_s)
+    common = np.bincount(cell, weight * passes.iri_errors.parts()[1], len(key)) / total
     return Means(key, np.bincount(cell, minlength=len(key)).astype(np.intp),
-                 np.bincount(cell, weight * passes.iri_m_per_km, len(key)) / total, np.sqrt(1.0 / total),
+                 np.bincount(cell, weight * passes.iri_m_per_km, len(key)) / total, np.sqrt(1.0 / total + common**2),
+                 common,
                  np.where(np.isfinite(first), first, np.nan), np.where(np.isfinite(last), last, np.nan))
 
 
@@ -186,10 +206,12 @@ def changes(passes: Passes, scatter: Scatter, split_s: float) -> Changes:
     """The difference of two periods, before an instant and from it on, in the cells that were passed in both."""
     early = passes.time_s < split_s
     late = passes.time_s >= split_s
-    one, other = means(_some(passes, early), scatter), means(_some(passes, late), scatter)
+    one, other = means(passes.of(early), scatter), means(passes.of(late), scatter)
     key, here, there = np.intersect1d(one.key, other.key, return_indices=True)
     change = other.iri_m_per_km[there] - one.iri_m_per_km[here]
-    std = np.hypot(other.iri_std_m_per_km[there], one.iri_std_m_per_km[here])
+    variance = sum(mean.iri_std_m_per_km[rows] ** 2 - mean.common_std_m_per_km[rows] ** 2
+                   for mean, rows in ((one, here), (other, there)))
+    std = np.sqrt(variance)
     p_value = _two_sided(change / std)
     return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value))
 
@@ -215,7 +237,7 @@ YEAR_S = 365.25 * 86_400.0
 
 def trends(passes: Passes, scatter: Scatter) -> Trends:
     """A straight line through the passes over each cell."""
-    dated = _some(passes, np.isfinite(passes.time_s))
+    dated = passes.of(np.isfinite(passes.time_s))
     key, cell = np.unique(dated.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(dated, scatter), 1e-12)
     total = np.bincount(cell, weight, len(key))
@@ -244,7 +266,3 @@ def _two_sided(z: Array) -> Array:
 
     return np.asarray(2.0 * ndtr(-np.abs(z)), dtype=np.float64)
 
-
-def _some(passes: Passes, which: npt.NDArray[np.bool_]) -> Passes:
-    return Passes(*(getattr(passes, name)[which] for name in (
-        "key", "drive", "time_s", "iri_m_per_km", "iri_std_m_per_km", "known_m")))

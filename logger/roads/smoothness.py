@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads.repeated_drives import Passes, Scatter, variances, way_and_cell
+from logger.roads.window_errors import errors_of_means
 
 Array = npt.NDArray[np.float64]
 
@@ -56,12 +57,12 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     if not len(passes.key):
         none = np.zeros(0, np.intp)
         return WayMeans(none, np.zeros(0), none, np.zeros(0), np.zeros(0))
-    _, cell = np.unique(passes.key, return_inverse=True)
-    own = variances(passes, Scatter(0.0, scatter.passes))
+    key, cell = np.unique(passes.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
     length_m = np.zeros(cell.max() + 1)
     np.maximum.at(length_m, cell, np.minimum(passes.known_m, cell_m))
-    way, of = np.unique(way_and_cell(passes.key)[0], return_inverse=True)
+    ways, number = way_and_cell(passes.key)
+    way, of = np.unique(ways, return_inverse=True)
     covered_m = np.zeros(len(way))
     first = np.unique(cell, return_index=True)[1]
     np.add.at(covered_m, of[first], length_m)
@@ -69,9 +70,14 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     mean: Array = np.asarray(np.bincount(of, share * passes.iri_m_per_km), dtype=np.float64)
     pair, which = np.unique(np.stack([of, passes.drive]), axis=1, return_inverse=True)
     by_drive = np.bincount(which.ravel(), share)
-    common = np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
-    return WayMeans(way, covered_m, np.bincount(pair[0]).astype(np.intp), mean,
-                    np.sqrt(np.bincount(of, share**2 * own) + common))
+    order = np.lexsort((passes.key, which.ravel()))
+    of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, number * cell_m, share, order, share[order],
+                                which.ravel()[order], len(by_drive))
+    own = np.bincount(pair[0], (of_drives.std**2 - of_drives.common_std**2) * by_drive**2)
+    own += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))
+    own += np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
+    common = np.bincount(pair[0], of_drives.common_std * by_drive)
+    return WayMeans(way, covered_m, np.bincount(pair[0]).astype(np.intp), mean, np.sqrt(own + common**2))
 
 
 def suggestion(iri_m_per_km: float, iri_std_m_per_km: float) -> tuple[str, float]:

@@ -282,7 +282,6 @@ class Pipeline:
             lon_deg=place[1] if place else None,
             speed_mps=_known(window.speed_mps),
             iri_m_per_km=iri,
-            iri_std_m_per_km=None if estimate is None else _iri_std(estimate, bool(flags & {"gps_lost", "gps_late"})),
             iri_rms_m_per_km=self._iri_by_rms(window, flags),
             a_w_mps2=_known(ride.a_w.value),
             mtvv_mps2=_known(ride.mtvv.value),
@@ -300,6 +299,7 @@ class Pipeline:
             a_w_raw_mps2=_known(window.a_w_mps2),
             mtvv_raw_mps2=_known(window.mtvv_mps2),
             vdv_raw_mps175=_known(window.vdv_mps175),
+            **_iri_errors(estimate, bool(flags & {"gps_lost", "gps_late"})),
         )
 
     def _iri_by_rms(self, window: Window, flags: set[str]) -> float | None:
@@ -325,11 +325,17 @@ class Pipeline:
         return self.odometer.place(0.5 * (window.start_m + window.end_m), window.leg)
 
 
-def _iri_std(estimate: WindowEstimate, is_guessed: bool) -> float | None:
-    """Standard error of the IRI [m/km], with what it costs to carry the speed through a loss of fix, or to have that of
-    some seconds before."""
+def _iri_errors(estimate: WindowEstimate | None, is_guessed: bool) -> dict[str, float | None]:
+    """Columns of the IRI's standard error and its parts [m/km], with what it costs to carry the speed through a loss of
+    fix, or to have that of some seconds before: neighbours have the same wrong speed."""
+    if estimate is None or not isfinite(estimate.iri_m_per_km):
+        return dict.fromkeys(("iri_std_m_per_km", "iri_level_std_m_per_km", "iri_common_std_m_per_km",
+                              "iri_place_std_m_per_km"))
     bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_guessed else 0.0
-    return _known(hypot(estimate.iri_std_m_per_km, bridging))
+    return {"iri_std_m_per_km": _known(hypot(estimate.iri_std_m_per_km, bridging)),
+            "iri_level_std_m_per_km": _known(hypot(estimate.iri_level_std_m_per_km, bridging)),
+            "iri_common_std_m_per_km": _known(estimate.iri_common_std_m_per_km),
+            "iri_place_std_m_per_km": _known(estimate.iri_place_std_m_per_km)}
 
 
 def _known(value: float) -> float | None:

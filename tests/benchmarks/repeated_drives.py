@@ -16,6 +16,7 @@ from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import Passes, means, passes_of, scatter_of
 from logger.roads.road_matching import DOUBTFUL
 from logger.roads.road_network import RoadNetwork
+from logger.roads.window_errors import WindowErrors
 
 from ..support.drives.parallel_town import WINDOW_M, judged, road_values, town_drives
 from .figures import Figures
@@ -66,7 +67,7 @@ def _means(figures: Figures) -> None:
         enough = straight & (np.bincount(cell, straight)[cell] >= 10)
         for number, found in results.items():
             chosen = enough & (rank < number)
-            mean = means(_some(passes, chosen), scatter)
+            mean = means(passes.of(chosen), scatter)
             weight = np.unique(passes.key[chosen], return_inverse=True)[1]
             east, north, sin, cos, slip_m = (np.bincount(weight, column) / np.bincount(weight)
                                              for column in place[chosen].T)
@@ -82,11 +83,6 @@ def _means(figures: Figures) -> None:
         figures.at_least(f"truth beyond one standard error {words}", float(np.mean(off > std)), 0.15, "")
         figures.at_most(f"place on the ground, along the road, {words}", float(np.sqrt(np.mean(slip_m**2))),
                         4.0 / number**0.5, "m")
-
-
-def _some(passes: Passes, which: np.ndarray) -> Passes:
-    return Passes(*(getattr(passes, name)[which] for name in (
-        "key", "drive", "time_s", "iri_m_per_km", "iri_std_m_per_km", "known_m")))
 
 
 def town_passes(seed: int, count: int = 30) -> tuple[Passes, np.ndarray]:
@@ -108,12 +104,12 @@ def town_passes(seed: int, count: int = 30) -> tuple[Passes, np.ndarray]:
     way, middle_m, drive, iri, std, *place = (np.concatenate(one) for one in columns)
 
     def cells(values: np.ndarray) -> Passes:
-        return passes_of(way, middle_m - WINDOW_M / 2, middle_m + WINDOW_M / 2, drive, 86_400.0 * drive, values, std,
-                         LENGTH_M)
+        return passes_of(way, middle_m - WINDOW_M / 2, middle_m + WINDOW_M / 2, drive, 86_400.0 * drive, values,
+                         WindowErrors(std, *np.zeros((3, len(std)))), LENGTH_M)
 
     passes = cells(iri)
     whole = passes.known_m > 0.9 * LENGTH_M
-    return _some(passes, whole), np.column_stack([cells(one).iri_m_per_km for one in place])[whole]
+    return passes.of(whole), np.column_stack([cells(one).iri_m_per_km for one in place])[whole]
 
 
 def _rank(key: np.ndarray) -> np.ndarray:

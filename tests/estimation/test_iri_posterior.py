@@ -96,7 +96,7 @@ def test_the_levels_error_moves_all_windows_alike() -> None:
     found = window_iri(flat, unseen, dull, louder, 0.2, WINDOW_M)
     more = window_iri(flat, unseen, louder, louder, 0.2, WINDOW_M)
     rise = (more.iri_m_per_km - found.iri_m_per_km) / (raised(spectrum).log_level - spectrum.log_level)
-    assert found.shared_std_m_per_km == pytest.approx(0.2 * rise, rel=1e-9)
+    assert found.level_std_m_per_km == pytest.approx(0.2 * rise, rel=1e-9)
     assert found.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * dull.left), rel=1e-6)
 
 

@@ -16,6 +16,7 @@ from logger.records import WindowRecord
 from logger.report.smoothness_layer import smoothness_layer
 from logger.roads.repeated_drives import Passes, Scatter
 from logger.roads.smoothness import suggestion, way_means
+from logger.roads.window_errors import WindowErrors
 from logger.store.formats.road_lines import read_map_ways
 
 WINDOW_M = 7.62
@@ -71,19 +72,26 @@ def test_streets_are_told_apart_and_what_is_little_known_stays_empty(tmp_path: P
     assert found[12]["covered_m"] == pytest.approx(200.0, abs=8.0)
 
 
+def alone(std: np.ndarray) -> WindowErrors:
+    return WindowErrors(std, *np.zeros((3, len(std))))
+
+
 def test_a_mean_of_a_way_counts_road_by_length_and_a_drive_once() -> None:
     # Way 0: cells of 25 and 10 m, one drive over both, another one over the first.
     key = np.array([0, 0, 1]) + (1 << 20)
-    passes = Passes(key, np.array([0, 1, 0]), np.zeros(3), np.array([2.0, 4.0, 6.0]), np.full(3, 0.7),
-                    np.array([25.0, 25.0, 10.0]))
+    passes = Passes(key, np.array([0, 1, 0]), np.zeros(3), np.array([2.0, 4.0, 6.0]),
+                    alone(np.full(3, 0.7)), np.array([25.0, 25.0, 10.0]))
     found = way_means(passes, Scatter(0.0, 0.0), 25.0)
     assert found.covered_m.tolist() == [35.0]
     assert found.drives.tolist() == [2]
     np.testing.assert_allclose(found.iri_m_per_km, [(3.0 * 25 + 6.0 * 10) / 35])
     shares = np.array([12.5, 12.5, 10.0]) / 35
     np.testing.assert_allclose(found.iri_std_m_per_km, [0.7 * np.sqrt(np.sum(shares**2))])
-    common = way_means(replace(passes, iri_std_m_per_km=np.full(3, 1e-5)), Scatter(0.1, 0.0), 25.0)
+    common = way_means(replace(passes, iri_errors=alone(np.full(3, 1e-5))), Scatter(0.1, 0.0), 25.0)
     assert common.iri_std_m_per_km[0] > 0.1 * 0.5**0.5 * common.iri_m_per_km[0]
+    nothing = np.zeros(3)
+    of_car = replace(passes, iri_errors=WindowErrors(np.full(3, 0.2), nothing, np.full(3, 0.2), nothing))
+    np.testing.assert_allclose(way_means(of_car, Scatter(0.0, 0.0), 25.0).iri_std_m_per_km, [0.2])
 
 
 @pytest.mark.parametrize("iri, word", [(0.5, "excellent"), (2.99, "excellent"), (3.0, "good"), (5.5, "intermediate"),

@@ -23,6 +23,7 @@ from logger.roads.repeated_drives import (
 )
 from logger.roads.road_matching import NO_WAY
 from logger.roads.road_network import RoadNetwork, Trace
+from logger.roads.window_errors import WindowErrors
 
 from ..support.drives.parallel_town import WINDOW_M, judged, town_drives
 
@@ -86,15 +87,27 @@ def test_lengths_of_cells_add_up_to_the_windows() -> None:
     start = np.cumsum(rng.uniform(5, 10, 200))
     end = start + rng.uniform(4, 60, 200)
     way, drive = rng.integers(0, 4, 200), rng.integers(0, 3, 200)
-    found = passes_of(way, start, end, drive, np.zeros(200), np.ones(200), np.ones(200), 25.0)
+    found = passes_of(way, start, end, drive, np.zeros(200), np.ones(200), alone(np.ones(200)), 25.0)
     assert found.known_m.sum() == pytest.approx((end - start).sum())
     for number in range(3):
         assert found.known_m[found.drive == number].sum() == pytest.approx((end - start)[drive == number].sum())
 
 
+def alone(std: np.ndarray) -> WindowErrors:
+    """Errors that nothing shares."""
+    return WindowErrors(std, *np.zeros((3, len(std))))
+
+
+def test_what_all_drives_of_a_car_share_stays_in_a_mean_and_is_in_no_change() -> None:
+    errors = WindowErrors(np.full(8, 0.5), np.zeros(8), np.full(8, 0.4), np.zeros(8))
+    passes = Passes(np.ones(8, np.int64), np.arange(8), 1e7 * np.arange(8.0), np.full(8, 3.0), errors, np.full(8, 25.0))
+    assert means(passes, Scatter(0.0, 0.0)).iri_std_m_per_km == pytest.approx((0.3**2 / 8 + 0.4**2) ** 0.5)
+    assert changes(passes, Scatter(0.0, 0.0), 3.5e7).change_std_m_per_km == pytest.approx((2 * 0.3**2 / 4) ** 0.5)
+
+
 def test_a_mean_is_weighted_by_its_errors() -> None:
     passes = Passes(np.array([1, 1, 9]), np.array([0, 1, 0]), np.array([0.0, 10.0, 5.0]), np.array([2.0, 4.0, 3.0]),
-                    np.array([0.1, 0.2, 0.3]), np.full(3, 25.0))
+                    alone(np.array([0.1, 0.2, 0.3])), np.full(3, 25.0))
     found = means(passes, Scatter(0.0, 0.0))
     # 2 weighs four times what 4 weighs.
     np.testing.assert_allclose(found.iri_m_per_km, [2.4, 3.0])
@@ -110,7 +123,7 @@ def random_passes(rng: np.random.Generator, drives: int, cells: int, drive: floa
     value = level * (1 + np.repeat(rng.normal(0, drive, drives), cells) + rng.normal(0, single, drives * cells))
     value = value + own * level * rng.normal(size=len(level))
     order = np.lexsort((number, cell))
-    return Passes(cell[order], number[order], 2.6e6 * number[order], value[order], (own * level)[order],
+    return Passes(cell[order], number[order], 2.6e6 * number[order], value[order], alone((own * level)[order]),
                   np.full(len(order), 25.0)), truth
 
 

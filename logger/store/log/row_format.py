@@ -184,17 +184,22 @@ COLUMNS = (
     _number("a_w_raw_mps2", 4),
     _number("mtvv_raw_mps2", 4),
     _number("vdv_raw_mps175", 4),
+    _number("iri_level_std_m_per_km", 3),
+    _number("iri_common_std_m_per_km", 3),
+    _number("iri_place_std_m_per_km", 3),
 )
-_OLD_COUNT = 23
-"""Columns of logs that did not separate the ride from the noise yet."""
+_COUNTS = (len(COLUMNS), 29, 23)
+"""Columns of logs: as they are now, before errors told what windows share of them, and before the ride was separated
+from the noise."""
 
 
 def _header(columns: Sequence[Column]) -> str:
     return ",".join([*(column.name for column in columns), "crc32"])
 
 
-HEADER = _header(COLUMNS)
-OLD_HEADER = _header(COLUMNS[:_OLD_COUNT])
+HEADERS = tuple(_header(COLUMNS[:count]) for count in _COUNTS)
+"""Of logs of today first, then of older ones."""
+HEADER = HEADERS[0]
 SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
 """A row of which nothing is known but what always is."""
 
@@ -209,7 +214,7 @@ def format_row(record: WindowRecord) -> str:
 
 
 def parse_row(text: str) -> WindowRecord:
-    """The record of a row, also of an old one without standard errors and raw values. UTC comes back in whole
+    """The record of a row, also of an old one that has fewer columns. UTC comes back in whole
     milliseconds, floats with the decimals of their column.
 
     Raises ``BadRow`` when the check value or any field is not as it should be.
@@ -218,7 +223,7 @@ def parse_row(text: str) -> WindowRecord:
     if f"{zlib.crc32(body.encode('utf-8', 'replace')):08x}" != check:
         raise BadRow("expected a row that fits its crc32")
     fields = body.split(",")
-    if len(fields) not in (_OLD_COUNT, len(COLUMNS)):
+    if len(fields) not in _COUNTS:
         raise BadRow(f"expected {len(COLUMNS) + 1} columns, found {len(fields) + 1}")
     try:
         return WindowRecord(**{column.attribute: column.read(field)
@@ -259,8 +264,8 @@ def scan(file: BinaryIO) -> Iterator[Row]:
         text = line.removesuffix(b"\n")
         torn = len(text) == len(line) < LINE_BYTES
         if number == 1:
-            if text not in (HEADER.encode(), OLD_HEADER.encode()):
-                header = next((one for one in (HEADER, OLD_HEADER) if text.startswith(one.encode())), "")
+            if text not in [one.encode() for one in HEADERS]:
+                header = next((one for one in HEADERS if text.startswith(one.encode())), "")
                 rest = text[len(header) + 1:] if header else text
                 yield from _salvaged(1, rest, torn)
                 yield Row(1, "", None, "expected the header line of a segment log", torn, len(text))
@@ -298,7 +303,7 @@ def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
     """The intact rows inside a damaged line: those whose newline was lost."""
     start = 0
     for end in _ROW_END.finditer(line):
-        if line.count(b",", start, end.end()) not in (_OLD_COUNT, len(COLUMNS)):
+        if line.count(b",", start, end.end()) not in _COUNTS:
             continue
         row = line[start:end.end()].decode("ascii", "replace")
         try:

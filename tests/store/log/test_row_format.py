@@ -16,9 +16,9 @@ from logger.records import WindowRecord
 from logger.store.log.row_format import (
     COLUMNS,
     HEADER,
+    HEADERS,
     LARGEST,
     LINE_BYTES,
-    OLD_HEADER,
     SHORTEST_ROW_BYTES,
     BadRow,
     Column,
@@ -35,13 +35,16 @@ RECORD = WindowRecord(
     iri_m_per_km=2.345, iri_std_m_per_km=0.6, iri_rms_m_per_km=2.3449999, a_w_mps2=0.43212, mtvv_mps2=0.9,
     vdv_mps175=1.234, crest_factor=3.2, comfort="a_little_uncomfortable", iri_class="A", accel_rms_mps2=0.6543,
     samples=46, clipped_samples=1, flags=("clipped", "gap"), a_w_std_mps2=0.02, mtvv_std_mps2=0.03,
-    vdv_std_mps175=0.04, a_w_raw_mps2=0.5, mtvv_raw_mps2=0.95, vdv_raw_mps175=1.3,
+    vdv_std_mps175=0.04, a_w_raw_mps2=0.5, mtvv_raw_mps2=0.95, vdv_raw_mps175=1.3, iri_level_std_m_per_km=0.3,
+    iri_common_std_m_per_km=0.1, iri_place_std_m_per_km=0.25,
 )
+NOTHING_SHARED = dict.fromkeys(("iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km"))
 NOTHING_NEW = {"a_w_std_mps2": None, "mtvv_std_mps2": None, "vdv_std_mps175": None, "a_w_raw_mps2": None,
-               "mtvv_raw_mps2": None, "vdv_raw_mps175": None}
+               "mtvv_raw_mps2": None, "vdv_raw_mps175": None, **NOTHING_SHARED}
 OLD_BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,"
             "2.345,0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
-BODY = OLD_BODY + ",0.0200,0.0300,0.0400,0.5000,0.9500,1.3000"
+LAST_BODY = OLD_BODY + ",0.0200,0.0300,0.0400,0.5000,0.9500,1.3000"
+BODY = LAST_BODY + ",0.300,0.100,0.250"
 UNKNOWN = replace(
     RECORD, utc_us=None, distance_start_m=None, distance_end_m=None, lat_deg=None, lon_deg=None, speed_mps=None,
     iri_m_per_km=None, iri_std_m_per_km=None, iri_rms_m_per_km=None, a_w_mps2=None, mtvv_mps2=None, vdv_mps175=None,
@@ -61,7 +64,7 @@ records = st.builds(
     accel_rms_mps2=maybe, samples=st.integers(0, 10**6), clipped_samples=st.integers(0, 10**6),
     flags=st.lists(st.sampled_from(["gap", "slow", "time_unset"]), unique=True).map(tuple),
     a_w_std_mps2=maybe, mtvv_std_mps2=maybe, vdv_std_mps175=maybe, a_w_raw_mps2=maybe, mtvv_raw_mps2=maybe,
-    vdv_raw_mps175=maybe,
+    vdv_raw_mps175=maybe, iri_level_std_m_per_km=maybe, iri_common_std_m_per_km=maybe, iri_place_std_m_per_km=maybe,
 )
 
 
@@ -93,7 +96,7 @@ def test_row_by_hand() -> None:
 
 
 def test_row_of_what_is_not_known_by_hand() -> None:
-    assert format_row(UNKNOWN) == checked("123,,1234.567890" + "," * 16 + "2,0.456789,,46,1" + "," * 6)
+    assert format_row(UNKNOWN) == checked("123,,1234.567890" + "," * 16 + "2,0.456789,,46,1" + "," * 9)
     assert parse_row(format_row(UNKNOWN)) == UNKNOWN
 
 
@@ -241,21 +244,23 @@ def test_no_row_is_shorter_than_one_of_which_nothing_is_known() -> None:
     assert len(shortest) + 1 - len(NOTHING_NEW) == SHORTEST_ROW_BYTES  # those of old logs are the shorter ones
 
 
-def test_rows_of_old_logs_are_read_and_end_without_what_they_did_not_hold() -> None:
-    record = parse_row(checked(OLD_BODY))
-    assert record == replace(parse_row(checked(BODY)), **NOTHING_NEW)
-    data = f"{OLD_HEADER}\n{checked(OLD_BODY)}\n".encode()
-    assert intact(data) == [checked(OLD_BODY)]
+@pytest.mark.parametrize(("body", "header", "nothing"), [
+    (OLD_BODY, HEADERS[2], NOTHING_NEW), (LAST_BODY, HEADERS[1], NOTHING_SHARED)], ids=["oldest", "last"])
+def test_rows_of_old_logs_are_read_and_end_without_what_they_did_not_hold(
+    body: str, header: str, nothing: dict[str, None]
+) -> None:
+    assert header.count(",") == body.count(",") + 1
+    assert parse_row(checked(body)) == replace(parse_row(checked(BODY)), **nothing)
+    data = f"{header}\n{checked(body)}\n".encode()
+    assert intact(data) == [checked(body)]
     assert damaged(data) == 0
+    beside_a_lost_newline = f"{header}\n{checked(body)}x{checked(body)}\n".encode()
+    assert intact(beside_a_lost_newline)
+    assert damaged(beside_a_lost_newline) == 1
 
 
-def test_an_old_row_beside_a_lost_newline_is_found() -> None:
-    data = f"{OLD_HEADER}\n{checked(OLD_BODY)}x{checked(OLD_BODY)}\n".encode()
-    assert intact(data)
-    assert damaged(data) == 1
-
-
-def test_an_old_row_is_written_again_as_rows_are_now() -> None:
-    old, now = checked(OLD_BODY), checked(OLD_BODY + "," * 6)
+@pytest.mark.parametrize(("body", "missing"), [(OLD_BODY, 9), (LAST_BODY, 3)], ids=["oldest", "last"])
+def test_an_old_row_is_written_again_as_rows_are_now(body: str, missing: int) -> None:
+    old, now = checked(body), checked(body + "," * missing)
     assert as_now(old, parse_row(old)) == now
     assert as_now(now, parse_row(now)) is now

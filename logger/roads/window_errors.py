@@ -1,0 +1,112 @@
+"""Standard errors of means over windows, from what the errors of windows have in common.
+
+Problem: the IRI of a section is the mean of its windows', but their errors are not independent: added as if they were,
+sections of 0.1 mi were out by 1.6 to 3.8 times their standard errors. Solution: each error is the sum of four parts,
+and each part has its own rule.
+
+own       what the readings leave open of the slope; its memory is a metre or two, so variances add
+level     how rough the road is there is not known better; the error fades along the way as exp(-d / 60 m). Measured
+          over 120 simulated drives (10 to 70 mph, 2 and 4 g, noise 0.147 m/s2): of 15, 30, 60, 120, 240 and 1000 m the
+          likeliest length is 60 or 120 m on roads whose level changes, 15 to 60 m on roads with holes
+common    numbers of the vehicle and of the sensor are wrong; all windows of a car share it
+place     a window lies some way on: what one gains at its end its neighbour loses, so a row of windows is off as much
+          as its two ends are
+
+A window cut by a limit counts with the mean of all of it, though a part may be rougher than the rest. The excess of a
+mean over small stretches is that of a random walk tied at both ends; how far it walks shows in the differences
+of neighbouring windows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import log
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+ALONG_M = 60.0
+_FADED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class WindowErrors:
+    """Standard errors of windows (n,) [m/km], whole and by their parts; NaN: not known.
+
+    Logs of older programs tell the whole alone. Then all of it counts as that of the level: their parts were measured
+    to be out so much that this is what makes sections right.
+    """
+
+    std: Array
+    level_std: Array
+    common_std: Array
+    place_std: Array
+
+    @classmethod
+    def undivided(cls, std: Array) -> WindowErrors:
+        """Of which the whole alone is known."""
+        nothing = np.full(len(std), np.nan)
+        return cls(std, nothing, nothing, nothing)
+
+    @property
+    def own_variance(self) -> Array:
+        """What the windows do not share [(m/km)2]."""
+        level_std, common_std, place_std = self.parts()
+        return np.maximum(self.std**2 - level_std**2 - common_std**2 - place_std**2, 0.0)
+
+    def parts(self) -> tuple[Array, Array, Array]:
+        """Level, common and place, where they are told; else all as level."""
+        told = np.isfinite(self.level_std) & np.isfinite(self.common_std) & np.isfinite(self.place_std)
+        return (np.where(told, self.level_std, self.std), np.where(told, self.common_std, 0.0),
+                np.where(told, self.place_std, 0.0))
+
+    def of(self, rows: Ints) -> WindowErrors:
+        """Those of some windows."""
+        return WindowErrors(*(getattr(self, one.name)[rows] for one in fields(self)))
+
+
+def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Array, window: Ints, piece_m: Array,
+                    group: Ints, count: int) -> WindowErrors:
+    """Standard errors of means by length (count,), whole and by their parts.
+
+    errors, iri, at_m, length_m    of windows (n,): IRI [m/km], middles and lengths [m]
+    window, piece_m, group         of pieces (p,): the window that each is cut from, how long it is [m], and the mean
+                                   that it counts in; those of one mean stand together, in the order driven
+    """
+    told, whole_m = errors.of(window), length_m[window]
+    level_std, common_std, place_std = told.parts()
+    level_std = level_std * piece_m
+
+    def total(values: Array, of: Ints = group) -> Array:
+        return np.asarray(np.bincount(of, values, count), dtype=np.float64)
+
+    own = total(piece_m * (told.own_variance * whole_m
+                           + _scatter(iri)[window] * np.maximum(whole_m - piece_m, 0.0)))
+    level = total(level_std**2)
+    for lag in range(1, len(group)):
+        apart_m = np.abs(at_m[window[lag:]] - at_m[window[:-lag]])
+        near = (group[lag:] == group[:-lag]) & (apart_m < -ALONG_M * log(_FADED))
+        if not near.any():
+            break
+        pairs = 2 * level_std[lag:] * level_std[:-lag] * np.exp(-apart_m / ALONG_M)
+        level += total(pairs[near], group[lag:][near])
+    middle_m = at_m[window]
+    apart = np.abs(np.diff(middle_m)) > 0.75 * (whole_m[1:] + whole_m[:-1])
+    ends = (np.diff(group) != 0) | apart
+    first, last = np.append(True, ends)[:len(group)], np.append(ends, True)[:len(group)]
+    place = total((place_std * whole_m) ** 2 / 2 * (first.astype(np.float64) + last))
+    common, known_m = total(common_std * piece_m), total(piece_m)
+    return WindowErrors(*(np.divide(one, known_m, out=np.full(count, np.nan), where=known_m > 0) for one in (
+        np.sqrt(own + level + common**2 + place), np.sqrt(level), common, np.sqrt(place))))
+
+
+def _scatter(iri: Array) -> Array:
+    """Variance of windows (n,) about the road around them: half the mean square of the steps to neighbours, a share of
+    the mean square."""
+    steps, known = np.diff(iri), iri[np.isfinite(iri)]
+    steps = steps[np.isfinite(steps)]
+    share = float(np.mean(steps**2) / 2 / np.mean(known**2)) if len(steps) and known.any() else 0.0
+    return np.nan_to_num(share * iri**2)

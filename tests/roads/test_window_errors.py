@@ -1,0 +1,78 @@
+"""Standard errors of means of windows, beside means of drawn errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from logger.roads.repeated_drives import passes_of
+from logger.roads.sections import Windows, even_edges, sections
+from logger.roads.window_errors import ALONG_M, WindowErrors
+
+WINDOW_M, COUNT, PARTS = 7.5, 120, 15  # of half a metre
+OWN, LEVEL, COMMON, PLACE = (np.linspace(*ends, COUNT) for ends in ((0.3, 0.7), (0.5, 0.2), (0.1, 0.1), (0.4, 0.6)))
+EDGES_M = WINDOW_M * np.arange(COUNT + 1)
+ERRORS = WindowErrors(np.sqrt(OWN**2 + LEVEL**2 + COMMON**2 + PLACE**2), LEVEL, COMMON, PLACE)
+NOTHING = np.zeros(COUNT)
+
+
+def drawn_errors(count: int) -> np.ndarray:
+    """Errors of pieces of half a metre (count, pieces), each part by what it is said to be."""
+    rng = np.random.default_rng(5)
+    own = np.sqrt(PARTS) * np.repeat(OWN, PARTS) * rng.standard_normal((count, COUNT * PARTS))
+    level = np.empty((count, COUNT))
+    level[:, 0] = rng.standard_normal(count)
+    kept = np.exp(-WINDOW_M / ALONG_M)
+    for number in range(1, COUNT):
+        level[:, number] = kept * level[:, number - 1] + np.sqrt(1 - kept**2) * rng.standard_normal(count)
+    passed = rng.standard_normal((count, COUNT + 1)) * np.append(PLACE, PLACE[-1]) / np.sqrt(2)
+    alike = LEVEL * level + COMMON * rng.standard_normal((count, 1)) + np.diff(passed)
+    return own + np.repeat(alike, PARTS, axis=1)
+
+
+@pytest.mark.parametrize("length_m", [7.5, 45.0, 150.0, 900.0])
+def test_errors_of_sections_are_those_of_drawn_errors(length_m: float) -> None:
+    per_section = round(2 * length_m)
+    drawn = drawn_errors(4000).reshape(4000, -1, per_section).mean(axis=2)
+    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, ERRORS, NOTHING + 1)
+    found = sections(windows, even_edges(EDGES_M[-1], length_m)).iri_std_m_per_km
+    assert found == pytest.approx(drawn.std(axis=0), rel=0.06)
+
+
+def test_a_row_with_holes_has_the_ends_of_its_parts() -> None:
+    only_place = WindowErrors(NOTHING + 0.5, NOTHING, NOTHING, NOTHING + 0.5)
+    iri = NOTHING + 3
+    iri[40:50] = np.nan
+    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, iri, only_place, NOTHING + 1)
+    whole = sections(windows, EDGES_M[[0, -1]]).iri_std_m_per_km
+    assert whole == pytest.approx(np.sqrt(2) * 0.5 / (COUNT - 10))
+
+
+def test_a_window_that_is_cut_may_be_rougher_on_one_side() -> None:
+    """Means over half metres that are drawn alike, and windows that are known exactly."""
+    rough = 3 + np.random.default_rng(6).standard_normal(COUNT * PARTS)
+    exact = WindowErrors(NOTHING, NOTHING, NOTHING, NOTHING)
+    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, rough.reshape(COUNT, PARTS).mean(axis=1), exact,
+                      NOTHING + 1)
+    edges_m = even_edges(EDGES_M[-1], 10.0)[:-1]
+    found = sections(windows, edges_m)
+    true = rough[:(len(edges_m) - 1) * 20].reshape(-1, 20).mean(axis=1)
+    off = (found.iri_m_per_km - true) / np.maximum(found.iri_std_m_per_km, 1e-9)
+    cut = found.iri_std_m_per_km > 0
+    assert 0.8 < np.sqrt(np.mean(off[cut] ** 2)) < 1.25
+    assert found.iri_m_per_km[~cut] == pytest.approx(true[~cut])
+
+
+def test_errors_of_which_the_whole_alone_is_known_count_as_shared_by_neighbours() -> None:
+    old = WindowErrors.undivided(NOTHING + 0.5)
+    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, old, NOTHING + 1)
+    two = sections(windows, EDGES_M[[0, 2]]).iri_std_m_per_km
+    assert two == pytest.approx(0.5 * np.sqrt((1 + np.exp(-WINDOW_M / ALONG_M)) / 2))
+
+
+def test_a_pass_against_the_way_has_the_same_error_as_along_it() -> None:
+    way, drive, edges_m = np.zeros(COUNT, np.intp), np.zeros(COUNT, np.intp), EDGES_M
+    there = passes_of(way, edges_m[:-1], edges_m[1:], drive, NOTHING, NOTHING + 3, ERRORS, 150.0)
+    back = passes_of(way, *(edges_m[-1] - edges_m[one] for one in (slice(1, None), slice(None, -1))), drive, NOTHING,
+                     NOTHING + 3, ERRORS, 150.0)
+    assert back.iri_errors.std[::-1] == pytest.approx(there.iri_errors.std)
