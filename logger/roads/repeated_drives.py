@@ -1,13 +1,13 @@
 """What several passes over one place say together: a mean, its standard error, and what changed.
 
 The model of a value y of pass i over cell k of the road: y_ik = mu_k (1 + d_i + e_ik) + s_ik. s is the estimate's own
-error, whose standard error follows from those in the log (``window_errors``). d is common to a drive: calibration, tire pressure, load, temperature. e
-is of the pass alone: its lane, and the metres by which it was laid wrong. The last two are not known beforehand; their
-variances are estimated from all cells that were passed more than once (moments of the random-effects model; DerSimonian
-& Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and stand in each standard error. The
-variance of d does not fall with the passes of one drive over a place, nor with the length of a stretch: it falls with
-the number of drives. Of s, what is common to all windows of a car and its sensor does not fall with anything; the
-difference of two periods does not have it.
+error, whose standard error follows from those in the log (``window_errors``). d is common to a drive: calibration, tire
+pressure, load, temperature. e is of the pass alone: its lane, and the metres by which it was laid wrong. The last two
+are not known beforehand; their variances are estimated from all cells that were passed more than once (moments of the
+random-effects model; DerSimonian & Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and
+stand in each standard error. The variance of d does not fall with the passes of one drive over a place, nor with the
+length of a stretch: it falls with the number of drives. Of s, what is common to all windows of a car and its sensor
+does not fall with anything; the difference of two periods does not have it.
 """
 
 from __future__ import annotations

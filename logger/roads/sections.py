@@ -88,8 +88,8 @@ def sections(windows: Windows, edges_m: Array) -> Sections:
     worst, worst_at_m = _worst(windows, window, section, count)
     return Sections(
         edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
-        errors.std, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)), worst,
-        worst_at_m)
+        errors.std, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
+        worst, worst_at_m)
 
 
 def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:

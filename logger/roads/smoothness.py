@@ -57,7 +57,7 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     if not len(passes.key):
         none = np.zeros(0, np.intp)
         return WayMeans(none, np.zeros(0), none, np.zeros(0), np.zeros(0))
-    key, cell = np.unique(passes.key, return_inverse=True)
+    _, cell = np.unique(passes.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
     length_m = np.zeros(cell.max() + 1)
     np.maximum.at(length_m, cell, np.minimum(passes.known_m, cell_m))
@@ -71,7 +71,8 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     pair, which = np.unique(np.stack([of, passes.drive]), axis=1, return_inverse=True)
     by_drive = np.bincount(which.ravel(), share)
     order = np.lexsort((passes.key, which.ravel()))
-    of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, number * cell_m, share, order, share[order],
+    at_m = np.asarray(cell_m * number, dtype=np.float64)
+    of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order],
                                 which.ravel()[order], len(by_drive))
     own = np.bincount(pair[0], (of_drives.std**2 - of_drives.common_std**2) * by_drive**2)
     own += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))

@@ -39,6 +39,7 @@ from math import sqrt
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
 from logger.estimation.error_bound import ErrorBound, pooled_r2
@@ -47,10 +48,11 @@ from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
+from logger.records import WindowRecord
 from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, GpsConfig, PipelineConfig
-from logger.service.signal_chain import GRAVITY_CORNER_HZ, GRID_STEP_US, recorder_gain
+from logger.service.signal_chain import GRAVITY_CORNER_HZ, recorder_gain
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model, read_vehicle
 from logger.units import FOOT_M, MPH_MPS, US_PER_S, WINDOW_M
@@ -542,36 +544,53 @@ def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Conf
     )
 
 
-def logged_drive(
-    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, reported_latency_s: float, seed: int,
+START_US = 50_000_000
+"""The pipeline's time of a drive's first sample."""
+
+
+def logged_records(
+    drive: Drive, sensor: Accelerometer, receiver: Receiver, config: Config, seed: int,
     believed: Sensor | None = None, noise: NoiseBelief | None = None,
-) -> Logged:
-    """A drive through the real pipeline, and the exact IRI at the places its records tell.
+) -> tuple[list[WindowRecord], NoiseBelief | None]:
+    """Records of a drive through the real pipeline, and what it believes of the noise at the end.
 
     believed    what the pipeline takes the sensor for; None: what the driver says
     noise       what it believes of the noise before, where it learns it
     """
     rng = np.random.default_rng([FIRST_SEED, seed])
-    config = config_for(sensor, window_m, reported_latency_s)
     instrument = wiring.instrument(config.accelerometer)
     instrument = replace(instrument, sensor=believed or instrument.sensor, noise=noise)
     pipeline = wiring.pipeline(config, instrument, read_model(config.vehicle))
-    start_us = 50_000_000
     readings, clipped = sensor.read(drive.accel_mps2, rng)
-    t_us = start_us + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US // sensor.oversample
-    fixes = receiver.fixes(drive, start_us, rng)
+    t_us = times_us(drive)
+    fixes = receiver.fixes(drive, START_US, rng)
     records = []
     sent = 0
-    for now_us in range(start_us, int(t_us[-1]) + 5 * US_PER_S, US_PER_S // 2):
+    for now_us in range(START_US, int(t_us[-1]) + 5 * US_PER_S, US_PER_S // 2):
         part = slice(*np.searchsorted(t_us, [now_us - US_PER_S // 2, now_us]))
         begin, sent = sent, sum(fix.t_us < now_us for fix in fixes)
         records += pipeline.step(now_us, block_of(t_us[part], readings[part], clipped[part]), fixes[begin:sent])
     records += pipeline.finish()
+    return records, pipeline.noise
+
+
+def times_us(drive: Drive) -> npt.NDArray[np.int64]:
+    """The pipeline's time of each sample (n,)."""
+    return START_US + np.arange(len(drive.place_m), dtype=np.int64) * US_PER_S // drive.rate_hz
+
+
+def logged_drive(
+    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, reported_latency_s: float, seed: int,
+    believed: Sensor | None = None, noise: NoiseBelief | None = None,
+) -> Logged:
+    """A drive through the real pipeline (``logged_records``), and the exact IRI at the places its records tell."""
+    config = config_for(sensor, window_m, reported_latency_s)
+    records, noise = logged_records(drive, sensor, receiver, config, seed, believed, noise)
     whole = [one for one in records if one.lat_deg is not None and "partial" not in one.flags]
     latitudes = [one.lat_deg for one in whole if one.lat_deg is not None]
     middle_m = np.array([place_of(lat_deg) for lat_deg in latitudes])
     edges_us = np.array([[one.t_us, one.t_us + one.duration_s * US_PER_S] for one in whole])
-    begin_m, end_m = np.interp(edges_us, t_us, drive.place_m).T
+    begin_m, end_m = np.interp(edges_us, times_us(drive), drive.place_m).T
 
     def column(name: str) -> Array:
         return np.array([np.nan if getattr(one, name) is None else getattr(one, name) for one in whole])
@@ -582,7 +601,7 @@ def logged_drive(
                       nothing, np.full(len(whole), drive.road.level_m_per_km))
     moved = end_m - begin_m > 0.5 * window_m
     was = drive.road.iri(begin_m, np.maximum(end_m, begin_m + 0.1))
-    return Logged(windows.chosen(moved), was[moved], pipeline.noise)
+    return Logged(windows.chosen(moved), was[moved], noise)
 
 
 def print_logged(name: str, parts: Sequence[Logged]) -> Score:
