@@ -75,7 +75,7 @@ _NUMBERS = (
     "segment", "drive", "duration_s", "distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps",
     "iri_m_per_km", "iri_std_m_per_km", "iri_rms_m_per_km", "a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor",
     "accel_rms_mps2", "samples", "clipped_samples", "a_w_std_mps2", "mtvv_std_mps2", "vdv_std_mps175", "a_w_raw_mps2",
-    "mtvv_raw_mps2", "vdv_raw_mps175",
+    "mtvv_raw_mps2", "vdv_raw_mps175", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km",
 )
 _WORDS = ("comfort", "iri_class")
 
