@@ -17,7 +17,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 
-class CatalogueError(Exception):
+class CatalogueError(ValueError):
     """A file of a catalogue, or an installed package, that offers nothing, or something of another name: which, and
     what was expected."""
 

@@ -75,3 +75,8 @@ def _shown(character: str) -> str:
     if code < 0x100:
         return f"\\x{code:02x}"
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def percent(share: float) -> str:
+    """A share of a power, for a sentence."""
+    return f"{share:.0%}" if share >= 0.095 else f"{100 * share:.1f}%" if share >= 0.001 else "less than 0.1%"

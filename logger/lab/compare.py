@@ -21,9 +21,10 @@ from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.repeats import Repeats, find_repeats
 from logger.lab.likelihood.whittle import DISCREPANCY
+from logger.lab.residual_tests import run_residual_tests
+from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
-from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
@@ -71,7 +72,7 @@ class Comparison:
     moves: Mapping[str, float]
     far: tuple[str, ...]
     removed: Removed
-    tests: ResidualTests
+    tests: ResidualTestResults
 
     @property
     def band(self) -> ComparedBand | None:
@@ -89,7 +90,7 @@ class Comparison:
         return self.removed.error >= DISCREPANCY
 
     @property
-    def tests_found(self) -> tuple[ResidualTest, ...]:
+    def tests_found(self) -> tuple[ResidualTestResult, ...]:
         """Tests that are significant and large enough to matter."""
         return self.tests.found if self.exceeds_discrepancy else ()
 
@@ -134,10 +135,10 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                       removed, _tests(refitted, removed, plain))
 
 
-def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTests:
+def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTestResults:
     """Tests of the residuals without the sensors' drift."""
     residuals, where = refitted.residuals, refitted.where
     if removed.drifting_sensors:
         residuals = replace(residuals, predictions=removed.with_drifts(residuals.predictions))
         where = breakdown(residuals)
-    return run_residual_tests(residuals, where, plain.residuals)
+    return run_residual_tests(ResidualEvidence(residuals, where, plain.residuals))

@@ -8,20 +8,17 @@ import numpy as np
 
 from logger.lab.compare import Comparison, Standing
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
+from logger.lab.residual_tests.tests import ResidualTestResult
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
-from logger.lab.residuals.residual_tests import ResidualTest
 from logger.left_out import left_out_json
 from logger.report.band_text import band_json
 from logger.report.quantities import signal_errors
 from logger.report.removed_text import removed_json, removed_words
-from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error, runs_left_out
 
 _HELPS = 0.97
 _MOST_MOVES = 3
-_PLACED = {"shift"}
-"""Tests of places: what they find ties no residual to the car."""
 
 
 def headline(found: Comparison) -> list[str]:
@@ -60,7 +57,7 @@ def evidence(found: Comparison) -> list[str]:
                 "evidence."]
     if not found.tests_found:
         return ["No test finds more than noise in the residual."]
-    return [sentence(test) for test in found.tests_found]
+    return [test.sentence for test in found.tests_found]
 
 
 def conclusion(found: Comparison) -> str:
@@ -73,7 +70,7 @@ def conclusion(found: Comparison) -> str:
     if found.missing:
         return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
                 "diagnose with the same arguments says which physical effect would explain it.")
-    if found.tests_found and not all(test.name in _PLACED for test in found.tests_found):
+    if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
         return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
                 "Nothing here asks for another effect of the car.")
     if found.removed.drifting_sensors or found.removed.distance_error_m > 0:
@@ -120,7 +117,7 @@ def _part_json(part: Part, unit: str) -> dict[str, Any]:
             "error_power_share": part.share}
 
 
-def _test_json(test: ResidualTest, found: bool) -> dict[str, Any]:
+def _test_json(test: ResidualTestResult, found: bool) -> dict[str, Any]:
     return {"name": test.name, "found": found, "value": _finite(test.value), "unit": test.unit,
             "standard_error": _finite(test.standard_error), "p_value": _finite(test.p_value)}
 

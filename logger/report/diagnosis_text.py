@@ -9,9 +9,10 @@ from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
+from logger.printable import percent
 from logger.report import residual_text
 from logger.report.band_text import band_json
-from logger.report.quantities import chance, finite, numbers_of, percent, signal_errors
+from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
 from logger.report.rough_file_text import rough_file_json, rough_file_words
 from logger.report.text_layout import enumerated

@@ -14,7 +14,6 @@ from logger.chart_data import Curves, Line, line
 from logger.lab.compare import Comparison, Standing
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
-from logger.lab.residuals.residual_tests import worst_places
 from logger.report.charts import chart
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
@@ -109,7 +108,7 @@ def _places(standing: Standing) -> Html:
                               np.array([part.residual_mps2 for part in parts])))
     along = Curves("Residual along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
-             error_text(part, 2)) for part in worst_places(standing.where, _WORST)]
+             error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
         ("Run", "From, to [m]", "Share of the residual", "Residual [m/s2]", "Error"), rows))
 

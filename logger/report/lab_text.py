@@ -5,7 +5,6 @@ from __future__ import annotations
 from logger.lab.compare import Comparison
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.breakdown import Part
-from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.selection.add_effect import AddedEffects
 from logger.left_out import left_out_paragraph
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
@@ -41,7 +40,7 @@ def _tables(found: Comparison) -> list[str]:
         lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))] if other else []
     lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
     names = short_names(found.plain.residuals.runs)
-    places = [_place(part, names[part.name]) for part in worst_places(refitted, _PLACES)]
+    places = [_place(part, names[part.name]) for part in refitted.worst_places(_PLACES)]
     return [*lines, "Worst places", *places] if places else lines
 
 

@@ -72,11 +72,6 @@ def chance(p_value: float) -> str:
     return f"{p_value:.2f}" if p_value >= 0.01 else f"{p_value:.2g}"
 
 
-def percent(share: float) -> str:
-    """A share of a power, for a sentence."""
-    return f"{share:.0%}" if share >= 0.095 else f"{100 * share:.1f}%" if share >= 0.001 else "less than 0.1%"
-
-
 def finite(errors: Mapping[str, float]) -> dict[str, float]:
     """Those standard errors that are known."""
     return {name: error for name, error in errors.items() if isfinite(error)}

@@ -11,11 +11,11 @@ from logger.lab.likelihood.record_band import ComparedBand
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift
+from logger.printable import percent
 from logger.report.band_text import band_words
 from logger.report.charts import chart
 from logger.report.document import grid, hint, section
 from logger.report.html import EMPTY, Html
-from logger.report.quantities import percent
 from logger.runs import shortened
 
 _ALIKE = 0.15

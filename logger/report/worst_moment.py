@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.compare import Standing
-from logger.lab.residuals.residual_tests import worst_places
 from logger.runs import short_names
 
 _AROUND_S = 1.5
@@ -24,7 +23,7 @@ class Moment:
 
 def worst_moment(standing: Standing) -> Moment:
     """Around the largest residual in the worst place; on rigs, which stand where they are, of all."""
-    residuals, worst = standing.residuals, worst_places(standing.where, 1)
+    residuals, worst = standing.residuals, standing.where.worst_places(1)
     names = short_names(residuals.runs)
     if worst:
         index = next(i for i, run in enumerate(residuals.runs) if run.name == worst[0].name)

@@ -10,9 +10,10 @@ import pytest
 
 from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis, Step
 from logger.lab.likelihood.noise_floor import Noise
+from logger.lab.residual_tests import run_residual_tests
+from logger.lab.residual_tests.tests import ResidualEvidence
 from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.residual_tests import run_residual_tests
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
 from logger.report.diagnosis_text import JUDGED_ON, as_json, looks_like, summary, table, untested
@@ -51,7 +52,8 @@ def shape() -> Shape:
 
     residuals = beside_with(turns)
     where = breakdown(residuals)
-    return Shape(residuals, where, run_residual_tests(residuals, where, residuals), spatial_line_of(residuals))
+    return Shape(residuals, where, run_residual_tests(ResidualEvidence(residuals, where, residuals)),
+                 spatial_line_of(residuals))
 
 
 # --- sentences ---

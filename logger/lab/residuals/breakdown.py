@@ -68,6 +68,10 @@ class Breakdown:
     amplitude: tuple[Part, ...]
     place: tuple[Part, ...]
 
+    def worst_places(self, count: int) -> list[Part]:
+        """The places that hold most of the residual power."""
+        return sorted(self.place, key=lambda part: -part.share)[:count]
+
 
 @dataclass(frozen=True, eq=False)
 class ModelResiduals:

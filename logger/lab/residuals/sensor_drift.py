@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.whittle import LOWEST_HZ
-from logger.lab.residuals.residual_tests import SIGNIFICANCE
+from logger.lab.residual_tests.tests import SIGNIFICANCE
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]

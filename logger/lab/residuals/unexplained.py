@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residual_tests import run_residual_tests
+from logger.lab.residual_tests.tests import SIGNIFICANCE, ResidualEvidence, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.residual_tests import SIGNIFICANCE, ResidualTests, run_residual_tests
 from logger.lab.residuals.spectral_lines import NEIGHBOURS, periodogram, strongest_line
 from logger.runs import short_names
 
@@ -53,7 +54,7 @@ class Shape:
 
     residuals: ModelResiduals
     where: Breakdown
-    tests: ResidualTests
+    tests: ResidualTestResults
     line: SpatialLine | None
 
 
@@ -65,7 +66,8 @@ def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
         ModelResiduals(runs.runs, car, [run.main(one) for run, one in zip(runs.runs, some, strict=True)], responses)
         for some in map(removed.with_drifts, (state.predictions, runs.predict(car))))
     where = breakdown(residuals)
-    return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
+    return Shape(residuals, where, run_residual_tests(ResidualEvidence(residuals, where, as_recorded)),
+                 spatial_line_of(residuals))
 
 
 def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,

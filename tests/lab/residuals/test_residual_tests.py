@@ -1,19 +1,23 @@
-"""ResidualTests of residuals that are made to bear them: each with a number that is known beforehand, none on noise."""
+"""Tests of residuals that are made to bear them: each with a number that is known beforehand, none on noise."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from logger.lab.likelihood.lag import lag_drift, lags
+from logger.lab.residual_tests import run_residual_tests
+from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
-from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
 from logger.lab.residuals.road_coherence import coherence_with_road
-from logger.report.residual_text import sentence
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
@@ -27,11 +31,11 @@ def white(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
     return rng.normal(0, NOISE_MPS2, len(prediction))
 
 
-def marks(residuals: ModelResiduals) -> ResidualTests:
-    return run_residual_tests(residuals, breakdown(residuals), residuals)
+def marks(residuals: ModelResiduals) -> ResidualTestResults:
+    return run_residual_tests(ResidualEvidence(residuals, breakdown(residuals), residuals))
 
 
-def mark(found: ResidualTests, name: str) -> ResidualTest:
+def mark(found: ResidualTestResults, name: str) -> ResidualTestResult:
     return next(one for one in found.tests if one.name == name)
 
 
@@ -95,7 +99,7 @@ def test_a_late_clock_is_distinguished_from_a_wrong_place() -> None:
         assert found.found
         assert found.unit == unit
         assert found.value == pytest.approx(value, rel=0.05)
-        assert "lags the model" in sentence(found)
+        assert "lags the model" in found.sentence
 
 
 def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
@@ -108,7 +112,7 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     wrong = ModelResiduals(measured, residuals.car, residuals.predictions, residuals.responses)
     assert lag_drift(lags(measured, residuals.predictions)).value == pytest.approx(0.01, rel=0.03)
     found = marks(wrong)
-    assert "runs ahead by 1 m in each 100 m" in sentence(mark(found, "drift"))
+    assert "runs ahead by 1 m in each 100 m" in mark(found, "drift").sentence
     assert found.found[0].name == "drift"
     assert not mark(found, "shift").found
 
@@ -122,7 +126,7 @@ def test_the_direction_of_asymmetric_dampers(ratio: float, words: str) -> None:
     assert forces.asymmetry.value == pytest.approx(truth, rel=0.1)
     found = mark(marks(residuals), "direction")
     assert found.found
-    assert words in sentence(found)
+    assert words in found.sentence
 
 
 def test_the_curve_of_a_cubic_spring() -> None:
@@ -140,7 +144,7 @@ def test_dampers_that_yield_and_friction_bend_the_curve_by_rate() -> None:
     residuals = beside_with(recorded_by([("dry_friction", {"friction_force_n": 60.0})], NOISE_MPS2))
     found = mark(marks(residuals), "force by rate")
     assert found.found
-    assert "yields at speed" in sentence(found)
+    assert "yields at speed" in found.sentence
 
 
 def test_an_answer_out_of_proportion() -> None:
@@ -167,7 +171,7 @@ def test_excitation_and_speed_are_distinguished() -> None:
     assert mark(found, "excitation").found and not mark(found, "speed").found
     found = marks(beside_with(by_speed))
     assert mark(found, "speed").found
-    assert "times as large at 22 m/s as at 7 m/s" in sentence(mark(found, "speed"))
+    assert "times as large at 22 m/s as at 7 m/s" in mark(found, "speed").sentence
     assert mark(found, "speed").value == pytest.approx(22 / 7.3, rel=0.25)
 
 
@@ -177,11 +181,11 @@ def test_the_worst_place_is_named() -> None:
         return np.where(hit, 0.8, 0.0)
 
     residuals = beside_with(plus_noise(pothole))
-    worst = worst_places(breakdown(residuals), 1)[0]
+    worst = breakdown(residuals).worst_places(1)[0]
     assert (worst.name, worst.low) == ("runs/run2", 200.0)
     found = mark(marks(residuals), "place")
     assert found.found
-    said = sentence(found)
+    said = found.sentence
     assert "run2, 200 to " in said and "runs/run2" not in said
 
 
@@ -198,9 +202,9 @@ def test_blows_lean_to_one_side() -> None:
     def blows(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
         return np.where(prediction > 2.2 * prediction.std(), 0.4, 0.0)
 
-    found = mark(marks(beside_with(plus_noise(blows))), "lean")
+    found = mark(marks(beside_with(plus_noise(blows))), "skewness")
     assert found.found
-    assert "upward" in sentence(found)
+    assert "upward" in found.sentence
 
 
 def test_a_run_of_five_seconds_can_be_read() -> None:
@@ -233,4 +237,33 @@ def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
 
 def test_every_test_has_a_sentence_with_all_of_its_figures() -> None:
     for one in marks(beside_with(white)).tests:
-        assert sentence(one).endswith("."), one.name
+        assert one.sentence.endswith("."), one.name
+
+
+def test_a_package_adds_a_test_with_one_file(tmp_path: Path) -> None:
+    """Named in the comparison's JSON, and with its sentence in the evidence."""
+    (tmp_path / "their_tests.py").write_text("""
+from logger.lab.residual_tests.tests import ResidualTest, ResidualTests
+
+class Peak(ResidualTest):
+    name, unit = "peak", "m/s2"
+
+    def run(self, tested):
+        return self.result(max(abs(one).max() for one in tested.residuals.residual), None, 1e-9, True)
+
+    def sentence(self, found):
+        return f"The largest residual is {found.value:.3g} m/s2."
+
+TESTS = ResidualTests("theirs", (Peak(),))
+""")
+    about = tmp_path / "theirs-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[ridelog.residual_tests]\ntheirs = their_tests:TESTS\n")
+    code = ("import ridelog; road = ridelog.random_road(iso_class='C', length_m=200.0, seed=1)\n"
+            "car = ridelog.read_vehicle('rav4-2009')\n"
+            "run = ridelog.simulate(car.with_effect('sensor_gain', gain=1.2), road, 12.0, noise_mps2=0.03)\n"
+            "print('The largest residual is' in str(ridelog.compare(car, [run])))")
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True,
+                          env=os.environ | {"PYTHONPATH": str(tmp_path)})
+    assert (done.stdout, done.stderr) == ("True\n", "")

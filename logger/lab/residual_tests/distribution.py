@@ -1,0 +1,130 @@
+"""How is the residual distributed, in time, over frequency and in size?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from logger.dsp.pass_band import HALF_WIDTH_HZ
+from logger.identification.residual_whiteness import LAGS, autocorrelation
+from logger.lab.residual_tests.tests import (
+    BANDS,
+    SIGNIFICANCE,
+    ResidualEvidence,
+    ResidualTest,
+    ResidualTestResult,
+    ResidualTests,
+)
+from logger.lab.residuals.block_statistics import autocorrelations, mean_of_blocks, rms
+from logger.lab.residuals.spectral_lines import periodogram, strongest_line
+from logger.printable import percent
+from logger.runs import short_names
+
+_TONE_HZ = 0.4
+"""On either side of a line, whose neighbours it is compared with: about what a spectrum of segments resolves."""
+
+
+class Whiteness(ResidualTest):
+    """The largest autocorrelation; one of 0.1 explains a hundredth of the power from a sample before. Filtered
+    residuals are not tested: they are not white, whatever they were."""
+
+    name = "whiteness"
+
+    def run(self, tested: ResidualEvidence) -> ResidualTestResult:
+        """The autocorrelation with its lag."""
+        residuals = tested.residuals
+        if not residuals.whole:
+            return self.result()
+        rho = autocorrelations(residuals.residual, LAGS)
+        largest = int(np.abs(rho).argmax())
+        return self.result(float(rho[largest]), sum(map(len, residuals.residual)) ** -0.5,
+                           autocorrelation(residuals.residual, 0).p_value, bool(abs(rho[largest]) > 0.1),
+                           lag_s=(largest + 1) / residuals.rate_hz)
+
+    def sentence(self, found: ResidualTestResult) -> str:
+        """At which lag."""
+        return (f"The residual is not white: samples {found.figures['lag_s'] * 1000:.0f} ms apart have a correlation "
+                f"of {found.value:.2f}.")
+
+
+class Frequency(ResidualTest):
+    """The band that holds most, compared with white noise: F tests, Bonferroni over the bands."""
+
+    name = "frequency"
+
+    def run(self, tested: ResidualEvidence) -> ResidualTestResult:
+        """The share of that band."""
+        from scipy.stats import f
+
+        parts, residuals = tested.where.frequency, tested.residuals
+        whole, span_s = parts[-1].high, sum(map(len, residuals.residual)) / residuals.rate_hz
+        freedom = 1.6 * span_s  # per hertz, of spectra of segments that overlap
+        chances = []
+        for part in parts:
+            width = part.high - part.low
+            ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
+            chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
+        best = max((i for i in range(len(parts)) if chances[i] < SIGNIFICANCE), key=lambda i: parts[i].share,
+                   default=int(np.argmin(chances)))
+        part = parts[best]
+        white = (part.high - part.low) / whole
+        return self.result(part.share, None, min(chances[best], 1.0), part.share > 2 * white, part=part,
+                           white_share=white)
+
+    def sentence(self, found: ResidualTestResult) -> str:
+        """Where the power lies."""
+        part = found.figures["part"]
+        error = f"; the error there is {part.error:.2f}" if np.isfinite(part.error) else ""
+        return (f"{percent(found.value)} of the residual's power lies {BANDS[part.name]} ({part.low:.2g} to "
+                f"{part.high:.2g} Hz), where white noise would have {percent(found.figures['white_share'])}{error}.")
+
+
+class Skewness(ResidualTest):
+    """Skewness, with Student's test of the cubes of blocks; up to 1/2 either way a distribution counts as fairly
+    symmetric (M. G. Bulmer, Principles of Statistics, 1979, chapter 4)."""
+
+    name, road = "skewness", True
+
+    def run(self, tested: ResidualEvidence) -> ResidualTestResult:
+        """The mean cube over the cube of the deviation."""
+        scale = rms(tested.residuals.residual)
+        if not scale > 0:
+            return self.result()
+        mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in tested.residuals.residual],
+                                              tested.residuals)
+        return self.result(mean, error, p_value, abs(mean) > 0.5)
+
+    def sentence(self, found: ResidualTestResult) -> str:
+        """Which way."""
+        way = "up" if found.value > 0 else "down"
+        return (f"The residual has its sharp peaks {way}ward (skewness {found.value:.1f}): something pushes the body "
+                f"{way} in short blows.")
+
+
+class Tone(ResidualTest):
+    """The strongest spectral line of all runs, compared with the frequencies beside it."""
+
+    name, unit, road = "tone", "Hz", True
+
+    def run(self, tested: ResidualEvidence) -> ResidualTestResult:
+        """Its frequency, and the run where it is clearest."""
+        residuals = tested.residuals
+        names, tones = short_names(residuals.runs), []
+        for run, residual in zip(residuals.runs, residuals.residual, strict=True):
+            f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
+            low_hz, high_hz = run.pass_band_hz
+            inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + _TONE_HZ))
+            line = strongest_line(periodogram(residual), inside, round(_TONE_HZ * len(residual) / residuals.rate_hz))
+            if line is not None:
+                tones.append((line[1] * len(residuals.runs), float(f_hz[line[0]]), names[run.name]))
+        if not tones:
+            return self.result()
+        p_value, at_hz, name = min(tones)
+        return self.result(at_hz, None, min(p_value, 1.0), True, run=name)
+
+    def sentence(self, found: ResidualTestResult) -> str:
+        """Where it is."""
+        return (f"A single frequency stands out in the residual: {found.value:.1f} Hz, in {found.figures['run']}. "
+                "Something hums or rings there.")
+
+
+TESTS = ResidualTests("distribution", (Whiteness(), Frequency(), Skewness(), Tone()))
