@@ -17,19 +17,19 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.chip_bus import ConfiguredChip, bus_fault
-from drivers.dated_samples import DatedSamples, Samples
+from drivers.dated_samples import DatedSamples, UndatedSamples
 from drivers.errors import BadReply
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import UNREAD_CHIP, AccelerationBlock
-from drivers.registers import Field, Register
+from drivers.registers import Register, RegisterField
 from drivers.sources import US_PER_S, ChipSource, Scattered
 
 LONGEST_LOOK_US = 50_000
 """Between two looks: how late a reading may come, whatever the buffer holds."""
 
 
-class Waiting(NamedTuple):
+class BufferState(NamedTuple):
     """What a chip says of its buffer: how many entries it holds, whether some were lost, and the bytes that said so."""
 
     entries: int
@@ -43,7 +43,7 @@ class BufferedChip(ConfiguredChip, ABC):
     entry_bytes     of one entry, which a read at ``data_address`` takes out of the buffer
     """
 
-    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[Field, int]]],
+    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[RegisterField, int]]],
                  data_address: int, entry_bytes: int) -> None:
         super().__init__(name, bus, settings)
         self._data_address = data_address
@@ -59,7 +59,7 @@ class BufferedChip(ConfiguredChip, ABC):
         """Let the chip stand by. Never raises."""
 
     @abstractmethod
-    def _waiting(self, chip: int) -> Waiting:
+    def _waiting(self, chip: int) -> BufferState:
         """Ask the chip about its buffer. OSError of the bus."""
 
     @abstractmethod
@@ -145,7 +145,7 @@ class BufferedDecoder(ABC):
         entries = self._decoded(data)
         count = len(entries.accel_mps2)
         self._overruns += entries.after_loss
-        self._samples.add(Samples(
+        self._samples.add(UndatedSamples(
             after_loss=entries.after_loss, arrivals_us=np.full(count, t_us, dtype=np.int64),
             accel_mps2=entries.accel_mps2, clipped=entries.clipped, good=np.ones(count, dtype=np.bool_)))
 

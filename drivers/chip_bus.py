@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost, Timeout, WrongDevice
 from drivers.ports import I2cBus
-from drivers.registers import Field, Register
+from drivers.registers import Register, RegisterField
 
 NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
 
@@ -68,7 +68,9 @@ class ConfiguredChip:
     registers_to_check   so many ``check_next`` see every setting once
     """
 
-    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[Field, int]]]) -> None:
+    def __init__(
+        self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[RegisterField, int]]]
+    ) -> None:
         self.name = name
         self.registers_to_check = len(settings)
         self._bus = bus

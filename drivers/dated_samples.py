@@ -30,7 +30,7 @@ LONGEST_BURSTS_S = 0.45
 JUDGED_SAMPLES = 500
 
 
-class Samples(NamedTuple):
+class UndatedSamples(NamedTuple):
     """Samples without times: arrivals (n,) [us], acceleration (n, 3) [m/s2], clipped (n,), good (n,).
 
     after_loss    others may be missing between them and those before
@@ -57,7 +57,7 @@ class DatedSamples:
         self.clock = SampleClock(rate_hz, tolerance)
         self._rate_hz = rate_hz
         self._tolerance = tolerance
-        self._waiting: list[Samples] = []
+        self._waiting: list[UndatedSamples] = []
         self._times: list[npt.NDArray[np.int64]] = []
         self._ended = False
         self.good = 0
@@ -66,7 +66,7 @@ class DatedSamples:
         self.burst_s = 0.0
         self._late_us = np.empty(0, dtype=np.int64)
 
-    def add(self, samples: Samples) -> None:
+    def add(self, samples: UndatedSamples) -> None:
         """More samples, in order."""
         if samples.after_loss:
             self._times.append(self.clock.restart())
@@ -91,7 +91,7 @@ class DatedSamples:
         _, arrivals, accels, clips, goods = zip(*self._waiting, strict=True)
         arrivals_us, accel_mps2, clipped, good = (np.concatenate(part) for part in (arrivals, accels, clips, goods))
         n = len(t_us)
-        self._waiting = [Samples(False, arrivals_us[n:], accel_mps2[n:], clipped[n:], good[n:])]
+        self._waiting = [UndatedSamples(False, arrivals_us[n:], accel_mps2[n:], clipped[n:], good[n:])]
         dated = t_us != NO_TIME
         self.undated += int(np.count_nonzero(~dated))
         self._late_us = np.concatenate([self._late_us, (arrivals_us[:n] - t_us)[dated]])

@@ -125,7 +125,7 @@ class _Recording:
             yield data
 
 
-class Chip(Protocol):
+class RecordedChip(Protocol):
     """A chip on a recorded bus, as a model of its registers.
 
     data_address, sample_bytes    a read of so many bytes from there on takes a sample
@@ -152,7 +152,7 @@ class RecordedBus:
     acknowledged: a sample is never invented. ``now_us`` is only needed for cues with ``at_us``.
     """
 
-    def __init__(self, chip: Chip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
+    def __init__(self, chip: RecordedChip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
                  address: int = 0x0A) -> None:
         self.chip = chip
         self.chip.sample = self._take_loaded
@@ -168,7 +168,7 @@ class RecordedBus:
     @classmethod
     def playing(
         cls,
-        chip: Chip,
+        chip: RecordedChip,
         events: Iterable[Event],
         now_us: Callable[[], int],
         cues: Iterable[Cue] = (),

@@ -19,7 +19,7 @@ from drivers.ports import I2cBus
 
 
 @dataclass(frozen=True)
-class Field:
+class RegisterField:
     """Bits ``high_bit`` down to ``low_bit`` of a byte register, both included."""
 
     name: str
@@ -60,7 +60,7 @@ class Register:
     def read(self, bus: I2cBus, chip: int) -> int:
         return bus.read_byte_data(chip, self.address)
 
-    def check(self, bus: I2cBus, chip: int, values: Mapping[Field, int]) -> None:
+    def check(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
         """Read the register once; BadReply when a field does not hold its value."""
         byte = self.read(bus, chip)
         for field, value in values.items():
@@ -70,7 +70,7 @@ class Register:
                     f"{field.name} reads {field.extract(byte)}, expected {value}"
                 )
 
-    def update(self, bus: I2cBus, chip: int, values: Mapping[Field, int]) -> None:
+    def update(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
         """Set the fields, leave all other bits as they are, and check that the chip took them.
 
         SettingsError when a value does not fit (nothing is written then), BadReply when it reads back otherwise.

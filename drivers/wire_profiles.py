@@ -34,7 +34,7 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Calibration:
+class ScaleCalibration:
     """Raw counts of X, Y, Z at 0 g and at +1 g, each axis by itself."""
 
     zero_g_raw: Triple
@@ -67,7 +67,7 @@ class FrameLayout:
     offsets: tuple[int, int, int]
     valid_raw: tuple[int, int]
     upright_axis: int | None
-    calibration: Calibration
+    calibration: ScaleCalibration
 
     @property
     def words(self) -> str:
@@ -117,7 +117,7 @@ class LineLayout:
 
 
 @dataclass(frozen=True)
-class Profile:
+class WireProfile:
     """What the bytes of a device mean. ``verified``: a real device has confirmed it. ``scale``: see below."""
 
     name: str
@@ -142,7 +142,7 @@ def shipped_profiles() -> list[str]:
     return sorted(file.name.removesuffix(".yaml") for file in files if file.name.endswith(".yaml"))
 
 
-def load_profile(name_or_path: str | Path) -> Profile:
+def load_profile(name_or_path: str | Path) -> WireProfile:
     """A shipped profile by its name, or a user's own by its path (ending in .yaml or .yml).
 
     Raises SettingsError naming file, line, key and what was expected.
@@ -258,10 +258,10 @@ class _Keys:
             raise self.wrong(shortened(str(key))[1:-1], "no such key")
 
 
-def _profile(keys: _Keys) -> Profile:
+def _profile(keys: _Keys) -> WireProfile:
     framing = keys.choice("framing", ["frames", "lines"])
     layout = _frame_layout(keys.inner("frame")) if framing == "frames" else _line_layout(keys.inner("line"))
-    profile = Profile(
+    profile = WireProfile(
         name=keys.text("name"),
         version=keys.whole("version", 1, 1_000_000),
         verified=keys.flag("verified"),
@@ -298,7 +298,7 @@ def _frame_layout(keys: _Keys) -> FrameLayout:
         offsets=(x, y, z),
         valid_raw=(low, high),
         upright_axis=None if axis == "none" else AXES.index(axis),
-        calibration=Calibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])),
+        calibration=ScaleCalibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])),
     )
     keys.finish()
     return layout

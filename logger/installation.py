@@ -45,7 +45,7 @@ Run = Callable[[Sequence[str]], None]
 
 
 @dataclass(frozen=True)
-class Step:
+class InstallationStep:
     """One step: what it does in words, and the doing of it; ``act`` None: what is left as it is."""
 
     words: str
@@ -64,7 +64,7 @@ class Installation:
     def __post_init__(self) -> None:
         self._record = self._read_record()
 
-    def install(self) -> list[Step]:
+    def install(self) -> list[InstallationStep]:
         """The steps that put everything in place. Raises BadInput for a root whose folders lead out of it."""
         files = {name: self._shipped(source) for name, source in FILES.items()}
         steps = [self._put(name, data) for name, data in files.items()]
@@ -83,7 +83,7 @@ class Installation:
             self._command("systemctl", "restart", "ridelog.service"),
         ]
 
-    def uninstall(self) -> list[Step]:
+    def uninstall(self) -> list[InstallationStep]:
         """The steps that take away what ``install`` put in place, but for logs and for what was changed since."""
         steps = []
         if self._is_this_machine:
@@ -98,7 +98,7 @@ class Installation:
         if self._is_this_machine:
             steps += [self._command("systemctl", "daemon-reload"), self._command("udevadm", "control", "--reload")]
         logs = self.root / LOGS
-        return [*steps, Step(f"keep {logs} and the user ridelog who owns it" if logs.exists()
+        return [*steps, InstallationStep(f"keep {logs} and the user ridelog who owns it" if logs.exists()
                              else "keep the user ridelog (userdel ridelog removes it)")]
 
     @property
@@ -116,40 +116,42 @@ class Installation:
             raise BadInput(f"{path.parent}: expected a folder inside {self.root}; a link leads out of it")
         return path
 
-    def _put(self, name: str, data: bytes) -> Step:
+    def _put(self, name: str, data: bytes) -> InstallationStep:
         path = self._place(name)
         found = _content(path)
         if found == data:
-            return Step(f"keep {path}: it is there")
+            return InstallationStep(f"keep {path}: it is there")
         if path.is_symlink() or (found is not None and _digest(found) != self._record.get(name)):
             new = path.with_name(f"{path.name}.new")
-            return Step(f"keep {path}: it was changed; write {new} beside it", lambda: _write(new, data))
-        return Step(f"{'write' if found is None else 'replace'} {path}", lambda: _write(path, data))
+            return InstallationStep(f"keep {path}: it was changed; write {new} beside it", lambda: _write(new, data))
+        return InstallationStep(f"{'write' if found is None else 'replace'} {path}", lambda: _write(path, data))
 
-    def _take(self, name: str, digest: str) -> Step:
+    def _take(self, name: str, digest: str) -> InstallationStep:
         path = self._place(name)
         found = _content(path)
         if found is None:
-            return Step(f"nothing at {path}")
+            return InstallationStep(f"nothing at {path}")
         if path.is_symlink() or _digest(found) != digest:
-            return Step(f"keep {path}: it was changed")
-        return Step(f"remove {path}", path.unlink)
+            return InstallationStep(f"keep {path}: it was changed")
+        return InstallationStep(f"remove {path}", path.unlink)
 
-    def _link(self, name: str, target: Path) -> Step:
+    def _link(self, name: str, target: Path) -> InstallationStep:
         path = self._place(name)
         if path.is_symlink() and path.readlink() == target:
-            return Step(f"keep {path}: it is there")
+            return InstallationStep(f"keep {path}: it is there")
         if not self._is_ours(name, target):
-            return Step(f"keep {path}: it is not ours")
+            return InstallationStep(f"keep {path}: it is not ours")
         if path.is_symlink():
-            return Step(f"link {path} to {target}, no longer to {path.readlink()}", lambda: _make_link(path, target))
-        return Step(f"link {path} to {target}", lambda: _make_link(path, target))
+            return InstallationStep(f"link {path} to {target}, no longer to {path.readlink()}",
+                                    lambda: _make_link(path, target))
+        return InstallationStep(f"link {path} to {target}", lambda: _make_link(path, target))
 
-    def _unlink(self, name: str, target: Path) -> Step:
+    def _unlink(self, name: str, target: Path) -> InstallationStep:
         path = self._place(name)
         if path.is_symlink() and self._is_ours(name, target):
-            return Step(f"remove {path}", path.unlink)
-        return Step(f"keep {path}: it is not ours" if path.is_symlink() or path.exists() else f"nothing at {path}")
+            return InstallationStep(f"remove {path}", path.unlink)
+        return InstallationStep(f"keep {path}: it is not ours" if path.is_symlink() or path.exists() else
+                                f"nothing at {path}")
 
     def _is_ours(self, name: str, target: Path) -> bool:
         """True where a link is ours to make or to remove: to our target, to one that we recorded, or there is none."""
@@ -158,33 +160,33 @@ class Installation:
             return not path.exists()
         return str(path.readlink()) in (str(target), self._record.get(name))
 
-    def _stop(self) -> Step:
+    def _stop(self) -> InstallationStep:
         """systemctl fails for a unit that it does not know: then there is nothing to stop."""
         unit = self._place("etc/systemd/system/ridelog.service")
         if unit.exists():
             return self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service")
-        return Step(f"nothing to stop: no {unit}")
+        return InstallationStep(f"nothing to stop: no {unit}")
 
-    def _put_record(self, digests: dict[str, str]) -> Step:
+    def _put_record(self, digests: dict[str, str]) -> InstallationStep:
         path = self._place(RECORD)
         data = (json.dumps(digests, indent=1) + "\n").encode("ascii")
-        return Step(f"write {path}", lambda: _write(path, data))
+        return InstallationStep(f"write {path}", lambda: _write(path, data))
 
-    def _take_record(self) -> Step:
+    def _take_record(self) -> InstallationStep:
         path = self._place(RECORD)
-        return Step(f"remove {path}", lambda: path.unlink(missing_ok=True))
+        return InstallationStep(f"remove {path}", lambda: path.unlink(missing_ok=True))
 
-    def _take_folder(self, name: str) -> Step:
+    def _take_folder(self, name: str) -> InstallationStep:
         path = self._place(name)
 
         def remove() -> None:
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
 
-        return Step(f"remove {path} if it is empty", remove)
+        return InstallationStep(f"remove {path} if it is empty", remove)
 
-    def _command(self, *words: str) -> Step:
-        return Step(f"run {' '.join(words)}", lambda: self.run(words))
+    def _command(self, *words: str) -> InstallationStep:
+        return InstallationStep(f"run {' '.join(words)}", lambda: self.run(words))
 
     def _read_record(self) -> dict[str, str]:
         """Checksums of what was put in place, and where the command leads, by name; nothing where there is no record

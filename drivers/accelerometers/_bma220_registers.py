@@ -6,7 +6,7 @@ Addresses are those on I2C, twice the numbers that the data sheet gives for SPI.
 
 from __future__ import annotations
 
-from drivers.registers import Field, Register, ToggleRegister
+from drivers.registers import Register, RegisterField, ToggleRegister
 
 CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)
@@ -20,10 +20,10 @@ WATCHDOG = Register("bus watchdog", 0x2E)
 SUSPEND = ToggleRegister("suspend", 0x30)
 SOFT_RESET = ToggleRegister("soft reset", 0x32)
 
-SLEEP_ENABLE = Field("sleep_en", 6, 6)
-ENABLED_AXES = Field("en_x, en_y, en_z", 2, 0)
-SERIAL_HIGH_BANDWIDTH = Field("serial_high_bw", 7, 7)
-FILTER_CODE = Field("filter code", 3, 0)
-SELF_TEST = Field("sbist", 3, 2)
-RANGE_CODE = Field("range code", 1, 0)
-WATCHDOG_CODE = Field("watchdog code", 2, 1)
+SLEEP_ENABLE = RegisterField("sleep_en", 6, 6)
+ENABLED_AXES = RegisterField("en_x, en_y, en_z", 2, 0)
+SERIAL_HIGH_BANDWIDTH = RegisterField("serial_high_bw", 7, 7)
+FILTER_CODE = RegisterField("filter code", 3, 0)
+SELF_TEST = RegisterField("sbist", 3, 2)
+RANGE_CODE = RegisterField("range code", 1, 0)
+WATCHDOG_CODE = RegisterField("watchdog code", 2, 1)

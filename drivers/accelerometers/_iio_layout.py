@@ -69,7 +69,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ScanLayout:
     """A description, understood.
 
     axes         of x, y, z in a scan; empty where single values are read and the kernel does not give their type
@@ -110,7 +110,7 @@ def read_description(data: bytes) -> dict[str, Any]:
     return description
 
 
-def understood(description: Mapping[str, Any]) -> Layout:
+def understood(description: Mapping[str, Any]) -> ScanLayout:
     """What a description means. BadReply that names what cannot be."""
     try:
         polled = bool(description["polled"])
@@ -129,8 +129,8 @@ def understood(description: Mapping[str, Any]) -> Layout:
         raise BadReply("an IIO description: expected scans with in_accel_x, in_accel_y and in_accel_z")
     if rate_hz <= 0 or 0.0 in scale:
         raise BadReply("an IIO description: expected a rate and scales other than 0")
-    return Layout(name, polled, rate_hz, axes if len(axes) == len(AXES) else (), timestamp, scan_bytes, scale, offset,
-                  matrix)
+    return ScanLayout(name, polled, rate_hz, axes if len(axes) == len(AXES) else (), timestamp, scan_bytes, scale,
+                      offset, matrix)
 
 
 def _shown(error: Exception) -> str:

@@ -57,7 +57,7 @@ class Decoder(Protocol):
 
 
 @dataclass(frozen=True)
-class Readings:
+class ReadingQuality:
     """What single readings are.
 
     noise_mps2    r.m.s. noise of a reading, before it is rounded [m/s2], above 0; on the 100 Hz grid for a source that
@@ -109,7 +109,7 @@ class Accelerometer(ABC, Generic[Settings]):
         SettingsError for settings that cannot be."""
 
     @abstractmethod
-    def readings(self, settings: Settings) -> Readings:
+    def readings(self, settings: Settings) -> ReadingQuality:
         """What single readings are."""
 
     @abstractmethod

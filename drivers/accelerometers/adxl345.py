@@ -27,15 +27,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.accelerometers.accelerometer import Accelerometer, Readings
-from drivers.buffered_chip import BufferedChip, BufferedDecoder, Entries, Waiting, buffered_source
+from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality
+from drivers.buffered_chip import BufferedChip, BufferedDecoder, BufferState, Entries, buffered_source
 from drivers.chip_bus import bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from drivers.recorded_words import RecordedWords
-from drivers.registers import Field, Register
+from drivers.registers import Register, RegisterField
 from drivers.settings import Kind, OneOf, Whole
 from drivers.sources import Source
 
@@ -50,19 +50,19 @@ DATA_ADDRESS = 0x32
 FIFO = Register("FIFO control", 0x38)
 FIFO_STATUS = Register("FIFO status", 0x39)
 
-WHOLE_BYTE = Field("offset", 7, 0)
-LOW_POWER = Field("LOW_POWER", 4, 4)
-RATE_CODE = Field("rate code", 3, 0)
-LINK_AND_SLEEP = Field("link, AUTO_SLEEP", 5, 4)
-MEASURE = Field("measure", 3, 3)
-SLEEP = Field("sleep, wakeup", 2, 0)
-SELF_TEST = Field("SELF_TEST", 7, 7)
-FULL_RESOLUTION = Field("FULL_RES", 3, 3)
-JUSTIFY = Field("justify", 2, 2)
-RANGE_CODE = Field("range", 1, 0)
-FIFO_MODE = Field("FIFO mode", 7, 6)
-ENTRIES = Field("entries", 5, 0)
-OVERRUN = Field("overrun", 0, 0)
+WHOLE_BYTE = RegisterField("offset", 7, 0)
+LOW_POWER = RegisterField("LOW_POWER", 4, 4)
+RATE_CODE = RegisterField("rate code", 3, 0)
+LINK_AND_SLEEP = RegisterField("link, AUTO_SLEEP", 5, 4)
+MEASURE = RegisterField("measure", 3, 3)
+SLEEP = RegisterField("sleep, wakeup", 2, 0)
+SELF_TEST = RegisterField("SELF_TEST", 7, 7)
+FULL_RESOLUTION = RegisterField("FULL_RES", 3, 3)
+JUSTIFY = RegisterField("justify", 2, 2)
+RANGE_CODE = RegisterField("range", 1, 0)
+FIFO_MODE = RegisterField("FIFO mode", 7, 6)
+ENTRIES = RegisterField("entries", 5, 0)
+OVERRUN = RegisterField("overrun", 0, 0)
 
 BYPASS, STREAM = 0, 2
 SIXTEEN_G = 3
@@ -122,10 +122,10 @@ class Adxl345(BufferedChip):
         log.info("ADXL345 runs at 0x%02X, %d samples a second", chip, self._rate_hz)
         return chip
 
-    def _waiting(self, chip: int) -> Waiting:
+    def _waiting(self, chip: int) -> BufferState:
         interrupts = INTERRUPTS.read(self._bus, chip)
         status = FIFO_STATUS.read(self._bus, chip)
-        return Waiting(ENTRIES.extract(status), bool(OVERRUN.extract(interrupts)), bytes((interrupts, status)))
+        return BufferState(ENTRIES.extract(status), bool(OVERRUN.extract(interrupts)), bytes((interrupts, status)))
 
     def _marked(self, said: bytes, lost: bool) -> bytes:
         return bytes((OVERRUN.insert(said[0], int(lost)), said[1]))
@@ -177,9 +177,9 @@ class _Adxl345(Accelerometer[Adxl345Config]):
         """By the nominal rate."""
         return Adxl345Decoder(settings.rate_hz)
 
-    def readings(self, settings: Adxl345Config) -> Readings:
+    def readings(self, settings: Adxl345Config) -> ReadingQuality:
         """Steps that the noise covers."""
-        return Readings(NOISE_MPS2)
+        return ReadingQuality(NOISE_MPS2)
 
     def facts(self, settings: Adxl345Config) -> dict[str, Any]:
         """Scale and rate; no real chip has confirmed it yet."""

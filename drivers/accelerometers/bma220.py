@@ -44,7 +44,7 @@ from drivers.accelerometers._bma220_registers import (
     WATCHDOG,
     WATCHDOG_CODE,
 )
-from drivers.accelerometers.accelerometer import Accelerometer, Readings
+from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality
 from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
@@ -328,11 +328,11 @@ class _Bma220(Accelerometer[Bma220Config]):
         """By the range."""
         return Bma220Decoder(settings.range_g)
 
-    def readings(self, settings: Bma220Config) -> Readings:
+    def readings(self, settings: Bma220Config) -> ReadingQuality:
         """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate: of
         another one a recording does not say, and it has to give the same rows."""
         hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.reads, 1))
-        return Readings(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
+        return ReadingQuality(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
         """Range, scale, filter, rate."""

@@ -25,9 +25,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from drivers.accelerometers._iio_device import AUTO, POLLED_HZ, IioDevice, ScanPort
-from drivers.accelerometers._iio_layout import Integers, Layout, read_description, understood
-from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, Readings
-from drivers.dated_samples import DatedSamples, Samples
+from drivers.accelerometers._iio_layout import Integers, ScanLayout, read_description, understood
+from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality
+from drivers.dated_samples import DatedSamples, UndatedSamples
 from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.events import Event
 from drivers.machine import Machine
@@ -182,7 +182,7 @@ class IioDecoder:
 
     def __init__(self, settings: IioConfig) -> None:
         self._settings = settings
-        self._layout: Layout | None = None
+        self._layout: ScanLayout | None = None
         self._dated: DatedSamples | None = None
         self._blocks: list[AccelerationBlock] = []
         self._ended = self._begins = False
@@ -258,7 +258,7 @@ class IioDecoder:
             np.concatenate([block.t_us for block in blocks]), np.concatenate([block.accel_mps2 for block in blocks]),
             np.concatenate([block.clipped for block in blocks]), blocks[-1].rate_hz)
 
-    def _describe(self, layout: Layout) -> None:
+    def _describe(self, layout: ScanLayout) -> None:
         """A device, the same as before or another one."""
         if layout == self._layout:
             return
@@ -270,7 +270,7 @@ class IioDecoder:
         self._layout = layout
         self._dated = None if layout.polled else DatedSamples(layout.rate_hz, RATE_TOLERANCE)
 
-    def _take_scans(self, t_us: int, data: bytes, layout: Layout, dated: DatedSamples) -> None:
+    def _take_scans(self, t_us: int, data: bytes, layout: ScanLayout, dated: DatedSamples) -> None:
         if not data or len(data) % layout.scan_bytes:
             raise BadReply(f"an IIO event of {len(data)} bytes: expected scans of {layout.scan_bytes}")
         scans = np.frombuffer(data, dtype=np.uint8).reshape(-1, layout.scan_bytes)
@@ -282,10 +282,10 @@ class IioDecoder:
         self._arrived_us = int(arrivals_us[-1])
         begins, self._begins = self._begins, False
         raw = np.stack([axis.values(scans) for axis in layout.axes], axis=1)
-        dated.add(Samples(begins, arrivals_us, layout.accel_mps2(raw), layout.clipped(raw),
+        dated.add(UndatedSamples(begins, arrivals_us, layout.accel_mps2(raw), layout.clipped(raw),
                           np.ones(len(scans), dtype=np.bool_)))
 
-    def _take_values(self, t_us: int, data: bytes, layout: Layout) -> None:
+    def _take_values(self, t_us: int, data: bytes, layout: ScanLayout) -> None:
         try:
             raw: Integers = np.array([[int(word) for word in data.split()]], dtype=np.int64)
         except (ValueError, OverflowError):
@@ -322,13 +322,13 @@ class _Iio(Accelerometer[IioConfig]):
         """By the descriptions that come."""
         return IioDecoder(settings)
 
-    def readings(self, settings: IioConfig) -> Readings:
+    def readings(self, settings: IioConfig) -> ReadingQuality:
         """As the settings say; a step that they leave to the device is taken for finer than the noise. Several readings
         to each on the 100 Hz grid blur a step into noise."""
         step_mps2, each = settings.scale_mps2 or 0.0, settings.rate_hz / 100
         if each > 1:
-            return Readings(hypot(settings.noise_mps2, step_mps2 / sqrt(12 * each)))
-        return Readings(settings.noise_mps2, step_mps2)
+            return ReadingQuality(hypot(settings.noise_mps2, step_mps2 / sqrt(12 * each)))
+        return ReadingQuality(settings.noise_mps2, step_mps2)
 
     def facts(self, settings: IioConfig) -> dict[str, Any]:
         """What the settings ask for: the rest is the kernel's, and in the recording."""

@@ -20,15 +20,23 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers.accelerometer import Readings, SerialAccelerometer
-from drivers.dated_samples import WORTH_TELLING, DatedSamples, Samples
+from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer
+from drivers.dated_samples import WORTH_TELLING, DatedSamples, UndatedSamples
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
 from drivers.recorded_words import RecordedWords
 from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
 from drivers.wire_contents import SENSOR, RecentBytes
-from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile, shipped_profiles
+from drivers.wire_profiles import (
+    FrameLayout,
+    LineLayout,
+    ScaleCalibration,
+    Triple,
+    WireProfile,
+    load_profile,
+    shipped_profiles,
+)
 
 NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
 
@@ -140,7 +148,7 @@ class PascoDecoder:
     that cannot be used. What ``take`` returns over time does not depend on when it is called.
     """
 
-    def __init__(self, profile: Profile, calibration: Calibration | None = None) -> None:
+    def __init__(self, profile: WireProfile, calibration: ScaleCalibration | None = None) -> None:
         self._reader: _FrameReader | _LineReader
         if isinstance(profile.layout, FrameLayout):
             layout = profile.layout if calibration is None else replace(profile.layout, calibration=calibration)
@@ -211,7 +219,7 @@ class PascoDecoder:
         found = self._reader.read(b"".join(self._chunks))
         self._chunks.clear()
         for some in found:
-            self._samples.add(Samples(some.after_loss, self._arrivals.many(some.offsets), *some[2:]))
+            self._samples.add(UndatedSamples(some.after_loss, self._arrivals.many(some.offsets), *some[2:]))
         self._arrivals.forget(self._reader.framer.position)
         return self._samples.take()
 
@@ -226,10 +234,10 @@ def _profile_name(node: SettingNode) -> str:
     return str(node.path()) if is_path else node.text()
 
 
-def _calibration(node: SettingNode) -> Calibration:
+def _calibration(node: SettingNode) -> ScaleCalibration:
     axes = node.mapping(required=("x", "y", "z"))
     zeros_raw, ones_raw = zip(*(_counts_at_0_and_1_g(axes[axis]) for axis in "xyz"), strict=True)
-    return Calibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
+    return ScaleCalibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
 
 
 def _counts_at_0_and_1_g(node: SettingNode) -> tuple[float, float]:
@@ -253,7 +261,7 @@ class PascoConfig:
     baud: int = 115200
     profile: str = "lines"
     accept_unverified: bool = False
-    calibration: Calibration | None = None
+    calibration: ScaleCalibration | None = None
 
 
 class _Pasco(SerialAccelerometer[PascoConfig]):
@@ -290,9 +298,9 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
         """By the profile; frames without start bytes are distinguished by the axis that feels gravity."""
         return PascoDecoder(_mounted(load_profile(settings.profile), upright_axis), settings.calibration)
 
-    def readings(self, settings: PascoConfig) -> Readings:
+    def readings(self, settings: PascoConfig) -> ReadingQuality:
         """Fine steps, at a rate that the decoder finds out."""
-        return Readings(NOISE_MPS2)
+        return ReadingQuality(NOISE_MPS2)
 
     def facts(self, settings: PascoConfig) -> dict[str, Any]:
         """Profile and calibration."""
@@ -318,7 +326,7 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
                                                    "the settings of the recording, --config FILE, or "))
 
 
-def _mounted(profile: Profile, upright_axis: int) -> Profile:
+def _mounted(profile: WireProfile, upright_axis: int) -> WireProfile:
     """The profile for a sensor that feels gravity along this axis."""
     if not isinstance(profile.layout, FrameLayout) or profile.layout.upright_axis is None:
         return profile

@@ -22,7 +22,7 @@ from logger.files import make_folder, together
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
-from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
+from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
 from logger.store.formats.run_file import facts_beside, write_run_facts
 from logger.units import WINDOW_M
 
@@ -108,7 +108,7 @@ def _profile_beside(place: Path) -> Profile | None:
     return read_profile(profile) if place.is_dir() and profile.exists() else None
 
 
-def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
+def checked_run(run: Run | Path | str, asked: RecordRules) -> tuple[Run, EvenRecord]:
     """A run, or its file, judged and, where that was ``asked`` for, mended; and what was found.
 
     Raises BadInput as ``read_run``, and for what would give a wrong result.
@@ -337,7 +337,7 @@ def estimate(
     if step_mps2 is not None:
         ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
-    drive, checked = checked_run(run, Asked(unit, resample_hz))
+    drive, checked = checked_run(run, RecordRules(unit, resample_hz))
     found = assessed(drive, model, *sensor_of(drive, noise_mps2, step_mps2), window_m, anyway=anyway)
     return estimate_by(found, checked, str(drive.path))
 

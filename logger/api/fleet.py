@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from logger.exchange.layer import Layer
     from logger.fleet.drive_rows import Keyed
     from logger.fleet.engine import Engine
-    from logger.fleet.road_map import Pieces
+    from logger.fleet.road_map import RoadPieces
     from logger.fleet.summary import FleetFigures
 
 BY = ("segment", "section", "cell", "route")
@@ -163,7 +163,7 @@ def fleet_report(dataset: Path | str, out: Path | str, *, since: str | None = No
 
 @contextmanager
 def _summarised(folder: Path, by: str, since: str | None, until: str | None, engine: str, min_cars: int,
-                pseudonyms: bool) -> Iterator[tuple[FleetFigures, Engine, Pieces | None]]:
+                pseudonyms: bool) -> Iterator[tuple[FleetFigures, Engine, RoadPieces | None]]:
     """Figures, the engine that made them, and the map of the dataset."""
     from logger.fleet.engine import opened
     from logger.fleet.pseudonyms import names_of, shown_car
@@ -201,7 +201,7 @@ def day_us(text: str | None, option: str) -> int | None:
     return (datetime(day.year, day.month, day.day, tzinfo=UTC) - _EPOCH) // timedelta(microseconds=1)
 
 
-def _pieces(dataset: Dataset) -> Pieces | None:
+def _pieces(dataset: Dataset) -> RoadPieces | None:
     """The pieces of the map that a dataset was made with."""
     from logger.fleet.road_map import pieces_of
     from logger.store.formats.road_lines import read_road_lines

@@ -16,7 +16,7 @@ from logger.chart_data import line
 from logger.errors import BadInput
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import record_file
-from logger.store.formats.record_checks import Asked, EvenRecord, even_record, with_marks
+from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
 from logger.store.formats.run_file import facts_beside
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def comfort(
     if daily_hours is not None and not 0.0 < daily_hours <= 24.0:
         raise BadInput(f"comfort: expected more than 0 and at most 24 hours a day, found {daily_hours:g}")
     name = "record" if isinstance(record, Record) else str(record.path if isinstance(record, Run) else record)
-    ride = _even(record, name, Asked(unit, resample_hz))
+    ride = _even(record, name, RecordRules(unit, resample_hz))
     axes = {axis: ride.accel_mps2.get(f"accel_{axis}_mps2") for axis in "zxy"}
     taken_hz = None if ride.resampled is None else ride.resampled.from_hz
     try:
@@ -164,7 +164,7 @@ def _facts_of(record: Record | Run | Path | str) -> RecordFacts:
     return record.facts if isinstance(record, Run) else facts_beside(record)
 
 
-def _even(record: Record | Run | Path | str, name: str, asked: Asked) -> EvenRecord:
+def _even(record: Record | Run | Path | str, name: str, asked: RecordRules) -> EvenRecord:
     """The accelerations to weigh, checked."""
     if isinstance(record, Run):
         found = even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)

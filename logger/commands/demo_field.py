@@ -138,9 +138,9 @@ def _story(commands: _Commands, out: Path, tell: Say) -> Story:
 
 def _run(folder: Path) -> Run:
     from logger.api.drives import checked_run
-    from logger.store.formats.record_checks import Asked
+    from logger.store.formats.record_checks import RecordRules
 
-    return checked_run(folder, Asked(None, None))[0]
+    return checked_run(folder, RecordRules(None, None))[0]
 
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.api.drives import assessed, checked_run, estimate_by, sensor_of
     from logger.report.estimate_text import window_lines
     from logger.shipped import vehicle_path
-    from logger.store.formats.record_checks import Asked
+    from logger.store.formats.record_checks import RecordRules
     from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
 
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(vehicle_yaml)
     pictures, tables = parted(args.out)
     _check_files(args, vehicle_yaml)
-    drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
+    drive, checked = checked_run(args.run, RecordRules(args.unit, args.resample))
     found = assessed(drive, model, *sensor_of(drive, args.noise, args.step), window_m, warned, args.anyway)
     with together():
         files = [] if args.profile_out is None else _write_road(args.profile_out, found)

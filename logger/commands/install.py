@@ -13,7 +13,7 @@ from pathlib import Path
 import logger
 from drivers.board_serial_port import port_advice
 from logger.errors import EXIT_DONE, BadInput, RidelogError
-from logger.installation import CONFIG, PROGRAM, Installation, Step, hidden_from_services, run_command
+from logger.installation import CONFIG, PROGRAM, Installation, InstallationStep, hidden_from_services, run_command
 from logger.service.config import Config, load_config
 from logger.store.log.log_place import memory_notice
 
@@ -74,7 +74,7 @@ def _refuse_hidden(program: Path) -> None:
                            f"such as {PROGRAM.parent.parent}")
 
 
-def carry_out(steps: list[Step], args: argparse.Namespace) -> int:
+def carry_out(steps: list[InstallationStep], args: argparse.Namespace) -> int:
     """Print each step and, unless this is a dry run, take it. Raises CheckFailed or ``OSError`` at one that fails."""
     os.umask(0o022)  # the service's user reads its settings
     for step in steps:

@@ -51,7 +51,7 @@ LONG_AGO = (2015, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
-class Plan:
+class DemoDrive:
     """A drive: its folder, mean speed, how far apart bumps are and how high, in turn."""
 
     name: str
@@ -61,10 +61,10 @@ class Plan:
     seed: int
 
 
-PLANS = (Plan("slow", 6.0, 36.0, (0.05, 0.08, 0.11), 1), Plan("brisk", 11.0, 55.0, (0.04, 0.06, 0.07), 2))
+PLANS = (DemoDrive("slow", 6.0, 36.0, (0.05, 0.08, 0.11), 1), DemoDrive("brisk", 11.0, 55.0, (0.04, 0.06, 0.07), 2))
 
 
-def write_run(folder: Path, plan: Plan) -> None:
+def write_run(folder: Path, plan: DemoDrive) -> None:
     """Drive a plan and write it as a run."""
     rng = np.random.default_rng(plan.seed)
     time_s = np.arange(LASTS_S * RATE_HZ) / RATE_HZ
@@ -83,7 +83,7 @@ def write_run(folder: Path, plan: Plan) -> None:
     write_profile(folder / PROFILE, track)
 
 
-def road(plan: Plan, length_m: float) -> Track:
+def road(plan: DemoDrive, length_m: float) -> Track:
     """The street of a plan."""
     elevation = generate(_GD_N0_CM3, length_m, SPACING_M, plan.seed)
     place = SPACING_M * np.arange(len(elevation))

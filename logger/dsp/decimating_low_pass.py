@@ -23,7 +23,7 @@ _STOP_DB = 60.0
 
 
 @dataclass(frozen=True)
-class LowPass:
+class DecimatingLowPass:
     """Passes up to ``cutoff_hz`` of a record at ``rate_hz``; None passes all and keeps every sample.
 
     ValueError for a cut-off that is not above 0 and below half the rate.

@@ -51,7 +51,7 @@ _ON_COMB = 1.0  # samples: a held reading is written at the next instant
 
 
 @dataclass(frozen=True, eq=False)
-class Repeats:
+class RepeatedSamples:
     """Samples that repeat the one before.
 
     share         of all samples that repeat
@@ -103,7 +103,7 @@ def still_until_s(time_s: Array, samples: Array) -> float:
     return float(time_s[max(0, int(np.argmax(np.append(fresh_samples(samples)[1:], True))))])
 
 
-def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
+def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> RepeatedSamples | None:
     """Repeated samples (n, axes), all axes at once; None where there are none beyond chance, which
     gives some with a probability of ``false_alarm`` at most."""
     fresh = fresh_samples(samples)
@@ -114,7 +114,7 @@ def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | 
     chance = chernoff(still, stretches, CHANCE_STILL)
     if chance > false_alarm:
         return None
-    return Repeats(share, chance, fresh, _period(np.flatnonzero(fresh)))
+    return RepeatedSamples(share, chance, fresh, _period(np.flatnonzero(fresh)))
 
 
 def find_holds(time_s: Array, samples: Array, false_alarm: float = FALSE_ALARM) -> Bools:
@@ -199,7 +199,7 @@ def _period(places: npt.NDArray[np.int64]) -> float:
     return float(gaps[gaps <= np.quantile(gaps, _OUTER) + 1].mean())
 
 
-def fresh_times(repeats: Repeats, t_s: Array) -> Array:
+def fresh_times(repeats: RepeatedSamples, t_s: Array) -> Array:
     """When the new samples (m,) of a record with times (n,) [s] were taken: on an even grid where theirs can be one,
     for a held reading is written up to a sample late; else when they were written."""
     places = np.flatnonzero(repeats.fresh)

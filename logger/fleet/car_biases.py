@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.fleet.road_elimination import Codes, Elimination, Passes
+from logger.fleet.road_elimination import Codes, Elimination, RoadPasses
 
 Array = npt.NDArray[np.float64]
 
@@ -88,7 +88,7 @@ class Variances:
         """What draws a road's own growth to zero, in passes times years squared."""
         return (self.of_pass + self.of_session) / self.of_growth if self.of_growth > 0 else np.inf
 
-    def weights(self, passes: Passes) -> Array:
+    def weights(self, passes: RoadPasses) -> Array:
         """Of passes (n,), over the inverse of a pass's own variance: a session of k passes weighs
         k / (1 + k of_session / of_pass)."""
         if not self.of_pass + self.of_session > 0:
@@ -97,7 +97,7 @@ class Variances:
         return passes.count / (1.0 - share + share * passes.of_session)[passes.session]
 
 
-def car_biases(passes: Passes, cars: int) -> CarBiases:
+def car_biases(passes: RoadPasses, cars: int) -> CarBiases:
     """The biases of so many cars."""
     variances = Variances(0.0, 0.0, 0.0)
     design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
@@ -122,7 +122,7 @@ def car_biases(passes: Passes, cars: int) -> CarBiases:
                      repeats, needed)
 
 
-def _repeats(passes: Passes, cars: int) -> int:
+def _repeats(passes: RoadPasses, cars: int) -> int:
     """By how much sessions and roads have more degrees of freedom than cars and roads: the rank of their columns is
     their number less that of the parts that hang together."""
     from scipy.sparse import csr_matrix

@@ -73,7 +73,7 @@ class Commit:
 
 
 @dataclass(frozen=True)
-class Manifest:
+class DatasetManifest:
     """What counts in a dataset.
 
     roads    SHA-256 of the map that keys were made with; empty: cells
@@ -147,9 +147,9 @@ class Dataset:
         ledger_path = f"ledger/{name}.parquet"
         self._write(ledger_path, pyarrow.table({one: list(ledger[one]) for one in _LEDGER}))
         commit = Commit(name, ledger_path, sum(one.rows for one in files), files)
-        self._replace(Manifest(roads, trim_m, (*self.manifest.commits, commit)))
+        self._replace(DatasetManifest(roads, trim_m, (*self.manifest.commits, commit)))
 
-    def _replace(self, manifest: Manifest) -> None:
+    def _replace(self, manifest: DatasetManifest) -> None:
         content = {"ridelog_fleet": _FORMAT, **asdict(manifest)}
         replace_bytes(self.folder / _MANIFEST, json.dumps(content, separators=(",", ":")).encode())
         self.manifest = manifest
@@ -191,10 +191,10 @@ class Dataset:
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
 
-    def _read(self) -> Manifest:
+    def _read(self) -> DatasetManifest:
         path = self.folder / _MANIFEST
         if not path.exists():
-            return Manifest()
+            return DatasetManifest()
         try:
             content = json.loads(read_bounded(path, _MAX_BYTES))
             if content["ridelog_fleet"] != _FORMAT:
@@ -203,7 +203,7 @@ class Dataset:
                 DataFile(_inside(file["path"], _ROWS_PATH), int(file["rows"]), int(file["first_day"]),
                          int(file["last_day"]))
                 for file in one["files"])) for one in content["commits"])
-            return Manifest(str(content["roads"]), float(content["trim_m"]), commits)
+            return DatasetManifest(str(content["roads"]), float(content["trim_m"]), commits)
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             raise BadInput(f"{path}: expected the manifest of a fleet's dataset, format {_FORMAT}") from None
 

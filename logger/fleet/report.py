@@ -13,7 +13,7 @@ from logger.fleet.engine import Engine
 from logger.fleet.expressions import history
 from logger.fleet.layer import roads_layer
 from logger.fleet.page import fleet_page
-from logger.fleet.road_map import Pieces
+from logger.fleet.road_map import RoadPieces
 from logger.fleet.summary import FleetFigures, gains_table, grouped
 from logger.fleet.tiles import History, write_tiles
 
@@ -40,7 +40,7 @@ def history_of(engine: Engine, figures: FleetFigures, since_us: int | None, unti
     return History(at[published], found["quarter"][published], found["iri"][published] / passes, passes)
 
 
-def write_report(figures: FleetFigures, steps: History, pieces: Pieces | None, out: Path) -> int:
+def write_report(figures: FleetFigures, steps: History, pieces: RoadPieces | None, out: Path) -> int:
     """Write the folder, of figures by segment; give the number of tiles. BadInput for what cannot be written."""
     sections = grouped(figures.roads, "section", pieces, figures.shared)
     try:

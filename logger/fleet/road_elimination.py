@@ -30,7 +30,7 @@ _LEAST_INFORMATION = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Passes:
+class RoadPasses:
     """Passes over roads (n,), those of one session over one road together.
 
     road, session    codes from 0
@@ -61,7 +61,7 @@ class Elimination:
     """Passes with weights (n,), of so many cars. ``ridge``: what draws a road's own growth to zero, in passes times
     years squared; infinity: roads have none."""
 
-    def __init__(self, passes: Passes, cars: int, weight: Array, ridge: float) -> None:
+    def __init__(self, passes: RoadPasses, cars: int, weight: Array, ridge: float) -> None:
         self.passes, self.cars, self.weight = passes, cars, weight
         self.car, road = passes.car, passes.road
         self.roads = int(road.max()) + 1

@@ -34,7 +34,7 @@ _FAR = 25.0
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class RoadPieces:
     """Pieces of roads (k,), as long as ``SEGMENT_M`` or, at the end of a road, shorter.
 
     road               its line in the file, from 0
@@ -56,7 +56,7 @@ class Pieces:
         return np.degrees(np.arctan2(east, np.diff(self.lat_deg)[:, 0])) % 360.0
 
 
-def pieces_of(lines: Sequence[tuple[Array, Array]]) -> Pieces:
+def pieces_of(lines: Sequence[tuple[Array, Array]]) -> RoadPieces:
     """Lines of latitudes and longitudes (n,) [degrees] in pieces; a line without length has none.
     ValueError where no line has a length."""
     found: list[tuple[Array, ...]] = []
@@ -74,13 +74,13 @@ def pieces_of(lines: Sequence[tuple[Array, Array]]) -> Pieces:
     if not found:
         raise ValueError("expected a line with a length")
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
-    return Pieces(columns[0].astype(np.intp), *columns[1:])
+    return RoadPieces(columns[0].astype(np.intp), *columns[1:])
 
 
 class RoadMap:
     """Finds the roads of a map. ``keys`` is what ``drive_rows`` wants."""
 
-    def __init__(self, pieces: Pieces) -> None:
+    def __init__(self, pieces: RoadPieces) -> None:
         from scipy.spatial import cKDTree
 
         self.pieces = pieces

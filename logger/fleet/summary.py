@@ -14,9 +14,9 @@ from logger.fleet.engine import Engine
 from logger.fleet.expressions import cars as car_sums
 from logger.fleet.expressions import passes_by_car, passes_by_session, roads
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
-from logger.fleet.road_elimination import Passes
+from logger.fleet.road_elimination import RoadPasses
 from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
-from logger.fleet.road_map import Pieces
+from logger.fleet.road_map import RoadPieces
 from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
 
@@ -103,7 +103,7 @@ class FleetFigures:
 
 
 def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | None, least_cars: int,
-              pieces: Pieces | None, name_of: Callable[[int], str]) -> FleetFigures | None:
+              pieces: RoadPieces | None, name_of: Callable[[int], str]) -> FleetFigures | None:
     """Figures of a time [us since 1970, half-open]; None where no pass lies in it.
 
     by        segment, section, cell or route
@@ -143,13 +143,13 @@ def _sample(engine: Engine, since_us: int | None, until_us: int | None, passes: 
         one_in = -(-one_in // 2)
 
 
-def as_passes(sample: Mapping[str, npt.NDArray[Any]], cars: Keys) -> Passes:
+def as_passes(sample: Mapping[str, npt.NDArray[Any]], cars: Keys) -> RoadPasses:
     """Passes by road, car and session; in a fixed order, so that sums do not depend on the engine."""
     order = np.lexsort((sample["road"], sample["session"], sample["car"]))
     road, car, session, count, iri, years = (sample[name][order] for name in (
         "road", "car", "session", "passes", "iri", "years"))
     new = np.append(True, (np.diff(car) != 0) | (np.diff(session) != 0))[: len(car)]
-    return Passes(np.unique(road, return_inverse=True)[1], np.cumsum(new) - 1, np.searchsorted(cars, car[new]),
+    return RoadPasses(np.unique(road, return_inverse=True)[1], np.cumsum(new) - 1, np.searchsorted(cars, car[new]),
                   count.astype(np.float64), iri, years)
 
 
@@ -161,7 +161,7 @@ def gains_table(cars: Keys, biases: CarBiases) -> Any:
     return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
 
 
-def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:
+def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: RoadPieces | None) -> RoadTable:
     passes = sums["passes"].astype(np.float64)
     figures = road_figures(Sums(passes, *(sums[name] for name in (
         "years", "years_square", "iri", "iri_years", "iri_square", "bias_square"))), pass_std)
@@ -195,7 +195,7 @@ def piece_of(key: Keys) -> npt.NDArray[np.intp]:
     return ((key & ~ON_MAP) >> 1).astype(np.intp)
 
 
-def group_keys(segments: RoadTable, by: str, pieces: Pieces | None) -> Keys:
+def group_keys(segments: RoadTable, by: str, pieces: RoadPieces | None) -> Keys:
     """The section, cell or route that each segment belongs to; -1: to no route."""
     key = segments.key
     on_map = (key & ON_MAP) != 0
@@ -210,7 +210,7 @@ def group_keys(segments: RoadTable, by: str, pieces: Pieces | None) -> Keys:
     return out
 
 
-def grouped(segments: RoadTable, by: str, pieces: Pieces | None, shared: float) -> RoadTable:
+def grouped(segments: RoadTable, by: str, pieces: RoadPieces | None, shared: float) -> RoadTable:
     """Segments as they are, or put together: means by length. Of the variance of a segment's error so much is
     ``shared`` with the others, as if the same sessions had driven all of them; the rest is its own."""
     if by == "segment":

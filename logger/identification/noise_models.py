@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.decimating_low_pass import DecimatingLowPass
 from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
 
 Array = npt.NDArray[np.float64]
@@ -73,7 +73,7 @@ class Whitening:
 class Noise(Protocol):
     """A kind of noise."""
 
-    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
+    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
         """The noise that these residuals (behind the low-pass) of a model with these values are most likely from.
 
         Its deviation is never below ``floor``.
@@ -83,7 +83,7 @@ class Noise(Protocol):
 class White:
     """Every sample by itself."""
 
-    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
+    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
         """As ``Noise``."""
         shape = PredictionWhitener(np.zeros((0, 0)), np.ones(1))
         if low_pass.cutoff_hz is not None:
@@ -101,7 +101,7 @@ class Autoregressive:
 
     order: int | None = None
 
-    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
+    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
         """As ``Noise``. The order is at most 60, and a twentieth of the samples."""
         count = sum(map(len, residuals))
         most = min(_MOST_ORDER, count // _SAMPLES_PER_ORDER) if self.order is None else self.order
@@ -128,7 +128,7 @@ class RoadNoise:
 
     spectra: Callable[[Array, Array], list[Array]]
 
-    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
+    def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
         """As ``Noise``. The two levels are those of Whittle's likelihood of the residuals' tapered transforms."""
         rate_hz = low_pass.kept_hz
         f_hz = _grid(rate_hz)
@@ -151,7 +151,7 @@ def _grid(rate_hz: float) -> Array:
     return np.arange(_GRID // 2 + 1) * rate_hz / _GRID
 
 
-def _behind(low_pass: LowPass, spectra: Callable[[Array], list[Array]]) -> list[Array]:
+def _behind(low_pass: DecimatingLowPass, spectra: Callable[[Array], list[Array]]) -> list[Array]:
     """Spectra behind the low-pass, with what folds down as fewer samples are kept."""
     f_hz = _grid(low_pass.kept_hz)
     if low_pass.kept_hz == low_pass.rate_hz:
@@ -161,7 +161,7 @@ def _behind(low_pass: LowPass, spectra: Callable[[Array], list[Array]]) -> list[
     return [gain * one + gain_above * other for one, other in zip(spectra(f_hz), spectra(above_hz), strict=True)]
 
 
-def _sensor_shape(low_pass: LowPass) -> Array:
+def _sensor_shape(low_pass: DecimatingLowPass) -> Array:
     """One-sided spectrum (f,) of white noise of power 1 before the low-pass, behind it [1/Hz]."""
     return _behind(low_pass, lambda f_hz: [np.full_like(f_hz, 2 / low_pass.rate_hz)])[0]
 

@@ -23,7 +23,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.decimating_low_pass import DecimatingLowPass
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
     NOTHING_BY_DIFFERENCES,
@@ -144,7 +144,7 @@ class Fit:
     residuals: list[Array]
     white: list[Array]
     sensitivities: Array
-    low_pass: LowPass
+    low_pass: DecimatingLowPass
     noise: Whitening
     verdict: list[Finding]
     converged: bool
@@ -233,7 +233,7 @@ class _FitProblem:
         self.free = list(self.model.parameters)
         if not self.free:
             raise ValueError("expected at least one free number")
-        self.low_pass = LowPass(self.options.rate_hz, self.options.low_pass_hz)
+        self.low_pass = DecimatingLowPass(self.options.rate_hz, self.options.low_pass_hz)
         self.coordinates = Coordinates(self.free)
         self.low, self.high = self.coordinates.low, self.coordinates.high
         self.exact = isinstance(self.model, DifferentiablePredictor) and self.model.exact

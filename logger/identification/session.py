@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.decimating_low_pass import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel
 from logger.identification.frequency_domain_model import VehicleModel
@@ -103,7 +103,7 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
     ``UnusableRun`` for a record that is too short for the low pass.
     """
     rate_hz = model.records[0].rate_hz
-    reach = LowPass(rate_hz, low_pass_hz).reach
+    reach = DecimatingLowPass(rate_hz, low_pass_hz).reach
     for run, measured in enumerate(model.measured):
         if len(measured) <= reach:
             raise UnusableRun(run, f"expected more than {reach} samples for --low-pass {low_pass_hz:g}, found "

@@ -59,7 +59,7 @@ class UnlikeCar(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class Periodograms:
     """Periodograms of the pieces of a record.
 
     power        (j, f) one-sided [unit^2/Hz]; ``bins`` (f,) whole numbers of ``step_hz``
@@ -77,7 +77,7 @@ class Pieces:
     worth: Array
 
 
-def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float) -> Pieces:
+def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float) -> Periodograms:
     """Cut a record (n,) into tapered pieces that overlap by half, of which each has readings, and moves, all along.
 
     ValueError for fewer than four.
@@ -103,7 +103,7 @@ def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], r
     both = taper[:count // 2] ** 2 + taper[count // 2:] ** 2  # what two pieces make of an instant
     worth = float(both.mean() ** 2 / (both**2).mean()) / 2
     waves = bins * (rate_hz / count) / speed_mps[index].min(axis=1)[:, None]
-    return Pieces(power[:, bins], bins, rate_hz / count, shares,
+    return Periodograms(power[:, bins], bins, rate_hz / count, shares,
                   np.asarray(np.bincount(where.ravel(), speed_mps[index].ravel()) / np.bincount(where.ravel())),
                   kernel / kernel.sum(), np.where(waves <= HIGHEST_CPM, worth, 0.0))
 
@@ -111,7 +111,7 @@ def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], r
 class CarOnRoads:
     """The expected periodograms by all numbers but the levels: logarithms (p,) of the car's, the waviness, ln s^2."""
 
-    def __init__(self, vehicle: Vehicle, pieces: Pieces, rate_hz: float) -> None:
+    def __init__(self, vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> None:
         free_numbers = [free(vehicle, name) for name in fitted_names(vehicle)]
         self.car, self.pieces = AxleResponse(vehicle, free_numbers, rate_hz), pieces
         self._half_hz = pieces.step_hz / 2 * np.arange(2 * pieces.bins[0] - _KERNEL, 2 * pieces.bins[-1] + _KERNEL + 1)
@@ -160,7 +160,7 @@ def fitted_names(vehicle: Vehicle) -> list[str]:
     return [name for name in names_of(vehicle) if name in whole and read(vehicle, name) > 0]
 
 
-def fit_car(vehicle: Vehicle, pieces: Pieces, rate_hz: float) -> CarFit:
+def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
     """The numbers that make the periodograms most probable: from the vehicle's own, and from those that fit
     best where a floor of noise hides first all but the loudest parts of the spectrum, then fewer: with the deep gaps
     between them in sight from the beginning, many sets of numbers are the best near them. ``UnlikeCar`` where the
@@ -221,7 +221,7 @@ def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> t
     return x, spectrum, information, here, settled
 
 
-def _shares(pieces: Pieces, spectrum: Array) -> tuple[Array, Array]:
+def _shares(pieces: Periodograms, spectrum: Array) -> tuple[Array, Array]:
     """Measured over expected power in bands. ``UnlikeCar`` where that is neither chance nor a trifle."""
     f_hz, worth = pieces.bins * pieces.step_hz, pieces.worth.sum(axis=0)
     edges = np.unique(np.searchsorted(f_hz, np.geomspace(f_hz[0], f_hz[-1], _BANDS + 1)[:-1]))

@@ -36,7 +36,7 @@ PRINTED_RMS = (0.0458, 0.0445)
 
 
 @dataclass(frozen=True)
-class Sensor:
+class FloorSensor:
     """A recorder of acceleration: its gain, its own noise and its step [g]."""
 
     name: str
@@ -46,14 +46,14 @@ class Sensor:
 
 
 # Steps of PASCO's data sheet and of 6 bits over +-2 g; the noise is assumed, 2 mg per root Hz for the chip.
-SENSORS = (Sensor("PS-2119", 1.0, 0.003, 0.010), Sensor("BMA220 at 2 g", 0.98, 0.014, 0.0625))
+SENSORS = (FloorSensor("PS-2119", 1.0, 0.003, 0.010), FloorSensor("BMA220 at 2 g", 0.98, 0.014, 0.0625))
 
 
 @dataclass(frozen=True)
-class Compared:
+class SensorRecord:
     """One sensor's record: r.m.s. [g], peaks of its spectrum [Hz], damping by decrement."""
 
-    sensor: Sensor
+    sensor: FloorSensor
     rms_g: float
     peaks_hz: tuple[float, ...]
     decrement: Decrement
@@ -84,22 +84,22 @@ def released(building: Masses, samples: int = round(DURATION_S * RATE_HZ)) -> Ar
     return accel * FIRST_PEAK_G * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
 
 
-def recorded(accel_mps2: Array, sensor: Sensor, seed: int) -> Array:
+def recorded(accel_mps2: Array, sensor: FloorSensor, seed: int) -> Array:
     """What a sensor makes of an acceleration (n,): [m/s2], noisy and in steps."""
     rng = np.random.default_rng(seed)
     in_g = sensor.gain * accel_mps2 / STANDARD_GRAVITY_MPS2 + sensor.noise_g * rng.standard_normal(len(accel_mps2))
     return np.asarray(np.round(in_g / sensor.step_g) * sensor.step_g * STANDARD_GRAVITY_MPS2)
 
 
-def compare_sensors(seed: int = 1) -> tuple[Compared, ...]:
+def compare_sensors(seed: int = 1) -> tuple[SensorRecord, ...]:
     """Both sensors clamped to the top floor of the same simulated decay, as Tables 5.1, 5.2 and Eq 5.3 compare them."""
     top = released(structure())[:, 4]
     return tuple(_figures(recorded(top, sensor, seed + number), sensor) for number, sensor in enumerate(SENSORS))
 
 
-def _figures(accel_mps2: Array, sensor: Sensor) -> Compared:
+def _figures(accel_mps2: Array, sensor: FloorSensor) -> SensorRecord:
     in_g = accel_mps2 / STANDARD_GRAVITY_MPS2
-    return Compared(sensor, float(np.sqrt((in_g**2).mean())), _peaks_hz(in_g), log_decrement(in_g, RATE_HZ))
+    return SensorRecord(sensor, float(np.sqrt((in_g**2).mean())), _peaks_hz(in_g), log_decrement(in_g, RATE_HZ))
 
 
 def _peaks_hz(accel: Array) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from logger.records import WindowRecord
 from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.laid_traces import lay
-from logger.roads.places_to_visit import Place, places_to_visit
+from logger.roads.places_to_visit import PlaceToVisit, places_to_visit
 from logger.roads.repeated_drives import (
     Changes,
     Means,
@@ -66,7 +66,7 @@ class CombinedDrives:
     heading_deg: Array
     change: Changes | None
     trend: Trends
-    visits: tuple[Place, ...]
+    visits: tuple[PlaceToVisit, ...]
 
 
 def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km: float,

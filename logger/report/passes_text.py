@@ -13,7 +13,7 @@ from logger.printable import counted
 from logger.report.combined_drives import CombinedDrives
 from logger.report.quantities import known
 from logger.report.terminal import comfort_words
-from logger.roads.places_to_visit import Place
+from logger.roads.places_to_visit import PlaceToVisit
 from logger.roads.repeated_drives import Changes
 from logger.store.log.log_reader import iso_utc
 from logger.units import US_PER_S
@@ -150,7 +150,7 @@ def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
     return values
 
 
-def visit_values(found: CombinedDrives, one: Place) -> dict[str, Any]:
+def visit_values(found: CombinedDrives, one: PlaceToVisit) -> dict[str, Any]:
     """A place to visit by the names of its columns: where its worst cell is, and the figures of that."""
     values = cell_values(found, one.worst)
     a_w = values["a_w_mps2"]

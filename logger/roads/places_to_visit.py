@@ -25,7 +25,7 @@ BUMP_M = 30.0
 
 
 @dataclass(frozen=True)
-class Place:
+class PlaceToVisit:
     """A place of cells from one to before another of the means.
 
     kind                single bump, rough stretch or comfort only
@@ -45,7 +45,7 @@ class Place:
 
 
 def places_to_visit(mean: Means, a_w_mps2: Array, a_w_std_mps2: Array, length_m: float, above_m_per_km: float
-                    ) -> tuple[Place, ...]:
+                    ) -> tuple[PlaceToVisit, ...]:
     """The places of means over cells of a length (k,), those first that are furthest above their limit.
 
     a_w_mps2, a_w_std_mps2    of the cells; NaN: not known
@@ -62,7 +62,7 @@ def places_to_visit(mean: Means, a_w_mps2: Array, a_w_std_mps2: Array, length_m:
         worst = int(row[np.argmax(excess)])
         reach_m = len(row) * length_m
         kind = COMFORT if comfort else BUMP if reach_m <= max(BUMP_M, length_m) else STRETCH
-        place = Place(kind, tuple(row.tolist()), worst, reach_m, float((felt if comfort else rough)[worst]),
+        place = PlaceToVisit(kind, tuple(row.tolist()), worst, reach_m, float((felt if comfort else rough)[worst]),
                       int(mean.drives[worst]))
         found.append((-float(excess.max()), worst, place))
     return tuple(place for _, _, place in sorted(found, key=lambda one: one[:2]))

@@ -25,7 +25,7 @@ REPORTED_FROM_STDS = 2.0
 
 
 @dataclass(frozen=True)
-class Comfort:
+class ComfortFigures:
     """``ride`` without the noise, the word for it, and whether it hides in noise and rounding."""
 
     ride: RideFigures
@@ -33,7 +33,7 @@ class Comfort:
     is_hidden: bool
 
 
-NO_COMFORT = Comfort(NO_FIGURES, "", False)
+NO_COMFORT = ComfortFigures(NO_FIGURES, "", False)
 
 
 class ComfortColumns:
@@ -44,7 +44,7 @@ class ComfortColumns:
         self._noise_mps2 = sensor.noise_rms_mps2
         self._is_coarse = sensor.is_coarse
 
-    def of(self, window: Window, estimate: WindowEstimate | None, noise: NoiseBelief | None) -> Comfort:
+    def of(self, window: Window, estimate: WindowEstimate | None, noise: NoiseBelief | None) -> ComfortFigures:
         """What can be said of a window. ``noise`` is what is believed of the sensor's; None: what the settings say."""
         if not isfinite(window.a_w_mps2):
             return NO_COMFORT
@@ -57,7 +57,7 @@ class ComfortColumns:
             raw = RawFigures(window.samples, window.accel_rms_mps2, window.a_w_mps2, window.mtvv_mps2,
                              window.vdv_mps175)
             ride = self._floor.without(raw, noise_mps2, log_std)
-        return Comfort(ride, *word_of(ride.a_w, self._floor.most_hidden_mps2(noise_mps2)))
+        return ComfortFigures(ride, *word_of(ride.a_w, self._floor.most_hidden_mps2(noise_mps2)))
 
 
 def word_of(a_w: Uncertain, most_hidden_mps2: float) -> tuple[str, bool]:

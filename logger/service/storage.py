@@ -18,7 +18,7 @@ from logger.service.status import StorageStatus
 from logger.store.export.export_marks import exported_names
 from logger.store.export.pairing import NOT_PAIRED, Pairing
 from logger.store.log.disk_quota import DiskQuota, QuotaLimits
-from logger.store.log.dump_recording import Recording, repair_recordings
+from logger.store.log.dump_recording import DumpRecording, repair_recordings
 from logger.store.log.log_writer import SegmentLog, next_session, repair
 from logger.store.log.outage_buffer import BufferedLog
 from logger.store.log.quarantine import names_set_aside
@@ -55,7 +55,7 @@ class Storage:
         self._look()
         self.log = BufferedLog(self._begin, now_us)
         self._recording = (
-            Recording(directory, header, lambda: self.log.session, now_us, self._files) if header else None
+            DumpRecording(directory, header, lambda: self.log.session, now_us, self._files) if header else None
         )
 
     def record(self, event: Event) -> None:

@@ -22,7 +22,7 @@ from logger.installation import (
     PROGRAM,
     RECORD,
     Installation,
-    Step,
+    InstallationStep,
     hidden_from_services,
     run_command,
 )
@@ -52,7 +52,7 @@ def installation(root: Path, ran: list[tuple[str, ...]], program: Path = PROGRAM
     return Installation(root, program, lambda words: ran.append(tuple(words)))
 
 
-def take(steps: list[Step]) -> list[str]:
+def take(steps: list[InstallationStep]) -> list[str]:
     for step in steps:
         if step.act is not None:
             step.act()

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from drivers.dated_samples import DatedSamples, Samples
+from drivers.dated_samples import DatedSamples, UndatedSamples
 
 SECONDS = 60
 
@@ -19,7 +19,7 @@ def dated(taken_us: npt.NDArray[np.float64], burst: int) -> tuple[DatedSamples, 
     found, age_s = [], []
     for end in range(burst, len(taken_us) + 1, burst):
         now_us = int(taken_us[end - 1] + rng.uniform(0, 3000))
-        samples.add(Samples(False, np.full(burst, now_us), np.ones((burst, 3)), np.zeros(burst, bool),
+        samples.add(UndatedSamples(False, np.full(burst, now_us), np.ones((burst, 3)), np.zeros(burst, bool),
                             np.ones(burst, bool)))
         times_us = samples.take().t_us
         found.append(times_us)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from drivers.accelerometers.pasco import PascoDecoder
 from drivers.errors import SettingsError
 from drivers.sample_clock import NO_TIME, SampleClock
-from drivers.wire_profiles import Calibration, load_profile, shipped_profiles
+from drivers.wire_profiles import ScaleCalibration, load_profile, shipped_profiles
 
 G_MPS2 = 9.80665
 
@@ -173,13 +173,13 @@ def test_counts_become_accelerations():
 
 def test_a_unit_has_its_own_calibration():
     values = counts(60)
-    own = Calibration((4100, 4090, 4096), (4430, 4420, 4420))
+    own = ScaleCalibration((4100, 4090, 4096), (4430, 4420, 4420))
     _, accel, _, _ = decode("ps2119", even_drive(values), own)
     assert accel == pytest.approx((values - (4100, 4090, 4096)) / (330, 330, 324) * G_MPS2)
     with pytest.raises(SettingsError, match="no calibration"):
         PascoDecoder(load_profile("lines"), own)
     with pytest.raises(SettingsError, match="a count or more"):
-        Calibration((1, 2, 3), (4, 5, 3))
+        ScaleCalibration((1, 2, 3), (4, 5, 3))
 
 
 def test_the_ends_of_the_range_are_clipped_and_beyond_is_no_sample():

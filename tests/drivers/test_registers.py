@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import BadReply, SettingsError
-from drivers.registers import Field, Register, ToggleRegister
+from drivers.registers import Register, RegisterField, ToggleRegister
 
-MIDDLE = Field("middle", 5, 3)
-TOP = Field("top", 7, 7)
+MIDDLE = RegisterField("middle", 5, 3)
+TOP = RegisterField("top", 7, 7)
 SOME = Register("some", 0x22)
 
 
@@ -43,7 +43,7 @@ def test_a_field_takes_its_bits_and_no_others() -> None:
 @settings(max_examples=100)
 @given(byte=st.integers(0, 255), value=st.integers(-300, 300), low=st.integers(0, 7), more=st.integers(0, 7))
 def test_any_field_of_any_byte(byte: int, value: int, low: int, more: int) -> None:
-    field = Field("any", min(7, low + more), low)
+    field = RegisterField("any", min(7, low + more), low)
     if not 0 <= value < 2 ** (field.high_bit - low + 1):
         with pytest.raises(SettingsError, match="any takes 0 to"):
             field.insert(byte, value)
@@ -58,7 +58,7 @@ def test_any_field_of_any_byte(byte: int, value: int, low: int, more: int) -> No
 def test_a_field_lies_inside_a_byte() -> None:
     for high, low in ((8, 0), (3, 4), (2, -1)):
         with pytest.raises(ValueError, match="not inside a byte"):
-            Field("wrong", high, low)
+            RegisterField("wrong", high, low)
 
 
 def test_update_leaves_the_other_bits_as_they_were() -> None:

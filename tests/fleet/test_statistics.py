@@ -10,7 +10,7 @@ from scipy import stats
 
 from logger.fleet.car_biases import Variances, car_biases
 from logger.fleet.road_cells import SEGMENT_M, block_of, cell_keys, cells, section_of
-from logger.fleet.road_elimination import Elimination, Passes
+from logger.fleet.road_elimination import Elimination, RoadPasses
 from logger.fleet.road_figures import Sums, road_figures, significant
 from logger.fleet.road_map import RoadMap, pieces_of
 from logger.geodesy import EARTH_RADIUS_M, ground_distance_m
@@ -22,7 +22,7 @@ SESSION_STD, PASS_STD = 0.05, 0.1
 class Drawn:
     """Passes of cars over roads, in sessions, and the truth that they were drawn from."""
 
-    passes: Passes
+    passes: RoadPasses
     log_gain: np.ndarray
     level: np.ndarray
     growth: np.ndarray
@@ -49,7 +49,7 @@ def drawn_passes(cars: int, roads: int, sessions: int, mean_size: float, seed: i
     error = SESSION_STD * rng.normal(size=sessions)[session] + PASS_STD * rng.normal(size=len(session))
     iri = level[road] * (1 + growth[road] * (years[session] - 1)) * np.exp(log_gain[car[session]]) * (1 + noise * error)
     assert len(np.unique(road)) == roads
-    return Drawn(Passes(road, session, car, np.ones(len(road)), iri, years[session]), log_gain, level, growth)
+    return Drawn(RoadPasses(road, session, car, np.ones(len(road)), iri, years[session]), log_gain, level, growth)
 
 
 def test_biases_means_and_changes_have_the_errors_that_they_say() -> None:
@@ -163,7 +163,7 @@ def test_cars_that_share_no_road_are_compared_with_none() -> None:
     car_of_session = np.append(np.repeat([0, 1], 8), [2])
     iri = np.where(road == 0, 2.0, 3.0) * np.where(car_of_session[np.arange(33) // 2] == 1, 1.1, 1.0)
     iri *= 1 + 0.01 * np.random.default_rng(1).normal(size=33)
-    found = car_biases(Passes(road, np.arange(33) // 2, car_of_session, np.full(33, 9.0), iri, np.zeros(33)), 4)
+    found = car_biases(RoadPasses(road, np.arange(33) // 2, car_of_session, np.full(33, 9.0), iri, np.zeros(33)), 4)
     assert found.known.tolist() == [True, True, False, False]
     assert found.gain == pytest.approx([1 / 1.1**0.5, 1.1**0.5, 1, 1], abs=0.01)
     assert found.log_std[2] == pytest.approx(np.log(1.1) / 2**0.5, abs=0.01)
@@ -181,7 +181,7 @@ def test_what_few_drives_cannot_show_is_empty_and_all_else_is_near_the_truth(car
     error = SESSION_STD * rng.normal(size=sessions)[session] + PASS_STD * rng.normal(size=len(session))
     iri = rng.uniform(1, 6, roads)[road] * np.exp(log_gain[car_of_session[session]]) * (1 + error)
     years = rng.uniform(0, 1, sessions)
-    found = car_biases(Passes(road, session, car_of_session, np.ones(len(road)), iri, years[session]), cars)
+    found = car_biases(RoadPasses(road, session, car_of_session, np.ones(len(road)), iri, years[session]), cars)
     is_timed = drives > 1
     assert (found.repeats, found.needed) == (cars * (drives - 1), 6 + is_timed)
     enough = cars * (drives - 1) - 1 >= 6

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.dump import open_dump
 from drivers.errors import DriverError, SettingsError
-from drivers.wire_profiles import Calibration, load_profile, shipped_profiles
+from drivers.wire_profiles import ScaleCalibration, load_profile, shipped_profiles
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import load_config
@@ -104,7 +104,7 @@ def test_every_complaint_about_a_profile_names_its_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize("one_g_raw", [1e-320, 0.5, float("inf"), float("nan")])
 def test_a_scale_is_a_number(one_g_raw: float) -> None:
     with pytest.raises(SettingsError, match="calibration"):
-        Calibration((0, 0, 0), (1, 1, one_g_raw))
+        ScaleCalibration((0, 0, 0), (1, 1, one_g_raw))
 
 
 RECORD = WindowRecord(

@@ -8,12 +8,12 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.decimating_low_pass import DecimatingLowPass
 from logger.identification.noise_models import Autoregressive, RoadNoise, White, Whitening
 
 Array = npt.NDArray[np.float64]
 
-ALL = LowPass(100.0)
+ALL = DecimatingLowPass(100.0)
 NOTHING = np.empty(0)
 
 
@@ -94,7 +94,7 @@ def test_the_criterion_prefers_what_the_noise_is() -> None:
 
 
 def test_behind_a_low_pass_white_noise_and_roads_stay_what_they_are() -> None:
-    low = LowPass(100.0, 20.0)
+    low = DecimatingLowPass(100.0, 20.0)
     white = low.apply(0.2 * np.random.default_rng(3).standard_normal(6000))
     plain = White().fitted([white], NOTHING, low, 1e-9)
     samples = plain([white])

@@ -30,7 +30,7 @@ from copy import copy
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.decimating_low_pass import DecimatingLowPass
 from logger.identification.noise_models import RoadNoise
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
 from logger.identification.unknown_road.relative_placement import best_placement
@@ -99,7 +99,7 @@ class UnknownRoad:
                 found.append(gain * displacement_psd(f / speed, 1.0, waviness) / speed)
             return found
 
-        low_pass = LowPass(self.drives[0].rate_hz, None)
+        low_pass = DecimatingLowPass(self.drives[0].rate_hz, None)
         measured = [self.measured[number] for number in which]
         levels = RoadNoise(spectra).fitted(measured, values, low_pass, 1e-3 * self.size_mps2).levels
         return levels[GD_N0], levels["deviation_mps2"]

@@ -13,7 +13,7 @@ def _least_lag_s(tested: ResidualEvidence) -> float:
     return 1 / (3 * tested.residuals.rate_hz)
 
 
-class Drift(ResidualTest):
+class DriftTest(ResidualTest):
     """A lag that grows along the way."""
 
     name, unit, road = "drift", "m/m", True
@@ -34,7 +34,7 @@ class Drift(ResidualTest):
                 "scale error. All other findings may come from that alone.")
 
 
-class Shift(ResidualTest):
+class ShiftTest(ResidualTest):
     """A constant lag; not tested where it drifts. A lag by a constant length is a wrong place, no part of the car."""
 
     name, of_placement = "shift", True
@@ -60,5 +60,5 @@ class Shift(ResidualTest):
         return f"The measurement {'lags' if time_s > 0 else 'leads'} the model by {words}."
 
 
-DRIFT = Drift()
-TESTS = ResidualTests("alignment", (DRIFT, Shift()))
+DRIFT = DriftTest()
+TESTS = ResidualTests("alignment", (DRIFT, ShiftTest()))

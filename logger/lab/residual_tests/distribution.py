@@ -23,7 +23,7 @@ _TONE_HZ = 0.4
 """On either side of a line, whose neighbours it is compared with: about what a spectrum of segments resolves."""
 
 
-class Whiteness(ResidualTest):
+class WhitenessTest(ResidualTest):
     """The largest autocorrelation; one of 0.1 explains a hundredth of the power from a sample before. Filtered
     residuals are not tested: they are not white, whatever they were."""
 
@@ -46,7 +46,7 @@ class Whiteness(ResidualTest):
                 f"of {found.value:.2f}.")
 
 
-class Frequency(ResidualTest):
+class FrequencyTest(ResidualTest):
     """The band that holds most, compared with white noise: F tests, Bonferroni over the bands."""
 
     name = "frequency"
@@ -78,7 +78,7 @@ class Frequency(ResidualTest):
                 f"{part.high:.2g} Hz), where white noise would have {percent(found.figures['white_share'])}{error}.")
 
 
-class Skewness(ResidualTest):
+class SkewnessTest(ResidualTest):
     """Skewness, with Student's test of the cubes of blocks; up to 1/2 either way a distribution counts as fairly
     symmetric (M. G. Bulmer, Principles of Statistics, 1979, chapter 4)."""
 
@@ -100,7 +100,7 @@ class Skewness(ResidualTest):
                 f"{way} in short blows.")
 
 
-class Tone(ResidualTest):
+class ToneTest(ResidualTest):
     """The strongest spectral line of all runs, compared with the frequencies beside it."""
 
     name, unit, road = "tone", "Hz", True
@@ -127,4 +127,4 @@ class Tone(ResidualTest):
                 "Something hums or rings there.")
 
 
-TESTS = ResidualTests("distribution", (Whiteness(), Frequency(), Skewness(), Tone()))
+TESTS = ResidualTests("distribution", (WhitenessTest(), FrequencyTest(), SkewnessTest(), ToneTest()))

@@ -19,7 +19,7 @@ from logger.printable import percent
 from logger.vehicle.simulate import PASS_OF_RATE
 
 
-class Coherence(ResidualTest):
+class CoherenceTest(ResidualTest):
     """Coherence with the road, at the frequencies that the recorder passes."""
 
     name, road = "coherence", True
@@ -40,7 +40,7 @@ class Coherence(ResidualTest):
                 f"{BANDS[found.figures['band']]}. This part is not noise; a linear effect could cause it.")
 
 
-class Gain(ResidualTest):
+class GainTest(ResidualTest):
     """Gain, measured / model; not large where it is off by half and more, as the shape is another one then."""
 
     name, road = "gain", True
@@ -62,7 +62,7 @@ class Gain(ResidualTest):
                 f"{found.standard_error:.1g}).")
 
 
-class Proportion(ResidualTest):
+class ProportionTest(ResidualTest):
     """Proportionality: gains where a band is weak and where it is strong, with Welch's test of the difference."""
 
     name, road = "proportion", True
@@ -116,4 +116,4 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
     return gains[0], gains[1], float(2 * t.sf(abs(gains[1] - gains[0]) / error, freedom)), error
 
 
-TESTS = ResidualTests("response", (Coherence(), Gain(), Proportion()))
+TESTS = ResidualTests("response", (CoherenceTest(), GainTest(), ProportionTest()))

@@ -15,7 +15,7 @@ from logger.lab.residuals.force_state_map import Curve
 from logger.printable import percent
 
 
-class ForceBy(ResidualTest):
+class ForceByTest(ResidualTest):
     """The largest missing force by the rate or the travel of the suspensions that is known to a third of itself, else
     0."""
 
@@ -47,7 +47,7 @@ class ForceBy(ResidualTest):
                 f"{percent(curve.share)} of the residual. In addition to linear {part}: {ends}.")
 
 
-class Direction(ResidualTest):
+class DirectionTest(ResidualTest):
     """Asymmetry of the missing damper force."""
 
     name, unit, road = "direction", "N s/m", True
@@ -85,4 +85,4 @@ def _ends(curve: Curve, factor: float, unit: str) -> str:
     return f"{' and '.join(words)} (positive pulls body and wheel together)"
 
 
-TESTS = ResidualTests("suspensions", (ForceBy("rate"), Direction(), ForceBy("travel")))
+TESTS = ResidualTests("suspensions", (ForceByTest("rate"), DirectionTest(), ForceByTest("travel")))

@@ -16,7 +16,7 @@ from logger.lab.residuals.block_statistics import autocorrelations, block_means,
 from logger.runs import short_names
 
 
-class Excitation(ResidualTest):
+class ExcitationTest(ResidualTest):
     """Rank correlation of the power of the residual with that of the model, in blocks."""
 
     name, road = "excitation", True
@@ -39,7 +39,7 @@ class Excitation(ResidualTest):
                 f"{high.residual_mps2:.2g} where it has {high.low:.2g} and more.")
 
 
-class Speed(ResidualTest):
+class SpeedTest(ResidualTest):
     """Factor by which the residual changes from the slowest to the fastest driving at equal excitation: a regression of
     the logarithms of blocks on speed and a cubic of excitation. Not tested where speeds differ by less than would
     matter of the residual."""
@@ -75,7 +75,7 @@ class Speed(ResidualTest):
                 f"{fast_mps:.0f} m/s as at {slow_mps:.0f} m/s.")
 
 
-class Place(ResidualTest):
+class PlaceTest(ResidualTest):
     """The place with most power for its length; its autocorrelation gives the number of independent samples."""
 
     name = "place"
@@ -105,4 +105,4 @@ class Place(ResidualTest):
         return f"At some places the residual is much larger than usual: {named}."
 
 
-TESTS = ResidualTests("variation", (Excitation(), Speed(), Place()))
+TESTS = ResidualTests("variation", (ExcitationTest(), SpeedTest(), PlaceTest()))

@@ -31,7 +31,7 @@ from logger.identification.unknown_road.road_state import Options, RoadState
 from logger.lab.likelihood.noise_floor import Noise, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
-from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, responses_of
+from logger.lab.unknown_road.tabulated_response import DriveConditions, Tabulated, responses_of
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
@@ -105,7 +105,8 @@ class SameRoad:
                              "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
-        self.motions = [Motion(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0, STANDARD_WAVINESS)
+        self.motions = [DriveConditions(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0,
+                                        STANDARD_WAVINESS)
                         for parts in self.stretches for _, one in parts]
         nominal = self.tables(self.response((), self.start_vehicle))
         self._roads = [UnknownRoad(nominal[0], [one for _, one in parts], options, generator)
@@ -136,7 +137,7 @@ class SameRoad:
         return [Tabulated(self._behind_m, self._patch_m, self.rate_hz, gain, found[:, drive])
                 for drive, gain in enumerate(gains)]
 
-    def _moved_by(self, roads: Array) -> list[Motion]:
+    def _moved_by(self, roads: Array) -> list[DriveConditions]:
         """What moves the car in each drive over each stretch, on roads of these numbers (r,)."""
         levels = [roads[part[:2]] for part, parts in zip(self._parts, self.stretches, strict=True) for _ in parts]
         return [replace(one, level=float(level), waviness=float(waviness))

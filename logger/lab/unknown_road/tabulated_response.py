@@ -55,7 +55,7 @@ def _by_axle(linear: LinearCar, rate_hz: float) -> Complex:
 
 
 @dataclass(frozen=True)
-class Motion:
+class DriveConditions:
     """What moves a car over a stretch: its speed [m/s], and the level and the waviness of the road (``RoadState``)."""
 
     speed_mps: float
@@ -63,7 +63,7 @@ class Motion:
     waviness: float
 
 
-def responses_of(car: Car, rate_hz: float, motions: Sequence[Motion], highest_cpm: float = 4.0,
+def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0,
                  waves: int = 80) -> Complex:
     """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
     is not linear, the same for all of one that is.

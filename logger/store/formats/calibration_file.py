@@ -40,7 +40,7 @@ _GAIN_DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Found:
+class StoredCalibration:
     """A stored calibration and the file it was in."""
 
     speeds: tuple[SpeedCalibration, ...]
@@ -71,11 +71,11 @@ def places(vehicle_path: Path) -> tuple[Path, ...]:
     return (vehicle_path.with_name(name), in_cache)
 
 
-def find(paths: Sequence[Path], key: str) -> Found | None:
+def find(paths: Sequence[Path], key: str) -> StoredCalibration | None:
     """The calibration with this fingerprint; None where there is none, or none that can be trusted."""
     for path in paths:
         if key in (stored := _read(path)):
-            return Found(stored[key], path)
+            return StoredCalibration(stored[key], path)
     return None
 
 

@@ -81,7 +81,7 @@ def taken(quantity: Quantity, name: str, values: Array, file: str) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CsvTable:
     """A table in a file, found but not read yet.
 
     line         of the header; 0: there is none, and ``names`` is empty
@@ -120,7 +120,7 @@ class Rows:
 
 
 def find_table(data: bytes, file: str, fits: Callable[[Names], bool], unit_of: Callable[[str], str | None] | None = None
-               ) -> Table:
+               ) -> CsvTable:
     """The table below the first line that has names that fit or, where none does, below what looks like a header.
 
     unit_of    tells the unit in a cell, of which a line may stand below the header; None: no such line
@@ -141,19 +141,19 @@ def find_table(data: bytes, file: str, fits: Callable[[Names], bool], unit_of: C
 
 
 def _below(data: bytes, file: str, head: Sequence[tuple[int, int, str]], number: int, end: int, line: str,
-           names: Names, delimiter: str, unit_of: Callable[[str], str | None] | None) -> Table:
+           names: Names, delimiter: str, unit_of: Callable[[str], str | None] | None) -> CsvTable:
     units: Names = ()
     after = next((one for one in head if one[0] > number), None)
     if unit_of is not None and after is not None:
         cells = _names(after[2], delimiter)
         if len(cells) == len(names) and any(map(unit_of, cells)) and not any(map(_is_value, cells)):
             units, number, end = cells, after[0], after[1]
-            return Table(file, number - 1, line, names, units, delimiter, data[end:], number + 1)
-    return Table(file, number, line, names, units, delimiter, data[end:], number + 1)
+            return CsvTable(file, number - 1, line, names, units, delimiter, data[end:], number + 1)
+    return CsvTable(file, number, line, names, units, delimiter, data[end:], number + 1)
 
 
 def _unknown(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: str | None,
-             unit_of: Callable[[str], str | None] | None) -> Table:
+             unit_of: Callable[[str], str | None] | None) -> CsvTable:
     """By the first line of numbers: the header is the line of as many words above it, or above a line of units."""
     above: list[tuple[int, int, str]] = []
     for number, end, line in head:
@@ -167,17 +167,17 @@ def _unknown(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said:
                 if alike:
                     return _below(data, file, head, *alike[0][0], alike[0][1], delimiter, unit_of)
                 if not above:
-                    return Table(file, 0, line, (), (), delimiter, data, number)
+                    return CsvTable(file, 0, line, (), (), delimiter, data, number)
                 return _first(data, file, above, said)
         if not line.lower().startswith("sep=") and not line.startswith(_COMMENT):
             above.append((number, end, line))
     return _first(data, file, above or head, said)
 
 
-def _first(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: str | None) -> Table:
+def _first(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: str | None) -> CsvTable:
     """The first line as the header, whatever it is."""
     if not head:
-        return Table(file, 1, "", (), (), ",", b"", 2)
+        return CsvTable(file, 1, "", (), (), ",", b"", 2)
     delimiter = next((one for one in _delimiters(head[0][2], said) if one != _BLANKS), ",")
     return _below(data, file, head, *head[0], _names(head[0][2], delimiter), delimiter, None)
 
@@ -304,7 +304,7 @@ def columns_of(data: bytes, file: str, names: Names) -> list[Array]:
     return list(values.T.copy())
 
 
-def read_rows(table: Table, columns: Sequence[int], words: Sequence[str], gaps: bool = False, time: int | None = None
+def read_rows(table: CsvTable, columns: Sequence[int], words: Sequence[str], gaps: bool = False, time: int | None = None
               ) -> Rows:
     """The numbers in some columns of a table, at least one row.
 
@@ -324,7 +324,7 @@ def read_rows(table: Table, columns: Sequence[int], words: Sequence[str], gaps: 
     return _by_line(table, body, columns, words, gaps, time, comma)
 
 
-def _at_once(table: Table, body: bytes, columns: Sequence[int], comma: bool) -> Array | None:
+def _at_once(table: CsvTable, body: bytes, columns: Sequence[int], comma: bool) -> Array | None:
     """All rows of a plain table; None where some cell is none of a plain one."""
     if comma and b"." in body:
         return None
@@ -358,7 +358,7 @@ def _is_even(body: bytes, delimiter: bytes, rows: int, many: int) -> bool:
     return True
 
 
-def _by_line(table: Table, body: bytes, columns: Sequence[int], words: Sequence[str], gaps: bool, time: int | None,
+def _by_line(table: CsvTable, body: bytes, columns: Sequence[int], words: Sequence[str], gaps: bool, time: int | None,
              comma: bool) -> Rows:
     values, numbers, is_torn = array("d"), array("q"), False
     last = table.body_line + body.count(b"\n")
@@ -379,7 +379,7 @@ def _by_line(table: Table, body: bytes, columns: Sequence[int], words: Sequence[
     return Rows(np.frombuffer(values).reshape(-1, len(columns)), numbers, is_torn)
 
 
-def _lines(table: Table, body: bytes) -> Iterator[tuple[int, list[str]]]:
+def _lines(table: CsvTable, body: bytes) -> Iterator[tuple[int, list[str]]]:
     start, number = 0, table.body_line
     while start <= len(body):
         end = body.find(b"\n", start)
@@ -407,7 +407,7 @@ def _number(cell: str, word: str, gaps: bool, is_time: bool, comma: bool, where:
     raise BadInput(f"{where}: expected {'a time' if is_time else 'a number'} for {word}, found {shown(text)}{hint}")
 
 
-def _has_decimal_commas(table: Table, body: bytes, columns: Sequence[int]) -> bool:
+def _has_decimal_commas(table: CsvTable, body: bytes, columns: Sequence[int]) -> bool:
     """Whether commas in the numbers of these columns are decimal. BadInput where they may be either."""
     doubtful: tuple[int, str] | None = None
     for number, cells in _lines(table, body):

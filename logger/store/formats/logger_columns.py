@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from logger.errors import BadInput
 from logger.store.formats.csv_table import shown
-from logger.store.formats.logger_layouts import AXES, GRAVITY, LAYOUTS, PLACE, ROLES, SPELLINGS, Column, units_of
+from logger.store.formats.logger_layouts import AXES, GRAVITY, LAYOUTS, PLACE, ROLES, SPELLINGS, LayoutColumn, units_of
 
-Named = Mapping[str, tuple[Column, ...]]
+Named = Mapping[str, tuple[LayoutColumn, ...]]
 """Columns by role as a user names them: the header of each file has one of them at most."""
 
 _ENTRY = re.compile(rf"\s*({'|'.join(ROLES)})\s*=")
@@ -34,7 +34,7 @@ class Recognised:
     """The columns of a file by role, and what they are called together."""
 
     name: str
-    columns: Mapping[str, Column]
+    columns: Mapping[str, LayoutColumn]
     is_linear: bool = False  # gravity was taken out
 
     @property
@@ -69,7 +69,7 @@ def named_columns(text: str) -> Named:
     starts = [found.start() for found in re.finditer(rf"(?:^|(?<=,))(?={_ENTRY.pattern})", text)]
     if not starts or starts[0] != 0:
         raise BadInput(f"--columns: expected {_form()}, found {shown(text)}")
-    named: dict[str, tuple[Column, ...]] = {}
+    named: dict[str, tuple[LayoutColumn, ...]] = {}
     for start, end in zip(starts, [*starts[1:], len(text) + 1], strict=True):
         role, _, rest = text[start : end - 1].partition("=")
         column = _column(role.strip(), rest)
@@ -77,17 +77,17 @@ def named_columns(text: str) -> Named:
     return named
 
 
-def _column(role: str, text: str) -> Column:
+def _column(role: str, text: str) -> LayoutColumn:
     header, colon, word = text.rpartition(":")
     unit = _unit(word)
     if colon and unit in units_of(role):
-        return Column(header.strip(), unit)
+        return LayoutColumn(header.strip(), unit)
     if colon and re.fullmatch(r"[\w/^²°µ]{1,12}", word.strip()) and header.strip():
         raise BadInput(f"--columns: expected {role}={header.strip()}:UNIT with one of {', '.join(units_of(role))}, "
                        f"found {shown(word.strip())}")
     if not text.strip():
         raise BadInput(f"--columns: expected the name of a column after {role}=, found nothing")
-    return Column(text.strip())
+    return LayoutColumn(text.strip())
 
 
 def _unit(word: str) -> str:
@@ -134,7 +134,7 @@ def _by_layout(there: list[str], stem: str) -> Recognised | None:
         return None
     if len({plain(layout.columns["t"].header) for layout in fitting}) > 1:
         return None
-    columns: dict[str, Column] = {}
+    columns: dict[str, LayoutColumn] = {}
     names_of: list[str] = []
     for layout in fitting:
         new = {role: column for role, column in layout.columns.items()
@@ -153,7 +153,7 @@ def _by_name(there: list[str], named: Named) -> Recognised | None:
                            f"{' and '.join(one.header for one in found)} once or more")
         if found:
             unit = found[0].unit or unit_in(found[0].header, role)
-            columns[role] = Column(found[0].header, unit)
+            columns[role] = LayoutColumn(found[0].header, unit)
     linear = any("linear" in plain(columns[axis].header) for axis in AXES if axis in columns)
     return Recognised("columns as named", columns, linear) if columns else None
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from logger.bounds import TIME
 from logger.errors import BadInput
 from logger.files import read_bounded
-from logger.store.formats.csv_table import Names, Table, find_table, read_rows, shown
+from logger.store.formats.csv_table import CsvTable, Names, find_table, read_rows, shown
 from logger.store.formats.logger_columns import Named, Recognised, plain, recognise, unit_of_cell
 from logger.store.formats.logger_layouts import TIME_UNITS, units_of
 from logger.store.formats.record_file import MAX_BYTES
@@ -35,7 +35,7 @@ class Header:
     """A file's table, of which the names are known; none where no line has them."""
 
     path: Path
-    table: Table
+    table: CsvTable
 
     @property
     def names(self) -> Names:

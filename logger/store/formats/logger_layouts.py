@@ -41,7 +41,7 @@ def units_of(role: str) -> Mapping[str, float]:
 
 
 @dataclass(frozen=True)
-class Column:
+class LayoutColumn:
     """A column: its name in the header, and its unit; None: the header or the numbers have to show it."""
 
     header: str
@@ -54,13 +54,14 @@ class Layout:
     small letters; empty: the header says it."""
 
     name: str
-    columns: Mapping[str, Column]
+    columns: Mapping[str, LayoutColumn]
     stem: str = ""
 
 
 def _layout(name: str, stem: str = "", **columns: str) -> Layout:
     """Columns as ``"header|unit"``."""
-    return Layout(name, MappingProxyType({role: Column(*text.split("|")) for role, text in columns.items()}), stem)
+    found = {role: LayoutColumn(*text.split("|")) for role, text in columns.items()}
+    return Layout(name, MappingProxyType(found), stem)
 
 
 def _axes(pattern: str, letters: str = "xyz") -> dict[str, str]:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.dsp.bursts import burst_ends, spread
 from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import Repeats, find_holds, find_repeats, fresh_times, still_until_s
+from logger.dsp.repeated_samples import RepeatedSamples, find_holds, find_repeats, fresh_times, still_until_s
 from logger.dsp.stretches import stretches_of
 from logger.errors import BadInput
 from logger.left_out import LeftOut, counting
@@ -48,7 +48,7 @@ _HOLE_STEPS = 2.5
 
 
 @dataclass(frozen=True)
-class Asked:
+class RecordRules:
     """What is said of a record. ``unit``: one of ``UNITS``, None: to be judged; ``resample_hz``: lay it on an even grid
     of this rate, ``OWN_RATE``: of its own (``LEAST_RATE_HZ`` at least); None: it has to be even, without repeats."""
 
@@ -108,7 +108,7 @@ class EvenRecord:
 
 
 def even_record(
-    t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Array], file: str, asked: Asked,
+    t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Array], file: str, asked: RecordRules,
     moving: Bools | None = None,
 ) -> EvenRecord:
     """A record with times (n,) [s], judged and, where that was asked for, mended.
@@ -184,7 +184,7 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
     return replace(record, doubts=(*record.doubts, *doubts))
 
 
-def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
+def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) -> EvenRecord:
     """A drive's columns (n,) by name (``drive_file.COLUMNS``), as ``even_record``. Repeats are dropped; but what the
     samples do not hold cannot be estimated, so BadInput where fewer than 80 a second are left."""
     names = [name for name in columns if name not in (TIME, VERTICAL)]
@@ -201,8 +201,8 @@ _MEND = " (--resample lays samples on an even grid)"
 
 
 def _resampled(
-    t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array], repeats: Repeats | None,
-    held: Bools, file: str, rate_hz: float, doubts: list[Doubt],
+    t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
+    repeats: RepeatedSamples | None, held: Bools, file: str, rate_hz: float, doubts: list[Doubt],
 ) -> EvenRecord:
     from logger.dsp.uneven import mean_rate_hz, on_even_grid
 
@@ -255,7 +255,7 @@ def _rate_hz(t_s: Array) -> float:
     return float((len(t_s) - 1) / (t_s[-1] - t_s[0]))
 
 
-def _true_rate_hz(repeats: Repeats, t_s: Array) -> float:
+def _true_rate_hz(repeats: RepeatedSamples, t_s: Array) -> float:
     return float(1.0 / np.median(np.diff(fresh_times(repeats, t_s))))
 
 

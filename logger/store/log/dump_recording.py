@@ -4,7 +4,7 @@ Problem. A dump is bigger than all logs together and worth less: it must never s
 the logs. The power ends most of them in the middle of a block.
 
 Solution. A dump is called ``<session>[-<number>].dump.gz.part`` while it is written and loses the ``.part`` when it is
-ended. ``Recording`` lets go of a file that the disk refuses and begins another later; what is promised of a file is
+ended. ``DumpRecording`` lets go of a file that the disk refuses and begins another later; what is promised of a file is
 what was flushed before. ``repair_recordings`` cuts the dumps that were left open back to the last block that fits its
 check value.
 """
@@ -26,7 +26,7 @@ RETRY_US = 60 * US_PER_S
 log = logging.getLogger(__name__)
 
 
-class Recording:
+class DumpRecording:
     """Events in, whatever the disk does.
 
     session    number of the session, None as long as there is none; nothing is recorded before

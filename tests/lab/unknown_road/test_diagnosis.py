@@ -17,7 +17,7 @@ from logger.lab.unknown_road.fisher_scoring import fit
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
 from logger.lab.unknown_road.screening import screen
-from logger.lab.unknown_road.tabulated_response import Motion, Tabulated, response_of, responses_of
+from logger.lab.unknown_road.tabulated_response import DriveConditions, Tabulated, response_of, responses_of
 from logger.profiles.track import Track
 from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
@@ -107,7 +107,7 @@ def test_a_linear_car_stands_in_for_one_that_bends_its_laws(effect: Chosen) -> N
     level = float(np.log(64.0 / at_n0(2.0)))  # as LONG was generated
 
     def left(car: Car, level: float) -> float:
-        (gains,) = responses_of(car, RATE_HZ, [Motion(14.0, level, 2.0)])
+        (gains,) = responses_of(car, RATE_HZ, [DriveConditions(14.0, level, 2.0)])
         table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
         response = table.responses(np.zeros(0), crossing.f_hz)[0]
         predicted = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]

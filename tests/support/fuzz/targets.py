@@ -25,7 +25,7 @@ from drivers.accelerometers.bma220 import Bma220Decoder
 from drivers.accelerometers.pasco import PascoDecoder
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
-from drivers.wire_profiles import FrameLayout, LineLayout, Profile, load_profile, shipped_profiles
+from drivers.wire_profiles import FrameLayout, LineLayout, WireProfile, load_profile, shipped_profiles
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import load_config
@@ -182,7 +182,7 @@ def nmea() -> Target:
 # --- PASCO
 
 
-def pasco_reader(profile: Profile) -> Reader:
+def pasco_reader(profile: WireProfile) -> Reader:
     def read(data: bytes, rng: random.Random) -> Hashable:
         decoder = PascoDecoder(profile)
         t_us = 0
