@@ -6,6 +6,7 @@ import numpy as np
 
 from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.identification.residual_whiteness import LAGS, autocorrelation
+from logger.lab.likelihood.whittle import BLOCK_S
 from logger.lab.residual_tests.tests import (
     BANDS,
     SIGNIFICANCE,
@@ -18,9 +19,6 @@ from logger.lab.residuals.block_statistics import autocorrelations, mean_of_bloc
 from logger.lab.residuals.spectral_lines import periodogram, strongest_line
 from logger.printable import percent
 from logger.runs import short_names
-
-_TONE_HZ = 0.4
-"""On either side of a line, whose neighbours it is compared with: about what a spectrum of segments resolves."""
 
 
 class WhitenessTest(ResidualTest):
@@ -101,19 +99,20 @@ class SkewnessTest(ResidualTest):
 
 
 class ToneTest(ResidualTest):
-    """The strongest spectral line of all runs, compared with the frequencies beside it."""
+    """The strongest spectral line of all runs, compared with the frequencies that the spectra of the likelihood do not
+    resolve from it."""
 
     name, unit, road = "tone", "Hz", True
 
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """Its frequency, and the run where it is clearest."""
-        residuals = tested.residuals
+        residuals, width_hz = tested.residuals, 1 / BLOCK_S
         names, tones = short_names(residuals.runs), []
         for run, residual in zip(residuals.runs, residuals.residual, strict=True):
             f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
             low_hz, high_hz = run.pass_band_hz
-            inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + _TONE_HZ))
-            line = strongest_line(periodogram(residual), inside, round(_TONE_HZ * len(residual) / residuals.rate_hz))
+            inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
+            line = strongest_line(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
             if line is not None:
                 tones.append((line[1] * len(residuals.runs), float(f_hz[line[0]]), names[run.name]))
         if not tones:
