@@ -30,7 +30,7 @@ class DriveSections:
     log, number    the file, and which drive of it, from 1
     records        its rows with a distance
     middle_m       (n,) of their middles, counted as the sections are [m]
-    figures        of the k sections
+    figures        of the k sections, and ``whole`` of all of them as one
     condition      by the federal limits; empty: not known
     ends_m         (k,) of the sections, the last one where the drive ends [m]
     direction      ``along`` a route or ``against`` it; empty: sections count from the beginning of the drive
@@ -41,6 +41,7 @@ class DriveSections:
     records: tuple[WindowRecord, ...]
     middle_m: Array
     figures: Sections
+    whole: Sections
     condition: tuple[str, ...]
     ends_m: Array
     direction: str = ""
@@ -96,8 +97,8 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
     found = sections(windows, edges_m)
     condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
     counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
-    yield DriveSections(log, number, counted_records, measure_m[kept], found, condition,
-                        np.minimum(edges_m[1:], windows.end_m[-1]), "along" if direction == ALONG else "against")
+    yield DriveSections(log, number, counted_records, measure_m[kept], found, sections(windows, edges_m[[0, -1]]),
+                        condition, np.minimum(edges_m[1:], windows.end_m[-1]), "along" if direction == ALONG else "against")
 
 
 def windows_of(records: Sequence[WindowRecord]) -> Windows:
@@ -123,5 +124,5 @@ def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m
     edges_m = even_edges(float(windows.end_m[-1]), length_m)
     found = sections(windows, edges_m)
     condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
-    return DriveSections(log, number, records, (windows.start_m + windows.end_m) / 2, found, condition,
-                         np.minimum(edges_m[1:], windows.end_m[-1]))
+    return DriveSections(log, number, records, (windows.start_m + windows.end_m) / 2, found,
+                         sections(windows, edges_m[[0, -1]]), condition, np.minimum(edges_m[1:], windows.end_m[-1]))

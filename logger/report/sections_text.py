@@ -16,6 +16,7 @@ from logger.report.drive_sections import DriveSections, localized
 from logger.report.localized_text import area_lines, area_values
 from logger.report.quantities import known
 from logger.roads.roughness_words import FEDERAL_WORDS
+from logger.roads.sections import Sections
 from logger.units import FOOT_M, MILE_M
 
 
@@ -43,8 +44,7 @@ def _title(one: DriveSections) -> str:
 
 def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUnits) -> Iterator[str]:
     count = sum(len(one.condition) for one in drives)
-    known_m, iri, std = (np.concatenate([getattr(one.figures, name) for one in drives])
-                         for name in ("known_m", "iri_m_per_km", "iri_std_m_per_km"))
+    known_m = np.concatenate([one.figures.known_m for one in drives])
     driven_m = sum(float(one.figures.driven_m.sum()) for one in drives)
     name, unit_m = units.way
     yield (f"{counted(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {counted(count, 'section')} of "
@@ -53,13 +53,22 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUni
     if total_m <= 0:
         yield "The IRI is known nowhere."
         return
-    mean, error = float(np.nansum(iri * known_m)) / total_m, float(np.sqrt(np.nansum((std * known_m) ** 2))) / total_m
+    mean, error = _mean([one.whole for one in drives if one.whole.known_m[0] > 0])
     label, scale = units.iri
     yield (f"Mean IRI {mean / scale:.{units.iri_decimals}f} {label}, standard error "
            f"{error / scale:.{units.iri_decimals + 1}f}, over {total_m / unit_m:.2f} {name}")
     words = [word for one in drives for word in one.condition]
     shares = {word: float(known_m[[here == word for here in words]].sum()) / total_m for word in FEDERAL_WORDS}
     yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())
+
+
+def _mean(wholes: Sequence[Sections]) -> tuple[float, float]:
+    """Mean IRI of drives by length, and its standard error [m/km]: the numbers of the car are wrong in all alike."""
+    known_m, iri, std, common = np.array([
+        (one.known_m[0], one.iri_m_per_km[0], one.iri_errors.std[0], one.iri_errors.common_std[0]) for one in wholes]).T
+    weight = known_m / known_m.sum()
+    variance = weight**2 @ (std**2 - common**2) + (weight @ common) ** 2
+    return float(weight @ iri), float(np.sqrt(variance))
 
 
 def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[str]:

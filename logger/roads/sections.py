@@ -45,7 +45,7 @@ class Sections:
 
     edges_m          limits [m]
     driven_m         how much of each windows cover, and ``known_m`` those with an IRI [m]
-    iri_m_per_km     mean over that, with its standard error
+    iri_m_per_km     mean over that, and ``iri_errors`` of it
     a_w_mps2         weighted r.m.s. acceleration over the time for which it is known [m/s2]
     speed_mps        mean [m/s]
     worst_m_per_km   largest IRI of a window in it, and ``worst_at_m`` where the middle of that lies [m]
@@ -55,11 +55,16 @@ class Sections:
     driven_m: Array
     known_m: Array
     iri_m_per_km: Array
-    iri_std_m_per_km: Array
+    iri_errors: WindowErrors
     a_w_mps2: Array
     speed_mps: Array
     worst_m_per_km: Array
     worst_at_m: Array
+
+    @property
+    def iri_std_m_per_km(self) -> Array:
+        """(k,) Standard error of the IRI."""
+        return self.iri_errors.std
 
 
 def even_edges(end_m: float, length_m: float) -> Array:
@@ -88,7 +93,7 @@ def sections(windows: Windows, edges_m: Array) -> Sections:
     worst, worst_at_m = _worst(windows, window, section, count)
     return Sections(
         edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
-        errors.std, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
+        errors, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
         worst, worst_at_m)
 
 

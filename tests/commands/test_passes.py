@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from logger.commands.main import main
@@ -163,3 +164,21 @@ def test_no_row_and_no_page_calls_a_road_poor_and_very_good(tmp_path: Path, caps
     assert not [line for line in capsys.readouterr().out.splitlines() if "poor" in line.split() and "A" in line.split()]
     assert main(["passes", str(folder), "--out", str(page)]) == 0
     assert "rough stretch" in page.read_text("utf-8") and "very good" not in page.read_text("utf-8")
+
+
+def test_what_all_windows_share_stays_in_the_mean_of_a_drive_and_of_drives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two drives of 762 m in 100 windows each: 0.3 m/km common to all, 0.4 of each window alone."""
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    parts = {"iri_level_std_m_per_km": 0.0, "iri_common_std_m_per_km": 0.3, "iri_place_std_m_per_km": 0.0}
+    rows = [replace(row, iri_m_per_km=3.0, iri_std_m_per_km=0.5, distance_start_m=7.62 * index,
+                    distance_end_m=7.62 * (index + 1), **parts)
+            for number in (1, 2) for index, row in enumerate(rows_of_drive(100, number=number))]
+    (folder / "00001-001.csv").write_text("\n".join([HEADER, *map(format_row, rows)]) + "\n", "ascii")
+    assert main(["sections", str(folder), "--length", "762m", "--json"]) == 0
+    drives = json.loads(capsys.readouterr().out)["drives"]
+    assert [one["sections"][0]["iri_std_m_per_km"] for one in drives] == pytest.approx([np.hypot(0.3, 0.04)] * 2)
+    assert main(["sections", str(folder), "--length", "50m"]) == 0
+    assert f"standard error {np.hypot(0.3, 0.4 / 200**0.5):.3f}," in capsys.readouterr().out
