@@ -98,7 +98,8 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
     condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
     counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
     yield DriveSections(log, number, counted_records, measure_m[kept], found, sections(windows, edges_m[[0, -1]]),
-                        condition, np.minimum(edges_m[1:], windows.end_m[-1]), "along" if direction == ALONG else "against")
+                        condition, np.minimum(edges_m[1:], windows.end_m[-1]),
+                        "along" if direction == ALONG else "against")
 
 
 def windows_of(records: Sequence[WindowRecord]) -> Windows:
