@@ -36,7 +36,7 @@ from logger.store.formats.profile_file import read_profile
 from logger.store.formats.record_file import read_record
 from logger.store.formats.vehicle_file import read_vehicle, write_vehicle
 from logger.store.integrity import verify
-from logger.store.log.row_format import HEADER, format_row, read_log, scan
+from logger.store.log.row_format import COLUMNS, HEADER, format_row, read_log, scan
 
 from .mutation import Target, ViolationError
 
@@ -363,7 +363,9 @@ def segment_log_reader(file: _File) -> Reader:
             body, _, check = row.text.rpartition(",")
             promise(f"{zlib.crc32(body.encode()):08x}" == check, "a row that does not fit its check value")
             promise(row.text.encode() in data, "a row that is not in the file")
-            promise(format_row(row.record) == row.text, "a row that is written otherwise than it was read")
+            older = "," * (len(COLUMNS) - 1 - body.count(","))
+            promise(format_row(row.record).rpartition(",")[0] == body + older,
+                    "a row that is written otherwise than it was read")
         if rng.random() < 0.05:
             path = file.hold(data)
             content = read_log(path)
