@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -19,9 +20,19 @@ from logger.store.formats.vehicle_file import read_vehicle
 
 from .support.drives.short_drive import SHORT_PLAN
 
+# Byte code is kept, of the tests with their asserts and for the commands that they start: to make it again costs each
+# worker 13 s of a processor and each command one.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # A busy machine is no fault of an example.
 hypothesis.settings.register_profile("any_machine", deadline=None)
 hypothesis.settings.load_profile("any_machine")
+
+
+def pytest_collection_finish() -> None:
+    """The tests themselves stay to the end: no search for garbage need go through them."""
+    gc.freeze()
 
 
 @pytest.fixture

@@ -113,6 +113,7 @@ def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: p
     assert all(row[3] > other[3] for row, other in zip(hundred["rows"], ten["rows"], strict=True))
 
 
+@pytest.mark.slow
 def test_a_minute_of_comma2k19_becomes_rows_and_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     road = made.surveyed(1)
     found = reported(capsys, "comma2k19", made.comma2k19(tmp_path / "set", road, late_s=0.3, faster_mps=0.2))

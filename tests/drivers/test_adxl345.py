@@ -16,6 +16,7 @@ from drivers.sources import ChipSource, Deadlines, Source
 
 from ..support.accelerometer_fakes.adxl345 import FakeAdxl345
 from ..support.accelerometer_fakes.fake import Clock
+from ..support.slow import slow
 
 RAMP_MPS2_PER_S = 0.5
 COUNT_US = 9.80665 / 256 / RAMP_MPS2_PER_S * 1e6
@@ -56,7 +57,7 @@ def late_us(fake: FakeAdxl345, block: AccelerationBlock, begin_us: int) -> np.nd
     return block.t_us - taken_us
 
 
-@pytest.mark.parametrize("rate_hz", [200, 400, 800])
+@pytest.mark.parametrize("rate_hz", [200, 400, *slow(800)])
 @pytest.mark.parametrize("clock_error", [0.0, 0.0001, -0.013, 0.035])
 def test_every_sample_comes_once_at_the_time_when_it_was_taken(
     fake: FakeAdxl345, rate_hz: int, clock_error: float
@@ -76,6 +77,7 @@ def test_every_sample_comes_once_at_the_time_when_it_was_taken(
     assert abs(np.median(late[steps]) + rounded_us) < 1_000
 
 
+@pytest.mark.slow
 def test_looks_in_step_with_the_chip_would_move_the_times(fake: FakeAdxl345) -> None:
     """Why looks are scattered: in step, the newest sample's age drifts, and jumps by an interval at its end."""
     fake.chip.clock_error = 0.0004

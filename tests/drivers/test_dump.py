@@ -293,6 +293,7 @@ except DumpError:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filler", [b"\x00", b"0.000000 nmea 00\n"])
 def test_compressed_bomb_does_not_fill_the_memory(tmp_path: Path, filler: bytes) -> None:
     block = filler * (1 << 16)

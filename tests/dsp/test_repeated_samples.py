@@ -12,6 +12,7 @@ from ..support.drives.records import FINE_HZ, at, held, ride, rounded
 STEPS = (0.0, 1e-3, 0.0383, 0.098, 0.613, 1.2)  # none, phones, 0.01 g, a BMA220 at 2 and at 4 g
 
 
+@pytest.mark.slow
 def test_no_clean_record_has_repeats() -> None:
     """Rides of any loudness, rate, step and noise, on one axis and three, with stands and jolts: none of 240."""
     false = []

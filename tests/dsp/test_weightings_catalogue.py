@@ -102,6 +102,7 @@ BURSTS = {
 BAND = Weighting("band", 0.4, 100.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "tolerance"), [("band", 0.004), ("wk", 0.004), ("wd", 0.015)])
 def test_whole_records_give_the_saw_tooth_values_of_iso_8041(name: str, tolerance: float) -> None:
     rate_hz, length_s, period_s = 20_000, 60, 2 * np.pi / 100
@@ -140,6 +141,7 @@ def test_gravity_and_the_end_of_a_record_leave_its_beginning_alone() -> None:
     assert np.abs(weighting.weigh(late, 100.0) - weighted)[:2000].max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "rate_hz"),
     [

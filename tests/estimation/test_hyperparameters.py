@@ -138,6 +138,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     assert np.abs(step - exact) == pytest.approx([0.0, 0.0], abs=0.3 * error.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [5.0, 14.0, 30.0])
 def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
     """Thirty roads of random amplitudes; errors over the stated standard error, and the bias of the level."""

@@ -54,6 +54,7 @@ def simulated(speed_mps: float, spectrum: RoadSpectrum, variance: float) -> tupl
     return tuple(np.fft.irfft(row, COUNT) for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [4.5, 13.4, 31.3])
 @pytest.mark.parametrize(("iri", "waviness", "deviation"), [(1.0, 2.0, 0.06), (4.0, 1.7, 0.06), (3.0, 2.3, 0.25)])
 def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness: float, deviation: float) -> None:

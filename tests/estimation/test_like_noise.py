@@ -71,6 +71,7 @@ def scaled(step_mps2: float, reading: np.ndarray, beyond_mps2: np.ndarray | floa
     return road.scale_log_std / road.noise.log_std
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step_mps2", "toggles"), [(ALIKE, True), (APART, False)])
 def test_the_ride_is_open_as_far_as_another_noise_makes_another_ride(step_mps2: float, toggles: bool) -> None:
     other = on_other_steps(readings(step_mps2)[:COUNT], step_mps2)

@@ -95,6 +95,7 @@ def near(count: int) -> np.ndarray:
     return weight
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variance_of", [stretches, pothole])
 def test_one_round_is_mackays_with_the_exact_posterior(variance_of: Callable[[], np.ndarray]) -> None:
     """d is sum v^2 over sum (1 - S_ii / d_i), S the posterior covariance, both over neighbours and with the weight of

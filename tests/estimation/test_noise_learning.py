@@ -336,6 +336,7 @@ def test_a_car_that_swings_or_is_worked_at_bounds_nothing() -> None:
     assert estimator.noise_stretches == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_steps", [0.28, 0.32, 0.38])
 def test_the_few_readings_on_a_third_step_tell_the_noise(noise_steps: float) -> None:
     """A level at an edge, which toggles for any noise: the noise that makes most of what was read, known to be the true

@@ -49,6 +49,7 @@ def test_it_agrees_with_the_computed_relation_within_its_standard_error(vehicle:
     assert [speed.speed_mps for speed in found] == list(SPEEDS_MPS)
 
 
+@pytest.mark.slow
 def test_the_standard_error_is_that_of_other_roads() -> None:
     runs = [calibrate(known_vehicle(RAV4), None, CalibrationSettings((15.0,), roads=16, seed=seed))[0]
             for seed in range(60)]

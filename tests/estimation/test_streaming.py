@@ -374,6 +374,7 @@ def test_pieces_of_road_join_and_have_the_roads_shape() -> None:
     assert np.median(correlations) > 0.85  # what is resolved by less than a half is missing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("range_g", [2, 4])
 def test_reading_several_times_per_sample_gains_and_its_errors_are_right(range_g: int) -> None:
     """Slow drives over roads that hide in the steps: four readings per sample, each twice as noisy, against one. Taken

@@ -69,6 +69,7 @@ def test_places_pin_the_distance_down() -> None:
     assert place_std_m(found, speeds, places)[near].max() < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1.01])
 def test_known_places_say_by_what_factor_the_speeds_are_off(scale: float) -> None:
     off = []

@@ -25,7 +25,7 @@ SOONER = ("command:iri", "command:comfort", "command:simulate", "command:convert
                                              for name in COMMAND_TARGETS if name not in SOONER)])
 def test_a_changed_field_ends_in_an_answer_or_one_line(name: str) -> None:
     with Workshop() as folder:
-        tally = fuzz(COMMAND_TARGETS[name](folder), seed=2, inputs=20)
+        tally = fuzz(COMMAND_TARGETS[name](folder), seed=2, inputs=10)
     assert not tally.failures, tally.failures[:3]
     assert tally.accepted > 0
 

@@ -18,6 +18,7 @@ def numbers(record: WindowRecord) -> dict[str, float]:
     return {name: value for name, value in values.items() if isinstance(value, float)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("low_pass_hz", [None, 15.0])
 def test_fixed_and_float_agree_to_six_digits(short_drive: Drive, low_pass_hz: float | None) -> None:
     pipeline = PipelineConfig(low_pass_hz=low_pass_hz)

@@ -78,14 +78,14 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
     assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
 
 
 @pytest.mark.slow
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
     lines_drive: Drive, lines_rows: Rows, seed: int
@@ -94,7 +94,7 @@ def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
 
 
 @pytest.mark.slow
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
     rng = random.Random(seed)
@@ -110,7 +110,7 @@ def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[s
 
 
 @pytest.mark.slow
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(
     short_drive: Drive, expected: list[str], seed: int
@@ -148,6 +148,7 @@ def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) 
     assert all("gap" in record.flags for record in placed)
 
 
+@pytest.mark.slow
 def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive, lines_rows: Rows) -> None:
     """A recording that holds two of them: its header says which one its rows are made of."""
     serial = [event for event in lines_drive.events if event.source != "nmea"]
@@ -166,6 +167,7 @@ def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
         core_for(replace(short_drive.header, vehicle="hovercraft"))
 
 
+@pytest.mark.slow
 def test_a_sensor_read_eight_times_as_fast_gives_the_same_road(expected: list[str]) -> None:
     """Oversampled and thinned: the windows are the same ones, the figures close, and jitter alone is no hole."""
     vehicle = read_vehicle(vehicle_file("rav4-2009"))
@@ -220,7 +222,7 @@ def with_outages(events: list[Event], seed: int) -> list[Event]:
 
 
 @pytest.mark.slow
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
 def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
     short_drive: Drive, seed: int, only: str, bridge_s: int

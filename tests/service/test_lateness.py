@@ -42,6 +42,7 @@ def test_with_fixes_a_row_waits_for_the_estimator_alone() -> None:
     assert 4 < latest_s((0, 0)) <= LONGEST_LAG_US / US_PER_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lost", "first_fix_s", "bridge_s"), [
     ((40, 49), 0.0, 10.0), ((40, 70), 0.0, 10.0), ((0, 0), 30.0, 10.0), ((20, 78), 0.0, 60.0)],
     ids=["loss of 9 s", "tunnel", "late first fix", "loss of 58 s, bridged"])

@@ -145,6 +145,7 @@ def test_a_header_that_cannot_be_is_refused(gps: dict[str, Any]) -> None:
         wiring.receiver_for_dump(header, Config(), place="dump:1")
 
 
+@pytest.mark.slow
 def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> None:
     with open_dump(short_dump) as reader:
         header, events = reader.header, list(reader)[:6000]

@@ -24,6 +24,7 @@ from ..support.drives.lines import (
     zda,
 )
 from ..support.drives.replay import core_for
+from ..support.slow import slow
 
 
 def by_and_by(utc: datetime, t_s: float) -> list[str]:
@@ -48,17 +49,14 @@ def minimum_alone(utc: datetime, t_s: float) -> list[str]:
 
 @pytest.mark.parametrize("receiver", [
     Receiver(rmc_gga_and(14)),
-    Receiver(rmc_gga_and(8), baud=4800),
-    Receiver(rmc_gga_and(4), every_s=0.1, baud=38400),
-    Receiver(minimum_alone, buffer_bytes=1024),
-    Receiver(by_and_by),
-    Receiver(rmc_gga_and(14), jumps=((-1, 2), (40, -2))),
+    *slow(Receiver(rmc_gga_and(8), baud=4800), Receiver(rmc_gga_and(4), every_s=0.1, baud=38400),
+          Receiver(minimum_alone, buffer_bytes=1024), Receiver(by_and_by),
+          Receiver(rmc_gga_and(14), jumps=((-1, 2), (40, -2)))),
     Receiver(rmc_gga_and(2), jumps=((-1, 1), (40, -1))),
     Receiver(rmc_gga_and(2), every_s=2),
-    Receiver(rmc_gga_and(2), every_s=5),
-    Receiver(two_rates),
+    *slow(Receiver(rmc_gga_and(2), every_s=5), Receiver(two_rates)),
     Receiver(place_time_speed_apart),
-    Receiver(speed_first),
+    *slow(Receiver(speed_first)),
 ], ids=["full", "full at 4800", "full at 10 Hz", "full with RMC alone, a small buffer", "full now and then",
         "full, and its clock jumps by 2 s", "its clock jumps by 1 s", "each 2 s", "each 5 s", "speed each 3 s", "GLL",
         "VTG before GLL"])
@@ -90,6 +88,7 @@ def test_a_full_line_is_reported_with_what_to_do() -> None:
     assert sends == pytest.approx(sum(len(text) + 6 for text in texts), rel=0.03)
 
 
+@pytest.mark.slow
 def test_where_nobody_knows_how_late_fixes_are_rows_say_so() -> None:
     def heard_late(utc: datetime, t_s: float) -> list[str]:
         return rmc_gga_and(14 if t_s < 30 else 2)(utc, t_s)

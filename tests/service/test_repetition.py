@@ -86,6 +86,7 @@ def twice(data: bytes, number: int, last: bytes) -> tuple[bytes, int, bytes]:
     return out, number, last
 
 
+@pytest.mark.slow
 def test_rows_of_repeated_lines_are_flagged_and_have_no_figures() -> None:
     drive = drive_at(100)
     events, number, last = [], 0, b""

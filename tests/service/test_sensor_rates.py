@@ -77,6 +77,7 @@ def test_rows_with_lines_lost_at_even_intervals_are_right_or_flagged(rate_hz: in
     assert sum("gap" in row.flags for row in rows.records) > 0.4 * len(rows.records)
 
 
+@pytest.mark.slow
 def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
     lost = randomly_lost(100, 0.01)
     drive, rows = rows_at(100, 0.01)

@@ -100,7 +100,7 @@ def samples_are_what_it_felt(name: str, settings: Any, folder: Path) -> None:
         np.testing.assert_allclose(facts["mps2_per_count"], sheet.step_mps2)
 
 
-def recording_alone_gives_the_same_rows(name: str, settings: Any, folder: Path, seconds: float = 25) -> Rows:
+def recording_alone_gives_the_same_rows(name: str, settings: Any, folder: Path, seconds: float = 20) -> Rows:
     """A dump, replayed with nothing but what its first line says, gives the live service's rows."""
     driven = Ride(name, folder, settings).drive(seconds)
     live = driven.rows()
@@ -119,7 +119,7 @@ def recording_alone_gives_the_same_rows(name: str, settings: Any, folder: Path, 
     assert kind.readings(after) == kind.readings(before)
     stated = [{key: fact for key, fact in kind.facts(one).items() if key not in OUTSIDE} for one in (before, after)]
     assert stated[0] == stated[1]
-    assert len(live.rows) > seconds * 1.2
+    assert len(live.rows) > seconds
     assert rows.rows == live.rows
     return live
 

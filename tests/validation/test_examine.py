@@ -51,6 +51,7 @@ def test_the_lab_finds_what_was_hidden(kind: str, seed: int, effect: str | None)
         assert numbers_right(record), [one.words for one in numbers(record)]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_drives")
 def test_an_effect_that_the_cars_numbers_can_do_is_nothing_to_be_seen() -> None:
     one = case("one", 5, "payload")

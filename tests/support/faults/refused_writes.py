@@ -1,5 +1,5 @@
-"""A command line whose disk refuses one of its changes, or all from one on: each of them, with each error, tried from
-the same older files.
+"""A command line whose disk refuses one of its changes, or all from one on: each of them, with one error after the
+other, tried from the same older files.
 
 The command runs up to its first change; there a process is split off for each trial, so what it computes it computes
 once. Run as a program in a process of its own: ``python -m tests.support.faults.refused_writes FOLDER WORD...``.
@@ -84,8 +84,8 @@ class Trials(RefusingFiles):
         kept = {name: data for name, data in older.items() if not name.startswith(".ridelog-")}  # begun, to be gone
         wrong = [] if status == 0 and made != older else [f"without an error: {status} {good}"]
         refused: Counter[str] = Counter()
-        for at, (number, error) in product(range(1, len(kinds) + 1), enumerate(ERRORS)):
-            lasting = (at + number) % 2 == 0
+        for at, lasting in product(range(1, len(kinds) + 1), (False, True)):
+            error = ERRORS[(at + 2 * lasting) % len(ERRORS)]
             self._lay_out(older)
             if self._split(lambda number, at=at, lasting=lasting: number >= at if lasting else number == at, error):
                 return
