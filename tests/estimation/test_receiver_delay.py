@@ -21,6 +21,7 @@ def town() -> SeenDrive:
     return drive("town", TOWN_S, Mounting(30.0, 4.0, -3.0), Receiver(), Instrument(), seed=5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("yaw_deg", "delay_s", "rate_hz"), [(0, 0.05, 1), (90, 0.4, 1), (-140, 0.2, 5), (175, 0.3, 10)])
 def test_the_delay_and_forward_are_found_at_every_angle(yaw_deg: float, delay_s: float, rate_hz: float) -> None:

@@ -30,6 +30,7 @@ def butterworth_15_hz(f_hz: np.ndarray) -> np.ndarray:
     return 1 / np.sqrt(1 + (f_hz / 15.0) ** 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vehicle", "gain"), [
     (RAV4, None), (RAV4, butterworth_15_hz), (replace(RAV4, sensor=SensorPlace(ahead_m=0.8)), None),
     (GOLDEN_CAR, None), (FULL_CAR, None), (loaded(RAV4, sprung_mass_factor=2.0), None),

@@ -18,8 +18,6 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
 
-from ..support.slow import slow
-
 FINE, COARSE = Sensor(0.05, 0.0), Sensor(0.1, 0.613)
 WINDOW_M, SPACING_M, BUMP_M = 7.62, 0.05, 300.3
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
@@ -125,8 +123,9 @@ def test_stretches_four_times_as_rough_as_others(sensor: Sensor, least_r2: float
     assert np.mean(score < 2) > (0.93 if sensor is FINE else 0.86)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("window_m", "place_std_m"),
-                         [(WINDOW_M, 2.0), *slow((WINDOW_M, 0.5), (4 * WINDOW_M, 2.0))])
+                         [(WINDOW_M, 2.0), (WINDOW_M, 0.5), (4 * WINDOW_M, 2.0)])
 def test_a_misplaced_window_is_as_uncertain_as_windows_on_either_side_differ(
         window_m: float, place_std_m: float) -> None:
     """On three roads that are eight times as rough every other 150 m, whose windows that far behind and that far ahead

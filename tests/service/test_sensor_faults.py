@@ -34,7 +34,6 @@ LONG = ("an hour without a fix", "GPS date jumps for good", "system clock set ba
         "GPS date jumps for seconds")
 
 
-@pytest.mark.parametrize(("hazard", "case"), [
-    case for hazard in HAZARDS for case in cases_for_tests([hazard], quick=0 if hazard.name in LONG else 1)], ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, 1, LONG), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()

@@ -33,7 +33,7 @@ def driven(folder: Path, reported_mps: Callable[[float], float], seconds: float 
     return car
 
 
-@pytest.mark.parametrize("factor", [0.4, 2.0, *slow(0.0, 1.6, 3.6)])
+@pytest.mark.parametrize("factor", [2.0, *slow(0.0, 0.4, 1.6, 3.6)])
 def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_path: Path, factor: float) -> None:
     car = driven(tmp_path, lambda second: 15.0 * factor)
     status = car.drive(1)
@@ -83,6 +83,7 @@ def doubted(drive: Iterator[TimedFix]) -> tuple[float, list[float]]:
     return first_s, [t_us / 1e6 for t_us, is_doubtful in zip(times_us, during, strict=True) if is_doubtful]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "found_s"), [(0.6, 40), (0.7, 60), (0.8, 120), (1.2, 150), (1.3, 90), (2.0, 30)])
 def test_a_wrong_factor_of_the_speed_is_found_in_a_town(factor: float, found_s: float) -> None:
     assert np.median([doubted(town_drive(1200, seed, factor))[0] for seed in range(9)]) < found_s

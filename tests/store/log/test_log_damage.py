@@ -17,8 +17,10 @@ from ...support.faults.crashes import FACTS, OFFSET_US, problems, window
 from ...support.faults.log_damage import HAZARDS
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
+LONG = ("damage inside an open log", "damage inside an open log and the file that was made of it")
 
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=1), ids=label)
+
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, 1, LONG), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
 

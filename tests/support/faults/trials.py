@@ -107,12 +107,14 @@ def _words(broken: AssertionError) -> str:
     return str(broken) or str(traceback.extract_tb(broken.__traceback__)[-1].line)
 
 
-def cases_for_tests(hazards: Sequence[Hazard], quick: int | None = None) -> list[Any]:
-    """Each fault with each of its few cases; of these all but the first so many are slow tests, where that is said."""
+def cases_for_tests(hazards: Sequence[Hazard], quick: int | None = None, long: Sequence[str] = ()) -> list[Any]:
+    """Each fault with each of its few cases; of these all but the first so many are slow tests, where that is said, and
+    all of those that are named as long."""
     found: list[Any] = []
     for hazard in hazards:
         cases = [(hazard, case) for case in hazard.some()]
-        found += cases if quick is None else [*cases[:quick], *slow(*cases[quick:])]
+        sooner = 0 if hazard.name in long else len(cases) if quick is None else quick
+        found += [*cases[:sooner], *slow(*cases[sooner:])]
     return found
 
 
