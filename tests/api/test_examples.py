@@ -120,6 +120,7 @@ def test_what_was_written_is_read_back(names: dict[str, Any], tmp_path: Path) ->
     assert repr(ridelog.read_vehicle(tmp_path / "car.yaml")) == repr(car)
 
 
+@pytest.mark.slow
 def test_each_record_shows_itself(names: dict[str, Any]) -> None:
     run, folder = names["runs"][0], names["folder"]
     shown = [run, run.profile, names["car"], ridelog.iri(run.profile), ridelog.estimate(run, "rav4-2009"),

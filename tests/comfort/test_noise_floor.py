@@ -32,6 +32,7 @@ def figures_of(accel: np.ndarray, count: int = COUNT) -> list[RawFigures]:
             for low in range(600, len(accel) - count, count) for part in [slice(low, low + count)]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rms_mps2", "noise_mps2", "step_mps2"), [(0.4, 0.1, 0.0), (0.6, 0.3, 0.6), (1.0, 0.1, 0.6)])
 def test_ride_is_found_under_noise_within_its_errors(rms_mps2: float, noise_mps2: float, step_mps2: float) -> None:
     rng = np.random.default_rng(2)

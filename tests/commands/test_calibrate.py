@@ -144,6 +144,7 @@ def test_a_vehicle_of_the_program_is_kept_in_the_cache(
     assert f"found in {tmp_path / 'cache'}" in Call(capsys, vehicle_file("rav4-2009")).err
 
 
+@pytest.mark.slow
 def test_the_screen(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = Call(capsys, car, "--passengers", "2").out.splitlines()
     assert max(map(len, lines)) <= 100

@@ -38,6 +38,7 @@ def test_a_file_of_the_users_own_stays(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["line.csv"]
 
 
+@pytest.mark.slow
 def test_a_run_of_either_sensor_can_be_read_and_says_what_its_steps_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

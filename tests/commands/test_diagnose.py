@@ -104,6 +104,7 @@ def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys
     assert reported["steps"][-1]["error"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert diagnose(*write_runs(tmp_path / "runs", [], more=out_of_balance), "--out", str(page)) == 0

@@ -56,6 +56,7 @@ def test_a_drive_is_judged_by_the_file_that_has_its_effects(
     assert own["r2"] > max(plain["r2"], 0.85 * own["limit_r2"])
 
 
+@pytest.mark.slow
 def test_standard_errors_of_the_file_are_in_those_of_the_windows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

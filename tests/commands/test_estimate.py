@@ -157,6 +157,7 @@ def test_a_drive_alone_is_estimated_without_comparison(
         assert [w["iri_m_per_km"] for w in result["windows"]] == [w["iri_m_per_km"] for w in with_road["windows"]]
 
 
+@pytest.mark.slow
 def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
     assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
@@ -168,6 +169,7 @@ def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixtur
     assert result["limit"]["std_m_per_km"] == pytest.approx(reported(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "step", "rate"), [
     (0.11, 0.0, 100), pytest.param(0.2, 0.613, 100, marks=pytest.mark.slow),
     pytest.param(0.15, 0.0, 208, marks=pytest.mark.slow)])
@@ -229,6 +231,7 @@ def test_a_drive_that_tells_nothing_of_the_noise_says_so(
     assert "This drive shows nothing of the noise. Assumed: 0.05 m/s2" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_distance_that_goes_back_a_little_is_computed_from_the_speed(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

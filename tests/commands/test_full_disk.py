@@ -129,7 +129,7 @@ def test_every_option_that_names_a_file_to_write_is_tried() -> None:
         assert set(name.split()) & WRITE <= set(writer.words.split())
 
 
-QUICK = ("road generate --out", "convert --to", "fleet ingest --to")  # a file, of another format, a folder
+QUICK = ("convert --to",)
 
 
 RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out")  # the longest

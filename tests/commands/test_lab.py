@@ -101,6 +101,7 @@ def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
         assert words in html
 
 
+@pytest.mark.slow
 def test_for_a_program_where_nothing_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert lab(write_runs(tmp_path / "runs", []), tmp_path / "out", "--json") == 0
     reported = json.loads(capsys.readouterr().out)

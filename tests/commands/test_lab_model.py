@@ -266,6 +266,7 @@ def test_a_record_too_slow_to_show_the_wheels(rate_hz: float, runs: list[str], t
         main(["diagnose", "--same-road", "--vehicle", "rav4-2009", str(tmp_path), runs[1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [49.8, 50.0])
 def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], tmp_path: Path,
                                    capsys: pytest.CaptureFixture[str]) -> None:

@@ -164,6 +164,7 @@ def test_logs_whose_words_and_links_name_files_of_this_machine(verb: str, trap: 
 RUN_READERS = (("compare", "--vehicle", "rav4-2009"), ("estimate", "--vehicle", "rav4-2009"), ("comfort",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", RUN_READERS, ids=lambda words: words[0])
 def test_a_run_that_names_files_of_this_machine(words: tuple[str, ...], trap: Trap, dump_of: Callable[..., Path]
                                                 ) -> None:

@@ -102,6 +102,7 @@ def test_a_fit_with_coloured_noise_that_ends_at_a_bound_says_what_to_try(
     assert "try --noise white" not in reported_white
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [False, True])
 def test_a_record_that_was_low_passed_is_compared_below(bench: Path, tmp_path: Path, more: bool,
                                                         capsys: pytest.CaptureFixture[str]) -> None:

@@ -100,6 +100,7 @@ def test_phones_of_zenodo_find_the_lasers_iri(zenodo: Path, capsys: pytest.Captu
     assert page.read_text().count("<svg") == 2
 
 
+@pytest.mark.slow
 def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = made.lira_map(tmp_path / "set", {"1ccf": (0, 0.1), "85e7": (20, 0.1), "e9ef": (0, 0.2)})
     ten, hundred, _ = reported(capsys, "lira-map", folder)["tables"]
@@ -198,6 +199,7 @@ def test_lira_cd_says_what_is_wrong(lira_cd: Path, tmp_path: Path) -> None:
     assert "expected a name like platoon_CPH1_HH.hdf5" in refused("lira-cd", tmp_path / "set")
 
 
+@pytest.mark.slow
 def test_zenodo_says_what_is_wrong(zenodo: Path, tmp_path: Path) -> None:
     folder = tmp_path / "set"
     shutil.copytree(zenodo, folder)

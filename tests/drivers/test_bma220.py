@@ -137,6 +137,7 @@ def test_any_state_of_the_chip_ends_in_one_that_runs_as_set(
     bma220.check_settings()
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(stuck=st.dictionaries(
     st.sampled_from([0x00, 0x02, 0x1E, 0x20, 0x22, 0x2E, SUSPEND, SOFT_RESET]), st.integers(0, 255), min_size=1

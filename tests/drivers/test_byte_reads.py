@@ -65,6 +65,7 @@ class Renewing(RecordedBus):
 samples = st.lists(st.tuples(*[st.sampled_from([0, 4, 8, 252, 64, 68])] * 3), min_size=1, max_size=12)
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(samples, st.integers(3, 30), st.integers(0, 40))
 def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(

@@ -34,6 +34,7 @@ def even(rate_hz: float) -> npt.NDArray[np.float64]:
     return np.arange(SECONDS * rate_hz) * (1e6 / rate_hz) + 5e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("burst", [1, 10])
 def test_nothing_is_said_of_samples_that_come_as_they_are_taken(burst: int) -> None:
     samples, error_ms, _ = dated(even(100.2), burst)

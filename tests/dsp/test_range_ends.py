@@ -10,6 +10,7 @@ from logger.dsp.range_ends import range_ends
 from ..support.drives.records import FINE_HZ, ride, rounded
 
 
+@pytest.mark.slow
 def test_no_ride_and_no_sine_has_an_end() -> None:
     false = []
     for seed in range(200):

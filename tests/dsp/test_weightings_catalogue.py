@@ -115,6 +115,7 @@ def test_whole_records_give_the_saw_tooth_values_of_iso_8041(name: str, toleranc
         assert ours_mps2 == pytest.approx(expected_mps2, rel=tolerance), teeth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WEIGHTINGS)
 def test_a_whole_record_is_weighted_as_an_analog_filter_would(name: str) -> None:
     rate_hz = 1500.0

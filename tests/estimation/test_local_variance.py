@@ -210,6 +210,7 @@ def scatter_of_what_is_learnt(true_variance: np.ndarray, learns: bool) -> float:
     return float(np.mean(found))
 
 
+@pytest.mark.slow
 def test_that_a_road_is_gaussian_is_learnt_and_that_it_is_patchy_is_kept() -> None:
     block, _, _ = a_block()
     even = np.ones(block.count)

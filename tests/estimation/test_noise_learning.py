@@ -287,6 +287,7 @@ def felt() -> tuple[np.ndarray, np.ndarray]:
     return drive(car, [body_point(car)], road, time_s, 14.0 * time_s)[:, 0], 14.0 * time_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "guess", "step"), [(0.2, 0.1, 0.613), (0.3, 0.1, 0.613), (0.12, 0.05, 0.0)])
 def test_the_noise_of_a_drive_is_found(noise: float, guess: float, step: float) -> None:
     accel, way = felt()

@@ -87,6 +87,7 @@ def test_another_drive_begins_with_no_other_motion() -> None:
     assert np.all(found.motion_mps2 == 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level_m_per_km", [1.5, 3.5])
 def test_the_ride_of_a_car_that_its_engine_shakes_has_that_shaking_in_it(
     level_m_per_km: float, monkeypatch: pytest.MonkeyPatch

@@ -72,6 +72,7 @@ def test_fixes_that_are_later_are_reported_to_be_later() -> None:
     assert later.delay_s - first.delay_s == pytest.approx(0.07, abs=0.015)
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_readings_does_not_matter() -> None:
     seen = town()
     one, other = fed(seen).estimate(), fed(replace(seen, accel=seen.accel / 9.8)).estimate()
@@ -79,6 +80,7 @@ def test_the_unit_of_the_readings_does_not_matter() -> None:
     assert one.gain == pytest.approx(9.8 * (other.gain or 0.0), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_pieces_do_not_matter() -> None:
     one, other = fed(town(), chunk=1000).estimate(), fed(town(), chunk=37).estimate()
     assert one.delay_s == other.delay_s

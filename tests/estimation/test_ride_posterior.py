@@ -74,6 +74,7 @@ def later(found: list[WindowEstimate], window_m: float = WINDOW_M) -> list[Windo
     return [one for one in found if one.number * window_m > LEAD_S * SPEED_MPS]
 
 
+@pytest.mark.slow
 def test_the_ride_is_found_between_steps_larger_than_it(coarse: list[WindowEstimate]) -> None:
     found = later(coarse)
     truth = np.array([exact(3.5, one.number) for one in found])

@@ -115,6 +115,7 @@ def test_a_recorder_that_hears_half_doubles_the_iri_per_rms() -> None:
         assert other.window_iri_per_accel_rms.spread == pytest.approx(one.window_iri_per_accel_rms.spread)
 
 
+@pytest.mark.slow
 def test_mass_calms_the_body_at_every_speed() -> None:
     """What the dissertation reads off Fig 6.7 and 6.8; and rougher roads shake more at higher speed (Fig 6.4)."""
     empty, people, double = (

@@ -31,6 +31,7 @@ def butterworth_15_hz(f_hz: np.ndarray) -> np.ndarray:
     return 1 / np.sqrt(1 + (f_hz / 15.0) ** 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [4.5, 17.9, 31.3])
 def test_relation_agrees_with_drives_in_the_time_domain(speed_mps: float) -> None:
     """Monte Carlo as in 6.3 of the dissertation: a long ISO road, scipy's simulation of the half car, the r.m.s."""

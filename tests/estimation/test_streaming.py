@@ -113,6 +113,7 @@ TOWN = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "least_r2"), [(FINE, 0.9), (COARSE, 0.75)])
 def test_five_kilometres_of_town_and_road(sensor: Sensor, least_r2: float) -> None:
     drives = [driven(TOWN, iri, seed) for seed, iri in enumerate((1.5, 4.0))]
@@ -163,6 +164,7 @@ def test_windows_of_any_length(window_m: float) -> None:
     assert np.sqrt(np.mean(off**2)) < 1.6 * np.mean([window.iri_std_m_per_km for window in known]) + 0.05
 
 
+@pytest.mark.slow
 def test_a_longer_window_is_known_better() -> None:
     one = driven(steady(20.0), 3.0, 2)
     spread = [
@@ -180,6 +182,7 @@ def in_one_go(coarse: bool) -> list[tuple[object, ...]]:
     return bits(estimated(an_estimator(sensor), one.read(sensor), one.distance_m))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coarse", [False, True])
 @settings(max_examples=5)
 @given(cuts=st.lists(st.integers(0, 3600), max_size=12))

@@ -41,6 +41,7 @@ def lacking() -> Comparison:
     return compared(CAR, [FRICTION])
 
 
+@pytest.mark.slow
 def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     """Everything that is left after the refit is the noise, and nothing is said to be missing."""
     measured = np.concatenate(mistaken.plain.residuals.measured)

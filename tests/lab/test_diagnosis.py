@@ -61,6 +61,7 @@ def test_a_car_as_its_file_says_lacks_nothing(flawless: SimulatedRuns) -> None:
     assert all(one.p_value > FALSE_ALARM for one in found.candidates)
 
 
+@pytest.mark.slow
 def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics() -> None:
     rng = np.random.default_rng(3)
 
@@ -174,6 +175,7 @@ def test_what_only_another_car_would_explain_is_unexplained() -> None:
     assert not found.exceeds_noise and found.shape is None
 
 
+@pytest.mark.slow
 def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named() -> None:
     found = diagnosed(secret_runs([hidden("dry_friction", friction_force_n=200.0)]), ("tire_damping", "sensor_gain"))
     assert found.verdict == () and found.exceeds_noise and found.unexplained

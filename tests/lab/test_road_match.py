@@ -61,6 +61,7 @@ def test_where_the_sensor_is_all_noise_nothing_is_refuted() -> None:
         assert not road_match(run_of(noise), ride(seed), BAND_HZ).is_refuted
 
 
+@pytest.mark.slow
 def test_where_it_fits_better_is_found() -> None:
     """A recording of one long road, 137 m farther along, forwards and backwards."""
     road = ride(5, 3 * COUNT)

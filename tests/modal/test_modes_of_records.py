@@ -135,6 +135,7 @@ def test_one_mode_under_random_forces(frequency_hz: float, ratio: float) -> None
     assert (over < 1.6).all()  # of 12 records: a bound that is attained gives 1.45 once in a hundred
 
 
+@pytest.mark.slow
 def test_a_measured_input() -> None:
     rng = np.random.default_rng(5)
     masses, push = five([0.02] * 5), rng.standard_normal(8000)

@@ -64,6 +64,7 @@ def test_a_drive_that_passes_a_place_twice_is_laid_over_itself() -> None:
     assert np.abs(found.along_m[second] - (at_m[second] - 1000.0 + WINDOW_M / 2)).max() < WINDOW_M
 
 
+@pytest.mark.slow
 def test_lanes_of_a_town_are_distinguished() -> None:
     drives = town_drives(8, 400, seed=4)
     network = RoadNetwork()

@@ -93,6 +93,7 @@ def records(short_drive: Drive) -> list[WindowRecord]:
     return rows_of(short_drive.header, short_drive.events, Config(gps=GpsConfig(latency_s=0.15))).records
 
 
+@pytest.mark.slow
 def test_rows_hold_the_ride_its_error_and_the_raw_value(records: list[WindowRecord]) -> None:
     whole = [row for row in records if not row.flags]
     assert len(whole) > 30

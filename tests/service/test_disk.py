@@ -14,7 +14,7 @@ from ..support.faults.disks import HAZARDS
 from ..support.faults.trials import Hazard, cases_for_tests, label
 
 
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=6), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
 

@@ -198,6 +198,7 @@ def test_a_serial_sensor_gives_the_same_road(short_rows: Rows, lines_rows: Rows)
     assert abs(ours / theirs - 1) < 0.1
 
 
+@pytest.mark.slow
 def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Drive, short_rows: Rows) -> None:
     day_us = 86_400_000_000
     half = len(short_drive.events) // 2

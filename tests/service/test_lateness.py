@@ -38,6 +38,7 @@ def latest_s(lost: tuple[float, float], first_fix_s: float = 0.0, bridge_s: floa
     return latest
 
 
+@pytest.mark.slow
 def test_with_fixes_a_row_waits_for_the_estimator_alone() -> None:
     assert 4 < latest_s((0, 0)) <= LONGEST_LAG_US / US_PER_S
 

@@ -108,6 +108,7 @@ def test_where_nobody_knows_how_late_fixes_are_rows_say_so() -> None:
     assert not any(placed(row) for row in driven if "gps_late" in row.flags)
 
 
+@pytest.mark.slow
 def test_a_lost_fix_of_a_receiver_that_sends_each_two_seconds_is_a_loss() -> None:
     def with_a_hole(utc: datetime, t_s: float) -> list[str]:
         return [] if 30 < t_s < 35 else rmc_gga_and(2)(utc, t_s)

@@ -103,6 +103,7 @@ def test_rows_of_repeated_lines_are_flagged_and_have_no_figures() -> None:
     assert all(row.iri_m_per_km is None and row.a_w_mps2 is None and row.comfort == "" for row in late)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [100, *slow(200, 400)])
 def test_no_row_of_a_sound_sensor_is_flagged(rate_hz: int) -> None:
     assert not any("repeated" in row.flags for row in rows_at(rate_hz)[1].records)

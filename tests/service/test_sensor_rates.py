@@ -42,6 +42,7 @@ def test_a_sensor_that_is_too_slow_gives_no_iri() -> None:
     assert all("gap" in row.flags for row in rows.records if row.speed_mps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate_hz", "share"), [
     (100, 0.1), (200, 0.05), *slow((100, 0.03), (100, 0.02), (150, 0.1), (150, 0.01), (400, 0.05))
 ])
@@ -97,6 +98,7 @@ def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
     assert found == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("second", "count"), [(47.37, 1), *slow((31.0, 1), (66.6, 2), (80.0, 7))])
 def test_a_single_line_that_is_lost_shows(second: float, count: int) -> None:
     drive = drive_at(100)
@@ -148,6 +150,7 @@ def test_status_says_which_rate_was_seen_and_what_to_do(
     assert advice(status) == ["Nothing: all is well."]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("burst", "says", "state"), [(30, "nothing has to be done", "ok"),
                                                       (100, "send each as it is taken", "doubtful")])
 def test_status_says_that_samples_come_in_bursts(tmp_path: Path, burst: int, says: str, state: str) -> None:

@@ -55,12 +55,14 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     assert last.iri_m_per_km is not None or "faint" in last.flags  # this car's readings are white: learnt as noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, *slow(0.93, 1.07)])
 def test_a_speed_that_is_a_little_off_is_believed(tmp_path: Path, factor: float) -> None:
     car = driven(tmp_path, lambda second: 15.0 * factor, 90)
     assert "speed_doubtful" not in car.flags()
 
 
+@pytest.mark.slow
 def test_a_parked_car_whose_place_wanders_is_believed(tmp_path: Path) -> None:
     car = Car(tmp_path)
     car.speed_mps = 0.0
@@ -120,6 +122,7 @@ def test_a_receiver_that_tells_no_speed_is_reported(tmp_path: Path) -> None:
     assert "no speed" in reported
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [1, 2])
 def test_a_date_that_is_weeks_back_is_reported_with_the_setting(tmp_path: Path, turns: int) -> None:
     car = Car(tmp_path)

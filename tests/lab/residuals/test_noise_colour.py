@@ -48,6 +48,7 @@ def test_motion_that_hardly_varies_says_next_to_nothing(varies: float) -> None:
     assert steady_power(power, motion) == 0
 
 
+@pytest.mark.slow
 def test_noise_falls_or_rises_throughout_and_a_hum_does_not() -> None:
     rng = np.random.default_rng(4)
     freedom = np.linspace(40.0, 300.0, 20)

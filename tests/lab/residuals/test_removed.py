@@ -54,6 +54,7 @@ def clean_size(clean: Comparison, found: Comparison) -> float:
     return sizes[0] / whole
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_removed() -> None:
     removed = compared(lambda run: run).removed
     assert not removed.drifting_sensors and removed.drift_share == 0 == removed.filter_share
@@ -61,6 +62,7 @@ def test_nothing_is_named_where_nothing_is_removed() -> None:
     assert removed.distance_share < 0.02
 
 
+@pytest.mark.slow
 def test_a_wrong_place_is_named_with_its_share() -> None:
     found = compared(lambda run: replace(run, distance_m=run.distance_m + 1.0))
     assert found.removed.distance_error_m == pytest.approx(1.0, abs=0.05) and found.removed.distance_share > 0.95

@@ -73,6 +73,7 @@ def test_a_speed_that_swings_tells_them_too() -> None:
     assert hum is not None and not hum.found
 
 
+@pytest.mark.slow
 def test_the_shape_of_a_fitted_model_is_that_of_its_residuals() -> None:
     posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)]))
     state = refit(posterior, posterior.start()).state

@@ -101,6 +101,7 @@ def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends(runs: S
     assert found.error_after == pytest.approx(found.error_refitted, rel=0.005)
 
 
+@pytest.mark.slow
 def test_effects_that_are_there_stay_and_are_fitted_too(runs: SimulatedRuns) -> None:
     found = add(posterior_of(runs), [hidden("sensor_offset", offset_m=0.3)], [hidden("tire_damping")])
     offset, tires = found.effects

@@ -73,6 +73,7 @@ def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight
     assert fine.chosen.values["offset_m"] == pytest.approx(0.2, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_car_that_is_bent_to_the_wall_does_not_hide_what_bends_it() -> None:
     base = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)])))
     assert base.posterior.prior.at_soft_bounds(base.state.logs)
@@ -96,6 +97,7 @@ def test_what_changes_nothing_promises_nothing(slight: Baseline) -> None:
     assert no_wheel_lifts_here.gain == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too() -> None:
     patch_m = 0.75 * CAR.contact_patch_m
     base = fitted(posterior_of(secret_runs([hidden("tire_enveloping", contact_patch_m=patch_m)])))
@@ -107,6 +109,7 @@ def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too
     assert fine.chosen.values["contact_patch_m"] == pytest.approx(patch_m, rel=0.1)
 
 
+@pytest.mark.slow
 def test_as_recorded_is_the_nominal_car_on_distances_without_their_trend() -> None:
     runs = SimulatedRuns([replace(one, distance_m=1.004 * one.distance_m + 0.1) for one in secret_runs().runs], 500.0)
     base = fitted(posterior_of(runs))

@@ -106,6 +106,7 @@ def test_a_search_goes_on_where_it_had_found_as_many_as_it_might() -> None:
     assert [name for name, _ in found.steps] == [name for name, _ in two.steps]
 
 
+@pytest.mark.slow
 def test_what_explains_as_well_is_named() -> None:
     base = base_of(secret_runs([hidden("sensor_offset", offset_m=0.1)], noise_mps2=0.3))
     selection = search(("sensor_offset", "cg_shift", "sensor_gain")).run(base)

@@ -199,6 +199,7 @@ def test_a_manifest_longer_than_any_of_ours_takes_no_memory(logs: Path, stick: P
     assert_all_there(logs, stick)
 
 
+@pytest.mark.slow
 def test_the_longest_manifest_that_is_read_fits_the_memory(logs: Path, stick: Path) -> None:
     text = a_manifest(logs, stick, manifest.MAX_FILES)
     (own(logs, stick) / manifest.NAME).write_bytes(text)

@@ -24,6 +24,7 @@ def test_what_was_written_is_read(manifest: Manifest) -> None:
     assert read_manifest([format_manifest(manifest)]) == manifest
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(MANIFESTS, st.data())
 def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataObject) -> None:

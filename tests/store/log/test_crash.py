@@ -50,6 +50,7 @@ def test_a_sidecar_whose_part_never_got_its_name_goes(tmp_path: Path) -> None:
     assert not sidecar.exists()
 
 
+@pytest.mark.slow
 def test_what_a_killed_process_left_is_on_the_disk_before_it_counts_as_finished(tmp_path: Path) -> None:
     """Killed, repaired, and the power goes at once: the repaired file is whole or the part is still there."""
     (tmp_path / "life").mkdir()
