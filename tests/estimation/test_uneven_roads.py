@@ -11,6 +11,8 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.iri import rectified_slope, window_iri
+from logger.roads.sections import Windows, even_edges, sections
+from logger.roads.window_errors import WindowErrors
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
@@ -172,3 +174,33 @@ def test_errors_cover_windows_that_are_misplaced(sensor: Sensor) -> None:
     assert np.mean(score < 2) == pytest.approx(0.954, abs=0.04)
     without = np.sqrt(np.mean(np.square(np.concatenate(blind))))
     assert without > (1.2 if sensor is FINE else 1.05)  # the place's error is not small here
+
+
+@pytest.mark.slow
+def test_sections_of_roads_that_change_have_right_standard_errors() -> None:
+    """Eight drives over roads whose slopes double or halve every 20 to 300 m: errors over their standard errors."""
+    whole, alone = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        slope = np.diff(an_iso_road(2.0, 1500, 60 + seed))
+        changes = np.append(0, np.cumsum(np.exp(rng.uniform(np.log(20), np.log(300), 30))) / SPACING_M).astype(int)
+        gain = np.exp(rng.choice((-0.5, 0.5), len(changes)))
+        slope *= gain[np.searchsorted(changes, np.arange(len(slope)), side="right") - 1]
+        road = np.append(0.0, np.cumsum(slope - slope.mean()))
+        accel, distance_m = driven(road, (9.0, 15.0, 22.0, 30.0)[seed % 4])
+        found = estimated(COARSE, read(accel, COARSE, seed), distance_m)
+        start_m = WINDOW_M * np.array([one.number for one in found])
+        iri = np.array([one.iri_m_per_km for one in found])
+        errors = WindowErrors(*np.array([(one.iri_std_m_per_km, one.iri_level_std_m_per_km, one.iri_common_std_m_per_km,
+                                          one.iri_place_std_m_per_km) for one in found]).T)
+        exact = exact_iri(road)[[one.number for one in found]]
+        for chosen, into in ((errors, whole), (WindowErrors(errors.std, *np.zeros((3, len(iri)))), alone)):
+            nothing = np.zeros(len(iri))
+            off = sections(Windows(start_m, start_m + WINDOW_M, nothing + 1, iri - exact, chosen, nothing),
+                           start_m[0] + even_edges(float(start_m[-1] - start_m[0]), 21 * WINDOW_M))
+            known = off.known_m > 20 * WINDOW_M
+            into.append((off.iri_m_per_km / off.iri_std_m_per_km)[known])
+    spread, independent = (float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in (whole, alone))
+    print(f"errors of 0.1 mi over their standard errors: {spread:.2f} (right: 1); as if windows shared nothing: "
+          f"{independent:.2f}")
+    assert 0.7 < spread < 1.4 < independent
