@@ -7,13 +7,14 @@ which may not fit each other; a search takes minutes, and what is wrong has to b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.model_checks import check_model, check_moves, predicted
+from logger.api.question import Notify, silent
 from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
 
@@ -30,14 +31,6 @@ if TYPE_CHECKING:
 
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
-
-Notify = Callable[[str], None]
-"""Takes a message on the progress of some work."""
-
-
-def silent(_words: str) -> None:
-    """Ignore a message."""
-
 
 @dataclass(frozen=True, eq=False)
 class Bench:
@@ -194,6 +187,17 @@ class Bench:
             yield
         except ValueError as error:
             raise BadInput(f"{self.word}: {error}") from None
+
+
+def files_of(vehicle: object) -> list[Path]:
+    """The file of a vehicle and those of its own effects; of a model only these. BadInput as ``read_model``."""
+    from logger.shipped import vehicle_path
+    from logger.store.formats.vehicle_file import Model, read_model
+
+    if isinstance(vehicle, Model):
+        return []
+    path = vehicle_path(str(vehicle))
+    return [path, *(Path(one.file) for one in read_model(path).effects if one.file is not None)]
 
 
 def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str],

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import Notify, silent
-from logger.api.ranges import LOW_PASS, MASS_FACTOR, PASSENGERS, SEED
+from logger.api.drive_questions import CalibrateQuestion
+from logger.api.question import Notify, function
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
 from logger.errors import BadInput
+from logger.files import write_text
 from logger.shipped import vehicle_path
 from logger.store.formats import vehicle_file
-from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -50,7 +50,7 @@ class Slopes:
 class Calibration(CommandResult):
     """A vehicle's relations between roughness and vibration at s speeds.
 
-    sprung_mass_kg              of the car as it was driven, with its load [kg]
+    found                       all of it, with and without a load
     speed_mps                   (s,) 10, 20 ... 70 mph [m/s]
     iri_per_accel_rms           whole roads: IRI per r.m.s. acceleration [m/km per m/s2]
     window_iri_per_accel_rms    the same for windows: their own IRI and their own r.m.s.
@@ -58,12 +58,28 @@ class Calibration(CommandResult):
     a_w_per_iri                 whole roads: Wk-weighted r.m.s. per IRI [m/s2 per m/km]
     """
 
-    sprung_mass_kg: float
+    found: Calibrated
     speed_mps: Array
     iri_per_accel_rms: Slopes
     window_iri_per_accel_rms: Slopes
     accel_rms_per_root_gd: Slopes
     a_w_per_iri: Slopes
+
+    @property
+    def sprung_mass_kg(self) -> float:
+        """Of the car as it was driven, with its load [kg]."""
+        return float(self._json["sprung_mass_kg"])
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the figures of each speed as CSV."""
+        from logger.report.calibration_text import csv_lines
+
+        write_text(path, csv_lines(self.found.speeds), "ascii")
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """Where more is."""
+        return "Next: --out FILE.csv or --json for all figures" + (
+            "." if self.found.load else "; --passengers 2 for what a load changes.")
 
     def charts(self) -> Sequence[Chart]:
         """IRI per r.m.s. acceleration over the speed, of whole roads and of windows."""
@@ -74,64 +90,21 @@ class Calibration(CommandResult):
             for name, one in (("roads", self.iri_per_accel_rms), ("windows", self.window_iri_per_accel_rms))))]
 
 
-@dataclass(frozen=True)
-class Question:
-    """What is asked of a vehicle; as of ``calibrate``.
-
-    said    how a window's length is written in a complaint
-    """
-
-    window_m: float = WINDOW_M
-    low_pass_hz: float | None = None
-    passengers: int = 0
-    sprung_mass_factor: float = 1.0
-    seed: int = 1
-    recompute: bool = False
-    said: str = "window_m"
-
-
-def calibrate(
-    vehicle: Model | Path | str, *, window_m: float = WINDOW_M, low_pass_hz: float | None = None, passengers: int = 0,
-    sprung_mass_factor: float = 1.0, seed: int = 1, recompute: bool = False, progress: Notify = silent,
-) -> Calibration:
-    """How much a vehicle shakes on roads of known roughness: its model drives over random roads of IRI 1 to 10 m/km, at
-    10 to 70 mph.
-
-    vehicle               with its effects; a model, or a name or file as in ``read_vehicle``. What is found of a name
-                          or a file is kept beside the file or in the user's cache, and taken from there the next
-                          time, unless an effect of your own is in it
-    window_m              length of a window, 2 to 200 [m]; 25 ft by default
-    low_pass_hz           of the recorder's settings, 1 to 45 [Hz]; None: none
-    passengers            people of 75 kg more in the car; a half car gets half of their mass, a quarter car a quarter
-    sprung_mass_factor    so many times the body's mass, 0.2 to 10
-    seed                  another number, other roads
-    recompute             do not look for a stored result
-    progress              called with where the result is from
-
-    Raises BadInput for numbers out of range, and as ``read_vehicle``. Source: Blum 2015,
-    section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
-
-    >>> found = calibrate(car)
-    >>> found.iri_per_accel_rms.slope.round(1).tolist()
-    [27.9, 18.2, 13.3, 10.9, 9.5, 7.9, 7.1]
-    """
+def calibration_of(question: CalibrateQuestion) -> Calibration:
+    """The answer to ``CalibrateQuestion``, which says what is raised."""
     from logger.report.calibration_text import as_json, lines
 
-    LOW_PASS.check("low_pass_hz", LOW_PASS.low if low_pass_hz is None else low_pass_hz)
-    PASSENGERS.check("passengers", passengers)
-    MASS_FACTOR.check("sprung_mass_factor", sprung_mass_factor)
-    SEED.check("seed", seed)
-    question = Question(window_m, low_pass_hz, passengers, sprung_mass_factor, seed, recompute)
-    if isinstance(vehicle, Model):
-        found = calibrated(vehicle, None, question, progress)
-    else:
-        path = vehicle_path(str(vehicle))
-        found = calibrated(vehicle_file.read_model(path), path, question, progress)
-    summary, speeds = as_json(found), found.speeds
+    vehicle = question.vehicle
+    path = None if isinstance(vehicle, Model) else vehicle_path(str(vehicle))
+    found = calibrated(vehicle if isinstance(vehicle, Model) else vehicle_file.read_model(str(path)), path, question)
+    speeds = found.speeds
     return Calibration(
-        "\n".join(lines(found)), summary, summary["sprung_mass_kg"], np.array([one.speed_mps for one in speeds]),
+        "\n".join(lines(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
         *(_slopes(speeds, name) for name in (
             "iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri")))
+
+
+calibrate = function("calibrate", CalibrateQuestion, calibration_of)
 
 
 def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
@@ -139,12 +112,11 @@ def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
     return Slopes(*(np.array([getattr(line, one.name) for line in lines]) for one in fields(Slopes)))
 
 
-def calibrated(model: vehicle_file.Model, path: Path | None, question: Question, notify: Notify = silent) -> Calibrated:
+def calibrated(model: vehicle_file.Model, path: Path | None, question: CalibrateQuestion) -> Calibrated:
     """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has, and for a
     vehicle that lacks what its model or an effect needs.
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
-    notify    called with where they are from
     """
     from logger.estimation.rms_calibration import CalibrationSettings, loaded
     from logger.report.calibration_text import Calibrated, Load
@@ -153,11 +125,12 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Question,
     try:
         settings = CalibrationSettings(window_m=question.window_m, seed=question.seed)
     except ValueError as error:
-        raise BadInput(f"{question.said}: {error}") from None
+        raise question.wrong("window_m", f": {error}") from None
     vehicle = model.vehicle
     if any(one.file is not None for one in model.effects):
         path = None  # what is in that file may change
-    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute, notify)
+    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute,
+               question.progress)
     plain = _answer(ask, vehicle, vehicle.name)
     people, factor = question.passengers, question.sprung_mass_factor
     if not people and factor == 1.0:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.drive_questions import ModesQuestion
 from logger.api.drives import read_run
-from logger.api.ranges import SPEED
 from logger.api.vehicles import model_of
-from logger.api.vibration_records import Channels, Found, Question, name_of, read_channels
+from logger.api.vibration_records import Channels, Found, name_of, read_channels
 from logger.errors import BadInput
 from logger.runs import READING, SKIP_S
 from logger.store.formats.channel_file import SPEED as SPEED_COLUMN
@@ -24,7 +24,7 @@ METHOD = "vehicle"
 _UNUSED = ("order", "response", "input_column")
 
 
-def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Found:
+def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -> Found:
     """The modes of the vehicle near the one of the question that was driven. BadInput as ``logger.api.modal.modes``."""
     from logger.modal.driven_car import car_modes
 
@@ -35,16 +35,16 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Fou
                        f"{', '.join(one.effect.name for one in model.effects)}")
     for option in _UNUSED:
         if getattr(question, option) is not None:
-            raise question.wrong(option, f": expected a record without {question.said('vehicle')}")
+            raise question.wrong(option, ": expected a record without `vehicle`")
     if question.method is not None:
-        raise question.wrong("method", f" {question.method}: expected none with {question.said('vehicle')}, whose "
+        raise question.wrong("method", f" {question.method}: expected none with `vehicle`, whose "
                                        "numbers are fitted to the spectrum")
     name, start_s, rate_hz, samples, speed_mps, usable = _record(given, question)
     time_s = start_s + np.arange(len(samples)) / rate_hz
     first_s = time_s[0] + SKIP_S if question.from_s is None else question.from_s
     inside = (time_s >= first_s) & (time_s <= (time_s[-1] if question.to_s is None else question.to_s))
     if not inside.any():
-        raise BadInput(f"{name}: expected {question.said('from_s')} before {question.said('to_s')}, within "
+        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within "
                        f"{time_s[0]:g} to {time_s[-1]:g} s")
     if not np.ptp(samples[inside]) > 0:
         raise BadInput(f"{name}: expected an acceleration that moves, found {samples[inside][0]:g} m/s2 all along")
@@ -55,15 +55,14 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Fou
     return Found(found, METHOD, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
 
 
-def _record(given: ChannelRecord | Path | str, question: Question
+def _record(given: ChannelRecord | Path | str, question: ModesQuestion
             ) -> tuple[str, float, float, Array, Array, npt.NDArray[np.bool_]]:
     """Name, start [s], rate [Hz], readings, speeds [m/s] and whether each is a reading."""
     path = given if isinstance(given, Path | str) else None
-    said = question.said("speed")
     if path is not None and (Path(path).is_dir() or SPEED_COLUMN in header_of(Path(path))):
         drive = read_run(path)
         if question.speed_mps is not None:
-            raise question.wrong("speed", f": expected a record without speeds, {drive.path} has them")
+            raise question.wrong("speed_mps", f": expected a record without speeds, {drive.path} has them")
         if question.columns is not None and tuple(question.columns) != (VERTICAL,):
             raise question.wrong("columns", f" {','.join(question.columns)}: expected {VERTICAL} of a drive")
         if drive.speed_mps.max() == 0:
@@ -72,12 +71,11 @@ def _record(given: ChannelRecord | Path | str, question: Question
         return (str(drive.path), float(drive.time_s[0]), drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, usable)
     name = name_of(given)
     if question.speed_mps is None:
-        raise BadInput(f"{name}: expected a column {SPEED_COLUMN}, or {said} M/S")
-    SPEED.check(said, question.speed_mps)
+        raise question.complaint(f"{name}: expected a column {SPEED_COLUMN}, or `speed_mps` M/S")
     record = read_channels(path, question.columns or (VERTICAL,)) if path is not None else given
     assert isinstance(record, ChannelRecord)
     if len(record.names) != 1:
-        raise BadInput(f"{name}: expected one sensor ({question.said('columns')})")
+        raise question.complaint(f"{name}: expected one sensor (`columns`)")
     count = len(record.samples)
     return (name, record.start_s, record.rate_hz, record.samples[:, 0], np.full(count, question.speed_mps),
             np.ones(count, bool))

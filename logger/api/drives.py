@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from logger import bounds
-from logger.api.bench import Notify, silent
-from logger.api.ranges import ADDED, AUTO, NOISE, RATE, SPEED, WINDOW
+from logger.api.drive_questions import EstimateQuestion
+from logger.api.question import Notify, function, silent
+from logger.api.ranges import ADDED, RATE, SPEED
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.chart_data import line
 from logger.errors import BadInput
-from logger.files import make_folder, together
+from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
 from logger.store.formats.run_file import facts_beside, write_run_facts
-from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -99,6 +99,18 @@ def read_run(path: Path | str) -> Run:
                excitation=drive_file.excitation_beside(drive) if timed else None)
 
 
+def run_on_road(given: Run | Path | str) -> Run:
+    """A run, or its folder, with the road that it was driven on, or its excitation. BadInput for one without."""
+    if not isinstance(given, Run) and not Path(given).is_dir():
+        raise BadInput(f"{given}: expected a folder with {drive_file.DRIVE} and {drive_file.PROFILE} (or "
+                       f"{drive_file.EXCITATION})")
+    run = given if isinstance(given, Run) else read_run(given)
+    if run.track is None:
+        raise BadInput(f"{run.path}: expected a run with the profile that it was driven on, or its excitation "
+                       f"({drive_file.PROFILE} or {drive_file.EXCITATION})")
+    return run
+
+
 def _file_of(place: Path) -> Path:
     return place / drive_file.DRIVE if place.is_dir() else place
 
@@ -108,12 +120,13 @@ def _profile_beside(place: Path) -> Profile | None:
     return read_profile(profile) if place.is_dir() and profile.exists() else None
 
 
-def checked_run(run: Run | Path | str, asked: RecordRules) -> tuple[Run, EvenRecord]:
+def checked_run(run: drive_file.Drive | Path | str, asked: RecordRules) -> tuple[Run, EvenRecord]:
     """A run, or its file, judged and, where that was ``asked`` for, mended; and what was found.
 
     Raises BadInput as ``read_run``, and for what would give a wrong result.
     """
-    if isinstance(run, Run):
+    if isinstance(run, drive_file.Drive):
+        run = run if isinstance(run, Run) else Run(**vars(run))
         names = (*drive_file.COLUMNS, *drive_file.PLACE, drive_file.USABLE)
         arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg, run.usable)
         columns = {name: one for name, one in zip(names, arrays, strict=True) if one is not None}
@@ -266,6 +279,7 @@ def _profile_of(track: Track) -> Profile:
 class Estimate(CommandResult):
     """The road's roughness from a drive's acceleration, in w windows.
 
+    found                all of it, as it was estimated
     mean_iri_m_per_km    of the windows that are known; NaN: none is
     edges_m              (w + 1,) ends of the windows [m]
     speed_mps            (w,) mean speed in each [m/s]
@@ -278,6 +292,7 @@ class Estimate(CommandResult):
     doubts               what may be wrong with the drive's record, a line each
     """
 
+    found: Assessment
     mean_iri_m_per_km: float
     edges_m: Array
     speed_mps: Array
@@ -289,6 +304,32 @@ class Estimate(CommandResult):
     profile: tuple[Profile, ...]
     doubts: tuple[str, ...] = ()
 
+    title: ClassVar[str] = "Roughness from acceleration"
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """The doubts."""
+        return self.doubts
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the windows as CSV, or the profile, each of its parts as a file of its own."""
+        from logger.report.estimate_text import window_lines
+
+        if option == "--out":
+            write_text(path, window_lines(self.found), "ascii")
+            return
+        for number, part in enumerate(self.profile, start=1):
+            file = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+            write_profile(file, part)
+            self._json["profile_files"].append(str(file))
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """Where the profile is."""
+        if files := self._json["profile_files"]:
+            return "\n".join(f"Profile: {file}" for file in files)
+        return "".join(f"No profile in {path}: the readings resolve no wavelengths over a stretch longer than the "
+                       "longest of them" for path in written.get("--profile-out", ()))
+
     def charts(self) -> Sequence[Chart]:
         """The IRI along the way with its standard error, and that of the profile where it is known."""
         from logger.chart_data import Curves, Line
@@ -298,64 +339,30 @@ class Estimate(CommandResult):
         lines = [Line("estimate", at_m[known], self.iri_m_per_km[known], self.iri_std_m_per_km[known])]
         if exact.any():
             lines.append(Line("profile", at_m[exact], self.iri_exact_m_per_km[exact]))
-        title = "Roughness from acceleration"
-        return [Curves(title, "distance [m]", "IRI [m/km]", tuple(lines))] if known.any() else []
+        return [Curves(self.title, "distance [m]", "IRI [m/km]", tuple(lines))] if known.any() else []
 
 
-def estimate(
-    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] | None = None,
-    step_mps2: float | None = None, window_m: float = WINDOW_M, unit: str | None = None,
-    resample_hz: float | None = None, anyway: bool = False,
-) -> Estimate:
-    """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
-    the run has a profile.
-
-    run           as ``read_run``; its distance may go back by up to 1 m, and is then computed again from the speed
-    vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
-    noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
-                  its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``; None: what the run's
-                  ``run.yaml`` says, or learnt
-    step_mps2     step that readings are rounded to; 0: none; None: what the run's ``run.yaml`` says, or none [m/s2]
-    window_m      1 to 1000 [m]; 25 ft by default
-    unit, resample_hz    as ``comfort``
-    anyway        go on where the run does not seem to be of its profile's road
-
-    Raises BadInput for a drive that cannot be used, or of another road than its profile's, what makes the result wrong
-    (repeated samples, gravity in g), and as ``read_run`` and ``read_vehicle``.
-    Source: a smoother of the road's state as ISO 8608 lets expect it (``logger.estimation``).
-
-    >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
-    >>> found.iri_m_per_km.shape == found.iri_exact_m_per_km.shape == (len(found.flags),)
-    True
-    """
-    model = model_of(vehicle)
-    if isinstance(noise_mps2, str):
-        if noise_mps2 != AUTO:
-            raise BadInput(f"noise_mps2: expected {AUTO} or a number, found {noise_mps2!r}")
-    elif noise_mps2 is not None:
-        NOISE.check("noise_mps2", noise_mps2)
-    if step_mps2 is not None:
-        ADDED.check("step_mps2", step_mps2)
-    WINDOW.check("window_m", window_m)
-    drive, checked = checked_run(run, RecordRules(unit, resample_hz))
-    found = assessed(drive, model, *sensor_of(drive, noise_mps2, step_mps2), window_m, anyway=anyway)
-    return estimate_by(found, checked, str(drive.path))
-
-
-def estimate_by(found: Assessment, checked: EvenRecord, name: str, files: Sequence[str] = ()) -> Estimate:
-    """What was found of a drive of this name, to be shown; ``files``: of its profile, where they were written."""
+def estimated(question: EstimateQuestion) -> Estimate:
+    """The answer to ``EstimateQuestion``, which says what is raised."""
     from logger.report.estimate_text import as_json, lines
     from logger.report.record_checks_text import checks_json, checks_lines
 
-    summary = as_json(name, found, list(files)) | checks_json(checked)
+    model = model_of(question.vehicle)
+    drive, checked = checked_run(question.run, RecordRules(question.unit, question.resample_hz))
+    found = assessed(drive, model, *sensor_of(drive, question.noise_mps2, question.step_mps2), question.window_m,
+                     question.warn, question.anyway)
+    summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
     text = "\n".join([*checks_lines(checked), *lines(found, summary)])
-    return Estimate(text, summary, summary.get("iri_m_per_km", np.nan), windows.edges_m,
+    return Estimate(text, summary, found, summary.get("iri_m_per_km", np.nan), windows.edges_m,
                     windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),
                     tuple(doubt.words for doubt in checked.doubts))
+
+
+estimate = function("estimate", EstimateQuestion, estimated)
 
 
 def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float | None = None) -> tuple[Sensor, bool]:

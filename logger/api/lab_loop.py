@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.bench import Bench, Notify, among, silent
+from logger.api.bench import Bench, among
+from logger.api.diagnosis import Diagnosis, diagnosis_of
 from logger.api.lab import (
     AddedEffect,
     Comparison,
-    Diagnosis,
-    Runs,
     addition_of,
     bench_with,
     comparison_of,
-    diagnosis_of,
 )
+from logger.api.lab_questions import LabLoopQuestion
 from logger.api.outputs import check_out
+from logger.api.question import Notify, function
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.errors import BadInput
@@ -53,6 +53,7 @@ added, and the vehicle file that is read, or written where an effect is added; o
 class LabStory(CommandResult):
     """What the loop came to.
 
+    story                all of it, as the lab has it
     model                with all that was added, as the last file has it
     first                comparison of the model as it was given
     diagnoses            at least one
@@ -65,6 +66,7 @@ class LabStory(CommandResult):
     page                 the file with all of it
     """
 
+    story: Story
     model: Model
     first: Comparison
     diagnoses: tuple[Diagnosis, ...]
@@ -85,50 +87,16 @@ class LabStory(CommandResult):
         return [falling("How the error fell", self.steps, self.noise_floor_error)]
 
 
-def lab(
-    vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
-    candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
-    anyway: bool = False, learns: bool = True,
-) -> LabStory:
-    """The lab's whole loop: compare, diagnose, learn a law where no effect explains what is missing, add what is
-    missing, compare again, until nothing is, six effects at most. It takes minutes, and the compiler of the ``lab``
-    extra.
-
-    vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
-    out             folder for a vehicle file of each step (``vehicle-1.yaml``), the page ``story.html``, and ``law.py``
-                    where a law is learned
-    ask             given the name of an effect that was found missing, gives that of the one to be added, or None for
-                    none; without it all that is missing is added
-    learns          whether a law is learned at all
-    candidates, effect_files, progress    as in ``diagnose``
-
-    Raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer that is no
-    effect; OSError for files that cannot be written.
-
-    >>> story = lab(car, runs, folder / "lab", candidates=["sensor_gain", "time_offset"])
-    >>> [one.effect for one in story.additions], story.comparisons[-1].missing
-    (['sensor_gain'], False)
-    >>> [one.effect.name for one in read_vehicle(folder / "lab" / "vehicle-1.yaml").effects]
-    ['sensor_gain']
-    """
-    from logger.report.session_text import as_json, ending, steps
-
-    place = Path(out)
-    bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab",
-                       low_pass_hz=low_pass_hz, anyway=anyway)
-    bench = replace(bench, effects=among(bench.effects, candidates))
+def story_of(question: LabLoopQuestion) -> LabStory:
+    """The answer to ``LabLoopQuestion``, which says what is raised."""
+    place, bench = Path(question.out), bench_with(question, None if question.candidates is not None else "ridelog lab")
+    bench = replace(bench, effects=among(bench.effects, question.candidates))
     make_ready(bench, place)
-    story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress), learns=lambda: learns)
-    rows = [(words, f"{error:.3f}") for words, error in steps(story)]
-    summary = as_json(story) | {"story": str(place / STORY)}
-    return LabStory(
-        "\n".join([*columns([("Model", "Error"), *rows]), "", paragraphs(ending(story))]), summary, model_of(model),
-        comparison_of(story.first), tuple(map(diagnosis_of, story.diagnoses)),
-        tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
-        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused,
-        Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
-        summary["noise_floor_error"], tuple(steps(story)), place / STORY)
+    return walk(bench, place, _asking(question.ask), unsaid_lines, lambda: nullcontext(question.progress),
+                learns=lambda: question.learns)
+
+
+lab = function("lab", LabLoopQuestion, story_of)
 
 
 def _asking(ask: Callable[[str], str | None]) -> Ask:
@@ -169,22 +137,30 @@ def always() -> bool:
 
 
 def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = unexplained,
-         learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
-    """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
+         learns: Learns = always) -> LabStory:
+    """Go through the loop; write the vehicle files and the page into ``out``.
 
     learns      asked once, where no effect explains what is missing
     notify        called with what was found
     progress    context around what takes long, called with what is under way
     explain     what to say of each step in addition to what it finds
     """
-    from logger.report.session_text import ending
+    from logger.report.session_text import as_json, ending, steps
     from logger.report.story_page import page
 
     story, model = go_through(given, out, ask, notify, progress, explain, learns)
     write_text(out / STORY, page(story))
     notify(chapter("The end", explain("end", "", "")))
     notify([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
-    return story, model
+    rows = [(words, f"{error:.3f}") for words, error in steps(story)]
+    summary = as_json(story) | {"story": str(out / STORY)}
+    return LabStory(
+        "\n".join([*columns([("Model", "Error"), *rows]), "", paragraphs(ending(story))]), summary, story,
+        model_of(model), comparison_of(story.first), tuple(diagnosis_of(one, given) for one in story.diagnoses),
+        tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
+        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused,
+        Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
+        story.floor, tuple(steps(story)), out / STORY)
 
 
 def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from logger.api.bench import Bench, Notify, silent
-from logger.api.lab import Runs, bench_with
+from logger.api.bench import Bench
+from logger.api.lab import bench_with
+from logger.api.lab_questions import LearnQuestion
+from logger.api.question import Notify, function, silent
 from logger.api.shown import CommandResult
-from logger.api.vehicles import Model
 from logger.files import write_text
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class LearnedModel:
 class LearnedLaw(CommandResult):
     """A law out of the data, or why there is none.
 
+    found                all that was learned
+    vehicle              name of the one that it is of
     family               that it is of; None: no law is learned
     words                what it is, in a sentence; or why there is none
     source               text of the Python file that holds it as an own effect; empty: none
@@ -42,6 +45,8 @@ class LearnedLaw(CommandResult):
     verdict              known effects that are missing, together with the law or instead of one
     """
 
+    found: LearnedModel
+    vehicle: str
     family: str | None
     words: str
     source: str
@@ -66,40 +71,47 @@ class LearnedLaw(CommandResult):
         return [falling("How the error fell", self.steps, self.noise_floor_error),
                 *super().figures()]
 
-    def write(self, path: Path | str) -> None:
-        """Write the law's file. ValueError where no law was learned."""
-        if not self.source:
-            raise ValueError(self.words)
-        write_text(Path(path), self.source)
+    def write(self, path: Path | str, option: str = "--out") -> None:
+        """Write the law's file (.py), or the page (.html). Without a law there is no file: ``source`` is empty."""
+        if Path(path).suffix == ".html":
+            write_text(Path(path), self.as_page(""))
+        elif self.source:
+            write_text(Path(path), self.source)
+            self._json["law"] = str(path)
+
+    def as_page(self, of: str) -> Html:
+        """What was learned as one HTML document."""
+        from logger.report.law_page import page
+
+        return page(self.found.learning, self.found.addition, self.curves[0] if self.curves else None, self.vehicle,
+                    str(self._json["law"] or "law.py"))
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """How to add the law."""
+        law = next(iter(written.get("--out", ())), None)
+        if not self.source or law is None:
+            return ""
+        return "Next: " + question.command(
+            f"add-effect {law if law.is_absolute() else f'./{law}'} {{}} --out with-law.yaml")
 
 
-def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Path | str] = (),
-          tolerance: float | None = None, low_pass_hz: float | None = None, progress: Notify = silent,
-          anyway: bool = False) -> LearnedLaw:
-    """Learn a law where no known effect explains what a model lacks. It takes minutes, and the compiler of the ``lab``
-    extra.
-
-    vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
-    effect_files    Python files, each with an effect of your own that is known as well
-    progress        called with what is under way, such as ``print``
-
-    Raises BadInput as ``diagnose``.
-
-    >>> learn(car, runs).family is None    # a known effect explains it: the sensor's gain
-    True
-    """
+def law_of(question: LearnQuestion) -> LearnedLaw:
+    """The answer to ``LearnQuestion``, which says what is raised."""
     from logger.report.law_text import as_json, law_lines, source_of
 
-    bench = bench_with(vehicle, runs, effect_files, tolerance, "learn", low_pass_hz=low_pass_hz, anyway=anyway)
-    found = learned(bench, progress)
+    bench = bench_with(question, "ridelog learn")
+    found = learned(bench, question.progress)
     summary = as_json(found.learning, found.addition, None)
     drawn = picture_of(found)
     steps = tuple((one["step"], one["error"]) for one in summary["steps"])
     return LearnedLaw(
-        "\n".join(law_lines(found.learning, found.addition)), summary, summary["family"], summary["words"],
-        source_of(found.learning, found.addition), summary["parameters"], summary["standard_errors"],
-        summary["error_before"], summary["error_after"], summary["error_after_unseen"], summary["noise_floor_error"],
-        tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
+        "\n".join(law_lines(found.learning, found.addition)), summary, found, bench.model.vehicle.name,
+        summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
+        summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
+        summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
+
+
+learn = function("learn", LearnQuestion, law_of)
 
 
 def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, MODAL_METHODS, MODAL_METHODS_GONE, RESPONSES, SPEED
+from logger.api.drive_questions import ModesCommand, ModesQuestion
+from logger.api.question import function
+from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
-from logger.api.vibration_records import Channels, Found, Question, name_of, read_channels
+from logger.api.vibration_records import Channels, Found, name_of, read_channels
 from logger.errors import BadInput
+from logger.files import write_text
 from logger.store.formats import channel_file
 
 if TYPE_CHECKING:
@@ -53,6 +56,14 @@ class Modes(CommandResult):
     order: int
     poles: Array
 
+    title: ClassVar[str] = "Modes"
+
+    def write(self, path: Path, option: str = "--diagram") -> None:
+        """Write the poles of all orders as CSV."""
+        rows = [f"{order:.0f},{frequency_hz:.7g},{damping_ratio:.5g}\n"
+                for order, frequency_hz, damping_ratio in self.poles.tolist()]
+        write_text(path, "order,frequency_hz,damping_ratio\n" + "".join(rows), "ascii")
+
     def charts(self) -> Sequence[Chart]:
         """The stabilisation diagram: the poles of every order that was tried; nothing where there are none."""
         from logger.chart_data import Curves, Line
@@ -63,47 +74,28 @@ class Modes(CommandResult):
             Line("poles", self.poles[:, 1], self.poles[:, 0], dots=True),))]
 
 
-def modes(
-    record: Channels | Path | str, method: str | None = None, *, columns: Sequence[str] | None = None,
-    input_column: str | None = None, order: int | None = None, response: str | None = None,
-    from_s: float | None = None, to_s: float | None = None,
-    vehicle: Model | Path | str | None = None, speed_mps: float | None = None,
-) -> Modes:
-    """Natural frequencies, damping ratios and mode shapes of a free decay or of a response to random forces, each with
-    its standard deviation. The order and the modes are chosen by rule.
-
-    A drive needs the ``vehicle``: what its sensor reads is coloured by the road, and by the second axle that follows
-    the first. Then the vehicle's springs, dampers and masses are fitted to the spectrum, and the modes are those of the
-    numbers found (``logger.modal.driven_car``).
-
-    record          100 samples or more; or its CSV file, as ``read_channels``; with a vehicle a drive or its folder, as
-                    ``read_run``, or a record of one sensor with ``speed_mps``
-    method          era, for a free decay; ssi, for a random response; n4sid, beside a measured input; None: as the
-                    record is; decrement (Eq 5.2 of Blum 2015), for one mode of a free decay; none with a vehicle
-    columns         of the sensors; None: all but the input
-    input_column    of a force or motion that was measured, for n4sid
-    order           states of the model, 2 or more; None: chosen by rule
-    response        "decay" or "random"; None: the record is looked at
-    from_s, to_s    stretch to be looked at [s]; None: as long as the record
-    vehicle         that was driven, as in ``read_vehicle``; its wheelbase, contact patch and sensor's place are held
-    speed_mps       of a record that does not say it
-
-    Raises BadInput for what does not fit together, a record that is too short for it, and as ``read_channels``. Source:
-    P. van Overschee and B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
-
-    >>> t_s = np.arange(1000) / 100
-    >>> top = np.exp(-0.02 * 2 * np.pi * 1.5 * t_s) * np.cos(2 * np.pi * 1.5 * t_s)
-    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(1000)
-    >>> found = modes(make_channels({"top": top + noise}, rate_hz=100.0), "era")
-    >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
-    ([1.5], [0.02])
-    """
-    question = Question(method, columns, input_column, order, response, from_s, to_s, vehicle, speed_mps)
-    return modes_by(question, found_modes(record, question),
-                    "record" if isinstance(record, Channels) else Path(record).name)
+def modes_of(question: ModesQuestion) -> Modes:
+    """The answer to ``ModesQuestion``, which says what is raised."""
+    return _modes_by(found_modes(question.record, question), question.named())
 
 
-def modes_by(question: Question, found: Found, name: str) -> Modes:
+modes = function("modes", ModesQuestion, modes_of)
+
+
+def asked_modes(question: ModesCommand) -> CommandResult:
+    """What the terminal asked: modes of a record, of a vehicle alone, or of the example."""
+    from logger.report.five_storey_text import example_lines, five_storey
+
+    if question.example is not None:
+        example = five_storey()
+        return CommandResult("\n".join(example_lines(example)), example)
+    if question.vehicle is not None and question.record == Path():
+        return vehicle_modes(model_of(question.vehicle), question.iri_m_per_km or COMMON_IRI,
+                             question.speed_mps or COMMON_SPEED_MPS)
+    return modes_of(question)
+
+
+def _modes_by(found: Found, name: str) -> Modes:
     """What was found of a record of this name, to be shown."""
     from logger.modal.mode import pole_rows
     from logger.report.modal_text import as_json, lines
@@ -172,56 +164,48 @@ def vehicle_modes(
     return VehicleModes(text, vehicle_json(*columns), *columns)
 
 
-def found_modes(given: channel_file.ChannelRecord | Path | str, question: Question) -> Found:
+def found_modes(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
     """The modes of a record or of a file. BadInput as ``modes``."""
     from logger.api.driven_modes import modes_of_drive
 
     if question.vehicle is not None:
         return modes_of_drive(given, question)
     if question.speed_mps is not None:
-        raise question.wrong("speed", f": expected {question.said('vehicle')} with it")
+        raise question.wrong("speed_mps", ": expected `vehicle` with it")
     _check(question)
     _check_stands(given, question)
     record, inputs = _asked(given, question)
     try:
         return Found(*_find(question, record, inputs), record)
     except ValueError as error:
-        raise BadInput(f"{name_of(given)}: {error}") from None
+        raise question.complaint(f"{name_of(given)}: {error}") from None
 
 
-def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Question) -> None:
+def _check_stands(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion) -> None:
     """BadInput for a drive, unless what moved it was measured, or it is said to be a free decay."""
     drives = (bool({*given.names} & {*channel_file.NOT_SENSORS}) if isinstance(given, channel_file.ChannelRecord) else
               channel_file.is_drive(given))
     if drives and question.input_column is None and question.response != "decay":
-        raise BadInput(
-            f"{name_of(given)}: expected {question.said('vehicle')} with a drive: the road, and the second axle that "
+        raise question.complaint(
+            f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
             "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
-            f"looked at with {question.said('response')} decay")
+            f"looked at with `response` decay")
 
 
-def _check(question: Question) -> None:
-    """BadInput for an option that the method has no use for, or does not know."""
-    method, said = question.method, question.said("method")
-    if method in MODAL_METHODS_GONE:
-        raise question.wrong("method", f" {method}: no longer offered, it missed or made up modes: expected {said} "
-                                       f"{MODAL_METHODS_GONE[method]}"
-                                       + (f" with {question.said('input_column')}" if "x" in method else ""))
-    for option, word, known in (("method", method, (None, *MODAL_METHODS)),
-                                ("response", question.response, (None, *RESPONSES))):
-        if word not in known:
-            raise question.wrong(option, f" {word}: expected one of {', '.join(filter(None, known))}")
+def _check(question: ModesQuestion) -> None:
+    """WrongOption for an option that the method has no use for."""
+    method = question.method
     if method == "decrement" and question.order is not None:
-        raise question.wrong("order", f": expected a method with poles, not {said} {method}")
+        raise question.wrong("order", f": expected a method with poles, not `method` {method}")
     if question.input_column is not None:
         if question.response is not None:
-            raise question.wrong("response", f": expected no {question.said('input_column')}, which says what moves "
-                                             "the structure")
+            raise question.wrong("response", ": expected no `input_column`, which says what moves the structure")
         if method not in (None, "n4sid"):
-            raise question.wrong("input_column", f": expected {said} n4sid with it, found {method}")
+            raise question.wrong("input_column", f": expected `method` n4sid with it, found {method}")
 
 
-def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -> tuple[Channels, Array | None]:
+def _asked(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion
+           ) -> tuple[Channels, Array | None]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
     pushed, name = question.input_column, name_of(given)
     at = name if isinstance(given, channel_file.ChannelRecord) else f"{name}:1"
@@ -238,15 +222,15 @@ def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -
     inside = (t_s >= (t_s[0] if question.from_s is None else question.from_s)) & (
         t_s <= (t_s[-1] if question.to_s is None else question.to_s))
     if not inside.any():
-        raise BadInput(f"{name}: expected {question.said('from_s')} before {question.said('to_s')}, within {t_s[0]:g} "
+        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within {t_s[0]:g} "
                        f"to {t_s[-1]:g} s")
     samples = record.samples[inside]
     outputs = [place for place, one in enumerate(record.names) if one != pushed]
     if not outputs:
         raise BadInput(f"{at}: expected a column other than the input {pushed}")
     if not (samples.std(axis=0) > 0).all():
-        raise BadInput(f"{name}: expected every column to move between {question.said('from_s')} and "
-                       f"{question.said('to_s')}")
+        raise question.complaint(f"{name}: expected every column to move between `from_s` and "
+                       f"`to_s`")
     inputs = None if pushed is None else samples[:, [record.names.index(pushed)]]
     names = tuple(record.names[place] for place in outputs)
     return replace(record, names=names, start_s=float(t_s[inside][0]), samples=samples[:, outputs]), inputs
@@ -261,20 +245,21 @@ def _picked(given: channel_file.ChannelRecord, wanted: Sequence[str]) -> Channel
                     given.samples[:, places])
 
 
-def _find(question: Question, record: Channels, inputs: Array | None) -> tuple[ModalResult, str]:
+def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tuple[ModalResult, str]:
     """What was found, and by which method. ValueError for a record that is too short or of another kind, an order that
     it cannot carry, or an input that shows nothing."""
     from logger.modal.analysis import decays, find_modes
     from logger.modal.decrement import decrement_mode
 
-    method, said = question.method, question.said("method")
-    decay = inputs is None and (decays(record.samples) if question.response is None else question.response == "decay")
+    method = question.method
+    decay = inputs is None and (decays(record.samples) if question.response is None else
+                                question.response == "decay")
     if method in _ONLY_DECAYS and not decay:
-        raise ValueError(f"expected a free decay for {said} {method}, found a motion that goes on: {said} ssi finds "
-                         f"its modes; {question.said('response')} decay if it is a decay")
+        raise ValueError(f"expected a free decay for `method` {method}, found a motion that goes on: `method` ssi finds "
+                         f"its modes; `response` decay if it is a decay")
     if method == "decrement":
         if len(record.names) > 1:
-            raise ValueError(f"expected one column for the decrement ({question.said('columns')}), found "
+            raise ValueError(f"expected one column for the decrement (`columns`), found "
                              f"{','.join(record.names)}")
         return decrement_mode(record.samples[:, 0], record.rate_hz), method
     if question.order is not None and question.order < 2:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import check_limit
-from logger.api.sections import length_of
+from logger.api.log_questions import PassesQuestion, length_of
+from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
 from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from logger.report.html import Html
 
 Array = npt.NDArray[np.float64]
-USUAL = "25m"
-ROUGH_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,6 +47,8 @@ class RepeatedDrives(CommandResult):
     heading_deg: Array
     _found: CombinedDrives
 
+    title: ClassVar[str] = "Passes"
+
     def charts(self) -> Sequence[Chart]:
         """The IRI of the way that most cells lie on."""
         from logger.chart_data import Curves, Line
@@ -60,6 +60,12 @@ class RepeatedDrives(CommandResult):
         at_m: Array = self._found.length_m * (np.arange(len(longest), dtype=np.float64) + 0.5)
         return [Curves("Mean of the drives over the longest way", "distance [m]", "IRI [m/km]", (
             Line("IRI", at_m, self.iri_m_per_km[longest], self.iri_std_m_per_km[longest]),))]
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the cells, or the places to visit, in the format of the file's ending."""
+        from logger.exchange.format import write_layer
+
+        write_layer(self.visits() if option == "--visit" else self.layer(), path)
 
     def layer(self) -> Layer:
         """Cells as lines, for the formats of ``convert``."""
@@ -73,52 +79,30 @@ class RepeatedDrives(CommandResult):
 
         return visits_layer(self._found)
 
-    def page(self) -> Html:
+    def as_page(self, of: str) -> Html:
         """Map, curves and tables as one page."""
         from logger.report.passes_page import passes_page
 
         return passes_page(self._found)
 
 
-def day_of(text: str, option: str) -> float:
-    """The beginning of a day such as 2026-04-30 in UTC [s since 1970]. BadInput for anything else."""
-    try:
-        day = date.fromisoformat(text)
-    except ValueError:
-        raise BadInput(f"{option} {text}: expected a date such as 2026-04-30") from None
-    return datetime(day.year, day.month, day.day, tzinfo=UTC).timestamp()
+def _day_s(day: str) -> float:
+    """The beginning of a day such as 2026-04-30 in UTC [s since 1970]."""
+    return datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp()
 
 
-def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL, since: str | None = None,
-           until: str | None = None, split: str | None = None, above_m_per_km: float = ROUGH_M_PER_KM
-           ) -> RepeatedDrives:
-    """Combine repeated drives of segment logs, by place and direction.
-
-    logs              folders at any depth, or files, of segment logs; open ones too
-    length            of a cell of road, with its unit, or in metres
-    since, until      first day, and first day no more, of the rows that count (UTC): rows without a date then do not
-    split             a day: what changed between the drives before and those from it on?
-    above_m_per_km    from which IRI a place is to be visited; by default where 23 CFR 490.313 says poor
-
-    Raises BadInput for no log, none with an intact row that counts, lengths from under 25 ft or beyond 100 km, and
-    dates that are none.
-
-    >>> found = passes(folder / "logs")
-    >>> bool((found.drives >= 1).all())
-    True
-    """
+def combined(question: PassesQuestion) -> RepeatedDrives:
+    """The answer to ``PassesQuestion``, which says what is raised."""
     from logger.left_out import left_out_json, left_out_paragraph
     from logger.report.combined_drives import combined_drives
     from logger.report.left_rows import of_passes
     from logger.report.passes_text import as_json, lines
     from logger.store.log.log_reader import find_logs_in, read_found
 
-    length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
-    check_limit("above_m_per_km", above_m_per_km)
-    first_s = -np.inf if since is None else day_of(since, "--since")
-    end_s = np.inf if until is None else day_of(until, "--until")
-    split_s = None if split is None else day_of(split, "--split")
-    places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
+    since, until, places = question.since, question.until, question.places
+    first_s, end_s = -np.inf if since is None else _day_s(since), np.inf if until is None else _day_s(until)
+    above_m_per_km = question.above_m_per_km or FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
+    split_s = None if question.split is None else _day_s(question.split)
     files = read_found(find_logs_in(places))
     records = [one for file in files for one in file.records]
     if since is not None or until is not None:
@@ -126,9 +110,12 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     if not records:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row"
                        + (" of these days" if since or until else ""))
-    found = combined_drives(records, length_m, above_m_per_km, split_s)
+    found = combined_drives(records, length_of(question.length), above_m_per_km, split_s)
     left = of_passes(files, records, found.placed)
     return RepeatedDrives(
         "\n".join([*lines(found), *left_out_paragraph(left)]), as_json(found) | left_out_json(left),
         found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)
+
+
+passes = function("passes", PassesQuestion, combined)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from logger.errors import BadInput
 
@@ -14,23 +14,50 @@ class Range(NamedTuple):
     high: float
     unit: str = ""
 
+    @property
+    def is_half_open(self) -> bool:
+        """Whether it has no end."""
+        return self.high == float("inf")
+
+    @property
+    def words(self) -> str:
+        """Both ends, with the unit."""
+        return f"{self.low:g} or more" if self.is_half_open else f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
+
+    def fault(self, value: Any) -> str:
+        """What follows the name of a number that lies outside; empty: it does not."""
+        if self.low <= value <= self.high:
+            return ""
+        return f" {value if isinstance(value, int) else format(value, 'g')}: expected {self.words}"
+
     def check(self, name: str, value: float) -> None:
         """BadInput for a value outside; ``name``: of what it is."""
-        if not self.low <= value <= self.high:
-            shown = value if isinstance(value, int) else format(value, "g")
-            ends = (f"{self.low:g} or more" if self.high == float("inf") else
-                    f"{self.low:g} to {self.high:g} {self.unit}".rstrip())
-            raise BadInput(f"{name} {shown}: expected {ends}")
+        if words := self.fault(value):
+            raise BadInput(f"{name}{words}")
+
+
+class Limit(Range):
+    """An IRI from which on a road is to be called rough [m/km]; one that no road has is refused."""
+
+    @property
+    def words(self) -> str:
+        """Said by the complaint alone, as the highest is known by what is not loaded before."""
+        return ""
+
+    def fault(self, value: Any) -> str:
+        """As of ``Range``."""
+        from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
+
+        found = Range(self.low, HIGHEST_LIMIT_M_PER_KM, self.unit).fault(value)
+        return found and f"{found}{limit_hint(value)}"
+
+
+LIMIT = Limit(0.01, float("inf"), "m/km")
 
 
 def check_limit(name: str, m_per_km: float) -> None:
     """BadInput for an IRI from which on a road is to be called rough, and that no road has; ``name``: of what it is."""
-    from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
-
-    try:
-        Range(0.01, HIGHEST_LIMIT_M_PER_KM, "m/km").check(name, m_per_km)
-    except BadInput as error:
-        raise BadInput(f"{error}{limit_hint(m_per_km)}") from None
+    LIMIT.check(name, m_per_km)
 
 
 TOLERANCE = Range(0.001, 0.5)
@@ -58,3 +85,5 @@ COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
 PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
 LOW_PASS = Range(1.0, 45.0, "Hz")
 """Of a calibration: people more in the car, times the body's mass, and the recorder's low pass."""
+DAILY_HOURS = Range(0.001, 24.0, "hours")
+"""Of riding, for values of health."""

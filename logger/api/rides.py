@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.drives import Run
+from logger.api.drive_questions import ComfortQuestion
+from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
 from logger.runs import UNKNOWN, RecordFacts
-from logger.store.formats import record_file
+from logger.store.formats import drive_file, record_file
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
 from logger.store.formats.run_file import facts_beside
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+Given = record_file.AccelerationRecord | drive_file.Drive | Path | str
 _SPECTRUM_S = 5.12
 """A resolution of 0.2 Hz: a body's bounce, at 1 to 2 Hz and damped by a fifth and more, is wider."""
 
@@ -89,6 +91,13 @@ class Comfort(CommandResult):
     rate_hz: float
     doubts: tuple[str, ...] = ()
 
+    title: ClassVar[str] = "Ride comfort"
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """The doubts."""
+        return self.doubts
+
     def charts(self) -> Sequence[Chart]:
         """The running r.m.s. over 1 s, beside a_w, and the spectrum of the weighted acceleration."""
         from scipy.signal import welch
@@ -109,44 +118,25 @@ class Comfort(CommandResult):
                    log_x=True)]
 
 
-def comfort(
-    record: Record | Run | Path | str, weighting: str = "wk", *, daily_hours: float | None = None,
-    unit: str | None = None, resample_hz: float | None = None,
-) -> Comfort:
-    """The comfort and health values of an acceleration record (ISO 2631-1:1997), by the formula of the standard.
-
-    record         at the seat, 80 samples a second or more, 1 s or longer; or a run, or a file
-    weighting      of the vertical axis, by a name that ``ridelog comfort --help`` lists. With wk, x and y are weighted
-                   by wd and combined with it
-    daily_hours    of such riding, for the health values; None: as long as the record
-    unit           "g" takes the accelerations as g, "mps2" as m/s2 without asking; None: as m/s2, if they look like it
-    resample_hz    of a file: drop repeated samples, and lay uneven ones on an even grid of this rate through an
-                   anti-alias filter; 0: of its own rate, 100 Hz at least
-
-    Raises BadInput for what is none of this, for what makes the values wrong (repeated samples, gravity in g), and as
-    ``read_record``. What is doubtful is in ``doubts``, a line each.
-
-    >>> found = comfort(read_run(folder))
-    >>> found.comfort, round(found.a_w_mps2, 2)
-    ('a_little_uncomfortable', 0.32)
-    """
+def comfort_of(question: ComfortQuestion) -> Comfort:
+    """The answer to ``ComfortQuestion``, which says what is raised."""
     from logger.api.weightings import weighting_named, weightings
     from logger.comfort.ride_comfort import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
     from logger.report.comfort_text import as_json, lines
     from logger.report.record_checks_text import checks_json, checks_lines
 
-    used = weighting_named(weighting)
-    if daily_hours is not None and not 0.0 < daily_hours <= 24.0:
-        raise BadInput(f"comfort: expected more than 0 and at most 24 hours a day, found {daily_hours:g}")
-    name = "record" if isinstance(record, Record) else str(record.path if isinstance(record, Run) else record)
-    ride = _even(record, name, RecordRules(unit, resample_hz))
+    used, record = weighting_named(question.weighting), question.record
+    name = "record" if isinstance(record, record_file.AccelerationRecord) else str(
+        record.path if isinstance(record, drive_file.Drive) else record)
+    ride = _even(record, name, RecordRules(question.unit, question.resample_hz))
     axes = {axis: ride.accel_mps2.get(f"accel_{axis}_mps2") for axis in "zxy"}
     taken_hz = None if ride.resampled is None else ride.resampled.from_hz
     try:
-        found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal), daily_hours, taken_hz,
+        found = ride_comfort(axes, ride.rate_hz, used, weightings().get(used.horizontal),
+                             question.daily_hours, taken_hz,
                              _facts_of(record).seen_to_hz)
     except ValueError as error:
-        is_file = not isinstance(record, (Record, Run))
+        is_file = not isinstance(record, (record_file.AccelerationRecord, drive_file.Drive))
         can_be_laid = is_file and taken_hz is None and LEAST_TAKEN_HZ <= ride.rate_hz < LOWEST_RATE_HZ
         hint = f" (--resample takes {LEAST_TAKEN_HZ:g} or more)" if can_be_laid else ""
         raise BadInput(f"{name}: {error}{hint}") from None
@@ -157,19 +147,22 @@ def comfort(
                    tuple(doubt.words for doubt in ride.doubts))
 
 
-def _facts_of(record: Record | Run | Path | str) -> RecordFacts:
+comfort = function("comfort", ComfortQuestion, comfort_of)
+
+
+def _facts_of(record: Given) -> RecordFacts:
     """What a run says of itself, also where its ``drive.csv`` alone was given."""
-    if isinstance(record, Record):
+    if isinstance(record, record_file.AccelerationRecord):
         return UNKNOWN
-    return record.facts if isinstance(record, Run) else facts_beside(record)
+    return record.facts if isinstance(record, drive_file.Drive) else facts_beside(record)
 
 
-def _even(record: Record | Run | Path | str, name: str, asked: RecordRules) -> EvenRecord:
+def _even(record: Given, name: str, asked: RecordRules) -> EvenRecord:
     """The accelerations to weigh, checked."""
-    if isinstance(record, Run):
+    if isinstance(record, drive_file.Drive):
         found = even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
         return with_marks(found, record.usable)
-    if not isinstance(record, Record):
+    if not isinstance(record, record_file.AccelerationRecord):
         file, t_s, accel, usable = record_file.read_marked_columns(record)
         return with_marks(even_record(t_s, accel, {}, file, asked), usable)
     t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING, check_limit
+from logger.api.question import function
+from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
+from logger.api.road_questions import ClassifyQuestion, IriCommand, IriQuestion
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
+from logger.files import write_text
 from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
@@ -160,6 +163,8 @@ class Iri(CommandResult):
     profile: Profile
     localized: tuple[Area, ...] = ()
 
+    title: ClassVar[str] = "International Roughness Index"
+
     def charts(self) -> Sequence[Chart]:
         """The IRI of the windows along the way, the continuous one over 25 ft (AASHTO R 54), and the profile."""
         from logger.chart_data import Curves, Line
@@ -175,21 +180,8 @@ class Iri(CommandResult):
             *road.charts()]
 
 
-def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: float | None = None,
-        localized_m_per_km: float | None = None) -> Iri:
-    """The International Roughness Index of a profile, exactly as defined (ASTM E1926; Sayers, TRR 1501, 1995).
-
-    profile       11 m or longer, samples 0.3 m apart or less; or its file
-    window_m      length of a window [m]
-    resample_m    of a file, as ``read_profile`` [m]
-    localized_m_per_km    say where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)
-
-    Raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
-
-    >>> found = iri(random_road(iso_class="B", length_m=400.0, seed=3))
-    >>> round(found.iri_m_per_km, 2), found.windows_m_per_km.round(2).tolist()
-    (4.44, [4.3, 4.69, 4.44, 4.32])
-    """
+def iri_of(question: IriQuestion) -> Iri:
+    """The answer to ``IriQuestion``, which says what is raised."""
     from logger.report.iri_text import as_json, lines
     from logger.report.localized_text import area_lines, area_values
     from logger.roads.localized_roughness import areas
@@ -197,11 +189,10 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     from logger.roads.profile_iri import continuous_iri, profile_iri
     from logger.units import WINDOW_M
 
-    name, road = _named(profile, resample_m)
-    if localized_m_per_km is not None:
-        check_limit("localized_m_per_km", localized_m_per_km)
+    name, road = _named(question.profile, question.resample_m)
+    localized_m_per_km = question.localized_m_per_km
     try:
-        found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
+        found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, question.window_m)
     except ValueError as error:
         words = unit_complaint(road.elevation_m, road.spacing_m) or f"{error}{spacing_hint(road.spacing_m)}"
         raise BadInput(f"{name}: {words}") from None
@@ -218,6 +209,24 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: floa
     return Iri("\n".join(said), values, whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
                road.start_m + np.array(ends_m), shown[1:], road, rough)
+
+
+iri = function("iri", IriQuestion, iri_of)
+
+
+def asked_iri(question: IriCommand) -> CommandResult:
+    """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
+    2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
+    from logger.report.iri_text import response_screen
+    from logger.roads.wavelength import sinusoid_iri, slope_gain
+
+    if not question.response:
+        return iri_of(question)
+    wavelengths_m = 100.0 / 2.0 ** (np.arange(26) / 3.0)
+    gain, iri_1_mm = slope_gain(1.0 / wavelengths_m), sinusoid_iri(0.001, 1.0 / wavelengths_m)
+    columns = {"wavelength_m": wavelengths_m, "slope_gain": gain, "iri_of_1_mm_m_per_km": iri_1_mm}
+    table = [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
+    return CommandResult("\n".join(response_screen(table)), {"response": table})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,6 +248,19 @@ class RoadClass(CommandResult):
     iri_m_per_km: float
     spectrum: BandedSpectrum
 
+    title: ClassVar[str] = "Class of the road"
+
+    def write(self, path: Path, option: str = "--psd") -> None:
+        """Write the spectrum as CSV."""
+        from logger.roads.elevation_spectrum import acceleration_psd
+
+        found = self.spectrum
+        columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,
+                   acceleration_psd(found.centre_cpm, found.psd_m3), found.freedom)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        header = "lowest_cpm,highest_cpm,displacement_psd_m3,acceleration_psd_per_m,degrees_of_freedom\n"
+        write_text(path, header + "".join(",".join(f"{value:.7g}" for value in row) + "\n" for row in rows), "ascii")
+
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""
         from logger.chart_data import Curves, Line
@@ -256,22 +278,13 @@ class RoadClass(CommandResult):
                        log_x=True, log_y=True)]
 
 
-def classify(profile: Profile | Path | str, resample_m: float | None = None) -> RoadClass:
-    """The class, degree of roughness and waviness of a profile of 100 m or more (ISO 8608).
-
-    resample_m    of a file, as ``read_profile`` [m]
-
-    Raises BadInput for one that is too short or too odd, and as ``read_profile``.
-
-    >>> found = classify(random_road(iso_class="C", length_m=500.0))
-    >>> found.road_class, abs(found.waviness - 2.0) < 3 * found.waviness_std
-    ('C', True)
-    """
+def road_class_of(question: ClassifyQuestion) -> RoadClass:
+    """The answer to ``ClassifyQuestion``, which says what is raised."""
     from logger.report.road_text import as_json, lines
     from logger.roads.plausible import spacing_hint
     from logger.roads.track_class import track_class
 
-    name, road = _named(profile, resample_m)
+    name, road = _named(question.profile, question.resample_m)
     profile_file.check_road(road, name)
     tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
     try:
@@ -283,7 +296,12 @@ def classify(profile: Profile | Path | str, resample_m: float | None = None) -> 
                      left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km, left.bands)
 
 
-def _named(profile: Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
+classify = function("classify", ClassifyQuestion, road_class_of)
+
+
+def _named(profile: profile_file.Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
     """A profile and what to call it, not judged."""
-    return ("profile", profile) if isinstance(profile, Profile) else (
-        str(profile), Profile(**vars(profile_file.read_profile(profile, resample_m))))
+    if isinstance(profile, Profile):
+        return "profile", profile
+    read = profile if isinstance(profile, profile_file.Profile) else profile_file.read_profile(profile, resample_m)
+    return "profile" if read is profile else str(profile), Profile(**vars(read))

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import check_limit
+from logger.api.log_questions import SectionsQuestion, length_of
+from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
-from logger.units import FOOT_M, MILE_M
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -23,10 +22,6 @@ if TYPE_CHECKING:
     from logger.store.log.log_reader import LoggedFile
 
 Array = npt.NDArray[np.float64]
-USUAL_M = 100.0
-LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
-_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
-SYSTEMS = ("si", "us")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,11 +50,19 @@ class Sections(CommandResult):
     condition: npt.NDArray[np.str_]
     _drives: tuple[DriveSections, ...]
 
+    title: ClassVar[str] = "Sections"
+
     def charts(self) -> Sequence[Chart]:
         """The IRI of the sections along each drive."""
         from logger.report.sections_text import charts
 
         return charts(self._drives)
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the rows in the format of the file's ending."""
+        from logger.exchange.format import write_layer
+
+        write_layer(self.layer(), path)
 
     def layer(self) -> Layer:
         """Rows with places, for the formats of ``convert``."""
@@ -68,53 +71,16 @@ class Sections(CommandResult):
         return sections_layer(self._drives)
 
 
-def length_of(text: str) -> float:
-    """A length with its unit, such as 100m, 0.1mi, 500ft, 1km [m]. BadInput for anything else."""
-    found = re.fullmatch(r"([0-9.]+)\s*(m|km|mi|ft)", text.strip())
-    try:
-        length_m = float(found[1]) * _UNITS_M[found[2]] if found else 0.0
-    except ValueError:
-        length_m = 0.0
-    if not LEAST_M <= length_m <= MOST_M:
-        raise BadInput(f"length {text}: expected a length with its unit, such as 100m, 0.1mi or 500ft, from "
-                       f"{LEAST_M:g} m to {MOST_M / 1000:g} km")
-    return length_m
-
-
-def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUAL_M, units: str = "si",
-             route: Path | str | None = None, localized_m_per_km: float | None = None) -> Sections:
-    """The drives of segment logs in sections of one length, each from its own beginning.
-
-    logs      folders at any depth, or files, of segment logs; open ones too
-    length    of a section, with its unit (``0.1mi``: 23 CFR 490), or in metres
-    units     of the text: si or us
-    route     GeoJSON of one LineString, with ``begin_km`` and ``end_km`` or points with ``km`` beside it: sections then
-              are of its measures, for each pass over it, along or against it
-
-    localized_m_per_km    list where the IRI over 25 ft, which slides along, is above this (AASHTO R 54)
-
-    The standard error of a section counts what its windows' errors share; where the logs of an older version do not say
-    what that is, neighbours count as sharing all. Rows flagged ``unsettled`` stand in no mean.
-
-    Raises BadInput for no log, none with an intact row, lengths from under 25 ft or beyond 100 km, and a file that is
-    no route.
-
-    >>> found = sections(folder / "logs", "0.1mi")
-    >>> bool((found.known_m <= found.length_m + 1e-6).all())
-    True
-    """
+def sections_of(question: SectionsQuestion) -> Sections:
+    """The answer to ``SectionsQuestion``, which says what is raised."""
     from logger.left_out import left_out_json, left_out_paragraph
     from logger.report.drive_sections import drive_sections
     from logger.report.left_rows import of_sections
     from logger.report.sections_text import as_json, lines
     from logger.store.log.log_reader import find_logs_in, read_found
 
-    length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
-    if localized_m_per_km is not None:
-        check_limit("localized_m_per_km", localized_m_per_km)
-    if units not in SYSTEMS:
-        raise BadInput(f"units {units}: expected one of {', '.join(SYSTEMS)}")
-    places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
+    length_m, route, places = length_of(question.length), question.route, question.places
+    units, localized_m_per_km = question.units, question.localized_m_per_km
     files = read_found(find_logs_in(places))
     if not any(one.records for one in files):
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
@@ -129,6 +95,9 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
         speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)
+
+
+sections = function("sections", SectionsQuestion, sections_of)
 
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:

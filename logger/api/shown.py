@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+
+from logger.errors import EXIT_DONE
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -56,9 +60,37 @@ class CommandResult(Shown):
     def __repr__(self) -> str:
         return self.text
 
+    title: ClassVar[str] = ""
+    """Of its page."""
+
+    @property
+    def exit_status(self) -> int:
+        """That its command leaves with."""
+        return EXIT_DONE
+
     def as_json(self) -> dict[str, Any]:
         """The object that the command prints with ``--json``; a copy."""
         return deepcopy(self._json)
+
+    def as_page(self, of: str) -> Html:
+        """It as a page that stands alone; ``of``: what it is a result of, such as a file."""
+        from logger.report.result_page import page
+
+        return page(self.title, of, self.text, self.charts())
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What its command says on stderr, a line each."""
+        return ()
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write it as the file that an ``option`` of its command asks for: of its own kind where it has one, else its
+        page."""
+        write_text(path, self.as_page(""))
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """What its command says last, such as what to do next; ``written``: the files of the command, by option."""
+        return ""
 
 
 def table(title: str, rows: Iterable[Row]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.shown import Shown, table
-from logger.api.vehicles import Model
 from logger.chart_data import line
 from logger.errors import BadInput
 from logger.store.formats import channel_file
@@ -72,30 +71,6 @@ def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start
     if not (len(arrays[0]) > 1 and rate_hz > 0 and np.isfinite(start_s) and np.isfinite(arrays).all()):
         raise BadInput("channels: expected two finite values or more in each, and a rate above 0 Hz")
     return Channels(tuple(samples), start_s, rate_hz, np.stack(arrays, axis=1))
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is asked of a record; as of ``modes``.
-
-    vehicle      that was driven, and ``speed_mps`` of a record that does not say it
-    said         how an option is written in a complaint
-    """
-
-    method: str | None = None
-    columns: Sequence[str] | None = None
-    input_column: str | None = None
-    order: int | None = None
-    response: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
-    vehicle: Model | Path | str | None = None
-    speed_mps: float | None = None
-    said: Callable[[str], str] = str
-
-    def wrong(self, option: str, words: str) -> BadInput:
-        """The complaint about an option."""
-        return BadInput(f"{self.said(option)}{words}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.lab_questions import CompareQuestion
 from logger.commands.demo_lab import truth_beside
 from logger.commands.lab import say, take
-from logger.commands.lab_model import bench_from, on_screen, progress, wipe
+from logger.commands.screen import on_screen, progress, warned, wipe
 from logger.files import write_text
 from logger.report.text_layout import columns, paragraphs
 
@@ -129,9 +130,10 @@ def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
 
 
 def _story(commands: _Commands, out: Path, tell: Say) -> Story:
+    from logger.api.lab import bench_with
     from logger.api.lab_loop import go_through, make_ready
 
-    given = bench_from(commands.vehicle, commands.runs)
+    given = bench_with(CompareQuestion(commands.vehicle, commands.runs, warn=warned))
     make_ready(given, out, "--out")
     return go_through(given, out, take, tell, progress, commands.explain)[0]
 

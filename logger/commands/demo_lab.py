@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.lab_questions import CompareQuestion
 from logger.commands.lab import say, take, walk
-from logger.commands.lab_model import bench_from
+from logger.commands.screen import warned
 from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
@@ -35,9 +36,9 @@ _EXPLAINED = {
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.bench import require_compiler, sought_effects
-    from logger.api.lab_loop import STORY, unsaid_lines
+    from logger.api.lab import bench_with
+    from logger.api.lab_loop import unsaid_lines
     from logger.demo.lab_drives import VEHICLE
-    from logger.report.session_text import as_json as story_json
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", sought_effects().values())
@@ -49,12 +50,9 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
         return
     if not as_json:
         print(paragraphs([_INTRODUCTION]))
-    given = bench_from(VEHICLE, folders)
-    story = walk(given, out, take, unsaid_lines if as_json else say, _explained)
-    if as_json:
-        print(json.dumps(story_json(story) | {"story": str(out / STORY)}, allow_nan=False))
-    else:
-        print("\n".join(_answer(story)))
+    given = bench_with(CompareQuestion(VEHICLE, folders, warn=warned))
+    found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
+    print(json.dumps(found.as_json(), allow_nan=False) if as_json else "\n".join(_answer(found.story)))
 
 
 def _explained(chapter: str, _effect: str, _vehicle: str) -> str:

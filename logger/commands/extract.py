@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog extract``."""
     from drivers.errors import DriverError
-    from logger.commands.lab_model import wipe
+    from logger.commands.screen import wipe
 
     extract_one = _of_csv(args) if args.csv else _of_dumps(args)
     sources = args.csv or args.dumps
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
     from logger.api.extracted_runs import read_measured_profile
     from logger.api.extraction import extract_dump, name_of
-    from logger.commands.lab_model import on_screen
+    from logger.commands.screen import on_screen
     from logger.service.config import load_config
 
     if not args.dumps:
@@ -121,7 +121,7 @@ def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
 def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
     from logger.api.csv_extraction import Asked, extract_csv, run_name
     from logger.api.extracted_runs import read_measured_profile
-    from logger.commands.lab_model import on_screen
+    from logger.commands.screen import on_screen
     from logger.service.config import load_config
     from logger.store.formats.logger_columns import named_columns
 

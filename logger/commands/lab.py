@@ -1,12 +1,4 @@
-"""The lab's whole loop at the terminal: compare, diagnose, add what is missing, compare again.
-
-  ridelog lab --vehicle mycar.yaml run1 run2
-  ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
-
-Before an effect is added it asks: yes, no, or the name of another one. Where no effect explains what is missing it
-offers to learn a law out of the data, as ridelog learn does. DIR gets a vehicle file for each step, the law, and
-story.html, the page of all of it.
-"""
+"""``ridelog lab`` at a terminal: the loop of ``logger.api.lab_loop``, which asks before it adds."""
 
 from __future__ import annotations
 
@@ -17,47 +9,50 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.add_effect import asked_for
-from logger.commands.lab_model import add_bench_arguments, bench, progress
+from logger.api.lab_questions import LAB, LabLoopQuestion, LabQuestion
+from logger.commands.options import asked, declare, help_of, respelled
+from logger.commands.screen import progress
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
-    from logger.api.lab_loop import Ask, Explain, Learns, Say
-    from logger.lab.session import Story
+    from logger.api.lab_loop import Ask, Explain, LabStory, Learns, Say
+
+__doc__ = help_of(LabLoopQuestion)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog lab``."""
-    add_bench_arguments(parser)
-    parser.add_argument("--out", type=Path, default=Path("ridelog-lab"), metavar="DIR",
-                        help="folder for the vehicle files and the page (default: ridelog-lab)")
+    declare(parser, LAB)
     parser.add_argument("--yes", action="store_true",
                         help="without asking, add what is found missing, and learn a law where no effect explains it")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
-    from logger.api.lab_loop import STORY, always, unsaid_lines
-    from logger.report.session_text import as_json
+    from logger.api.lab import bench_with
+    from logger.api.lab_loop import always, unsaid_lines
 
-    given = bench(args, searches="ridelog lab")
+    with respelled(LabLoopQuestion):
+        question = asked(LAB, args)
+        given = bench_with(question, "ridelog lab")
     asks = not (args.yes or args.json) and sys.stdin.isatty()
-    ask = _asked if asks else take if args.yes or args.json else _taking()
-    story = walk(given, args.out, ask, unsaid_lines if args.json else say, learns=_wants_a_law if asks else always)
+    ask = _asking(question) if asks else take if args.yes or args.json else _taking()
+    story = walk(given, Path(question.out), ask, unsaid_lines if args.json else say,
+                 learns=_wants_a_law if asks else always)
     if args.json:
-        print(json.dumps(as_json(story) | {"story": str(args.out / STORY)}, allow_nan=False))
+        print(json.dumps(story.as_json(), allow_nan=False))
     return EXIT_DONE
 
 
 def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain | None = None,
-         learns: Learns | None = None) -> Story:
+         learns: Learns | None = None) -> LabStory:
     """Go through the loop, as ``lab_loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
     from logger.api import lab_loop
 
     lab_loop.make_ready(given, out, "--out")
     return lab_loop.walk(given, out, ask, notify, progress, explain or lab_loop.unexplained,
-                         learns or lab_loop.always)[0]
+                         learns or lab_loop.always)
 
 
 # --- at the terminal ---
@@ -83,8 +78,14 @@ def _taking() -> Ask:
     return ask
 
 
-def _asked(given: Bench, name: str) -> str | None:
+def _asking(question: LabQuestion) -> Ask:
+    return lambda given, name: _asked(given, name, question)
+
+
+def _asked(given: Bench, name: str, question: LabQuestion) -> str | None:
     """What the user says."""
+    from logger.api.lab import asked_for
+
     while True:
         try:
             answer = input(f"\nAdd {name}? yes, no, or the name of another effect: ").strip()
@@ -98,7 +99,7 @@ def _asked(given: Bench, name: str) -> str | None:
             print(f"Expected yes, no, or one of {', '.join(given.effects)}.")
             continue
         try:
-            return asked_for(answer, given)[0].name
+            return asked_for(answer, given, question)[0].name
         except BadInput as error:
             print(error)
 

@@ -12,7 +12,7 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NoReturn, TextIO, cast
 
@@ -55,6 +55,22 @@ VERBS = {
     "capture": "record the raw bytes of a serial port",
     "hil": "play a recorded dump into serial ports for the running service, and check its log",
 }
+ASKED = {
+    "identify": "identify.question:VERB",
+    "compare": "lab_questions:COMPARE",
+    "diagnose": "lab_questions:DIAGNOSE",
+    "add-effect": "lab_questions:ADD_EFFECT",
+    "learn": "lab_questions:LEARN",
+    "plan": "lab_questions:PLAN",
+    "sections": "log_questions:SECTIONS",
+    "passes": "log_questions:PASSES",
+    "iri": "road_questions:IRI",
+    "estimate": "drive_questions:ESTIMATE",
+    "modes": "drive_questions:MODES",
+    "comfort": "drive_questions:COMFORT",
+    "calibrate": "drive_questions:CALIBRATE",
+}
+"""Verbs that are declared by a question, and where in ``logger.api``."""
 MOST_NAMED = 8
 """Of more files in one folder only their number is said: a screen still holds the result above."""
 EXIT_INTERRUPTED = 130
@@ -115,17 +131,23 @@ def main(arguments: list[str]) -> int:
     if not arguments or arguments[0] not in VERBS:
         return _without_verb(arguments)
     verb = arguments[0]
-    module = importlib.import_module(f"logger.commands.{verb.replace('-', '_')}")
-    parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__,
-                     formatter_class=_Help, allow_abbrev=False)
-    module.add_arguments(parser)
+    parser, run = command(verb)
     given = parser.parse_args(arguments[1:])
     with written_files() as written:
         try:
-            status: int = module.run(given)
+            status = run(given)
         finally:
             _name_written(written)
     return status
+
+
+def command(verb: str) -> tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], int]]:
+    """The parser of a verb, and what carries it out."""
+    module: Any = (importlib.import_module("logger.commands.options").Asked(f"logger.api.{ASKED[verb]}")
+                   if verb in ASKED else importlib.import_module(f"logger.commands.{verb.replace('-', '_')}"))
+    parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__, formatter_class=_Help, allow_abbrev=False)
+    module.add_arguments(parser)
+    return parser, module.run
 
 
 def _name_written(paths: list[Path]) -> None:

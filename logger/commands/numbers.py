@@ -1,9 +1,8 @@
-"""Options that are numbers within a range, checked where they are declared, and numbers by name."""
+"""Options that are numbers within a range, checked where they are declared."""
 
 from __future__ import annotations
 
 import argparse
-from math import isfinite
 from typing import Any
 
 from logger.api.ranges import Range, check_limit
@@ -46,20 +45,3 @@ def add_limit(parser: argparse.ArgumentParser, option: str, **rest: Any) -> None
         return m_per_km
 
     parser.add_argument(option, type=number, **rest)
-
-
-def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
-    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
-    name, _, rest = text.partition(":")
-    if "=" in name and "/" not in name:
-        raise BadInput(f"{option} {text}: expected NAME:PARAM=VALUE, with a colon after the name")
-    found: dict[str, float] = {}
-    for piece in rest.split(",") if rest else ():
-        parameter, _, value = piece.partition("=")
-        try:
-            found[parameter] = float(value)
-        except ValueError:
-            found[parameter] = float("nan")
-        if not isfinite(found[parameter]):
-            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
-    return name, found

@@ -13,9 +13,11 @@ from logger.files import together, write_file
 from logger.report.drawing import ENDINGS
 
 if TYPE_CHECKING:
+    from logger.api.shown import CommandResult
     from logger.chart_data import Chart
 
 PAGE = ".html"
+PICTURES = (PAGE, *ENDINGS)
 HELP = "write a page with pictures; .png, .svg or .pdf: the pictures alone"
 
 
@@ -27,7 +29,7 @@ def add_out(parser: argparse.ArgumentParser) -> None:
 
 def is_picture(path: Path) -> bool:
     """Whether a file that was asked for is one."""
-    return path.suffix.lower() in (PAGE, *ENDINGS)
+    return path.suffix.lower() in PICTURES
 
 
 def parted(asked: Sequence[Path]) -> tuple[list[Path], list[Path]]:
@@ -38,7 +40,7 @@ def parted(asked: Sequence[Path]) -> tuple[list[Path], list[Path]]:
 def check_pictures(asked: Sequence[Path], read: Iterable[Path], beside: Sequence[tuple[str, Path | None]] = ()) -> None:
     """Raise BadInput where a file of ``--out`` is none of a picture, or cannot be written, nor those ``beside`` it."""
     if other := next((path for path in asked if not is_picture(path)), None):
-        raise BadInput(f"--out {other}: expected a file that ends in one of {', '.join((PAGE, *ENDINGS))}")
+        raise BadInput(f"--out {other}: expected a file that ends in one of {', '.join(PICTURES)}")
     check_outs([*beside, *(("--out", path) for path in asked)], read=read)
 
 
@@ -50,20 +52,27 @@ def write_pictures(paths: Sequence[Path], title: str, of: str, text: str, charts
     text         what the command prints
     charts_of    makes the charts
     """
-    if not paths:
-        return
-    charts = charts_of()
-    made = [_content(path, title, of, text, charts) for path in paths]
+    from logger.report.result_page import page
+
+    if paths:
+        charts = charts_of()
+        _write(paths, lambda: page(title, of, text, charts), charts)
+
+
+def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
+    """The same of a result, whose page may be its own."""
+    if paths:
+        _write(paths, lambda: found.as_page(of), found.charts())
+
+
+def _write(paths: Sequence[Path], page: Callable[[], str], charts: Sequence[Chart]) -> None:
+    made = [page().encode() if path.suffix.lower() == PAGE else _drawn(path, charts) for path in paths]
     with together():
         for path, content in zip(paths, made, strict=True):
             write_file(path, [content])
 
 
-def _content(path: Path, title: str, of: str, text: str, charts: Sequence[Chart]) -> bytes:
-    if path.suffix.lower() == PAGE:
-        from logger.report.result_page import page
-
-        return page(title, of, text, charts).encode()
+def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
     if not charts:
         raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
     from logger.report.drawing import drawn

@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
+from logger.api.road_questions import CLASSIFY
+from logger.commands import options
 from logger.commands.numbers import add_number
-from logger.commands.pictures import add_out, check_pictures, write_pictures
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import together, write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.roads.elevation_spectrum import Array, BandedSpectrum
+    from logger.roads.elevation_spectrum import Array
 
 _LINES_AT_ONCE = 100_000
 
@@ -47,19 +48,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     make.add_argument("--json", action="store_true", help="print what was made as one JSON object; needs --out")
 
     tell = verbs.add_parser("classify", help="class, degree of roughness and waviness of a profile", allow_abbrev=False,
-                            description="Class, degree of roughness and waviness of a profile of at least 100 m.")
-    tell.add_argument("profile", type=Path, metavar="PROFILE", help="CSV or ERD file")
-    tell.add_argument("--resample", type=float, metavar="M",
-                      help="for an unevenly spaced profile: lay straight lines between its samples and take a sample "
-                           "every M metres; what was between wide samples stays unknown")
-    tell.add_argument("--psd", type=Path, metavar="FILE", help="write the smoothed spectrum of the (left) track as CSV")
-    add_out(tell)
-    tell.add_argument("--json", action="store_true", help="print one JSON object")
+                            description=options.help_of(CLASSIFY.question))
+    options.declare(tell, CLASSIFY)
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog road``."""
-    return _generate(args) if args.road_verb == "generate" else _classify(args)
+    return _generate(args) if args.road_verb == "generate" else options.run(CLASSIFY, args)
 
 
 # --- generate ---
@@ -109,29 +104,3 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
     return (f"{out or 'stdout'}: {length_m:.10g} m in {made['samples']} samples, class {made['class']}, "
             f"Gd(n0) {made['gd_n0_cm3']:.5g} cm3, waviness {made['waviness']:g}, seed {made['seed']}, "
             f"IRI {made['iri_m_per_km']:.2f} m/km")
-
-
-# --- classify ---
-
-
-def _classify(args: argparse.Namespace) -> int:
-    from logger.api.roads import classify
-
-    check_pictures(args.out, [args.profile], [("--psd", args.psd)])
-    found = classify(args.profile, args.resample)
-    with together():
-        if args.psd is not None:
-            write_text(args.psd, _psd_csv(found.spectrum), "ascii")
-        write_pictures(args.out, "Class of the road", args.profile.name, found.text, found.charts)
-    print(json.dumps(found.as_json()) if args.json else found.text)
-    return EXIT_DONE
-
-
-def _psd_csv(found: BandedSpectrum) -> str:
-    from logger.roads.elevation_spectrum import acceleration_psd
-
-    columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,
-               acceleration_psd(found.centre_cpm, found.psd_m3), found.freedom)
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    header = "lowest_cpm,highest_cpm,displacement_psd_m3,acceleration_psd_per_m,degrees_of_freedom\n"
-    return header + "".join(",".join(f"{value:.7g}" for value in row) + "\n" for row in rows)

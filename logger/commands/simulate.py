@@ -27,7 +27,8 @@ from typing import TYPE_CHECKING, Any
 
 from logger.api.outputs import check_outs
 from logger.api.ranges import ADDED, RATE, SPEED
-from logger.commands.numbers import add_number, named_numbers
+from logger.api.terms import named_numbers
+from logger.commands.numbers import add_number
 from logger.commands.pictures import HELP, parted, write_pictures
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import together

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
@@ -22,11 +22,10 @@ _G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 # --- for programs ---
 
 
-def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str, Any]:
+def as_json(run: str, found: Assessment) -> dict[str, Any]:
     """Settings, the run as a whole, per class of speed, per window; null for what is not known.
 
-    run      as the user knows it
-    files    that its profile was written to
+    run    as the user knows it
     """
     drive, windows, road = found.drive, found.windows, found.road
     return {
@@ -42,7 +41,7 @@ def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str,
         "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
         "shortest_wavelength_m": road.shortest_m if road else None,
         "longest_wavelength_m": road.longest_m if road else None,
-        "profile_files": list(files),
+        "profile_files": [],
         "speeds": [{"from_mps": low, "to_mps": low + SPEED_CLASS_MPS, **figures(found, which)}
                    for low, which in speed_classes(windows)],
         "windows": list(_rows(found)),
@@ -107,7 +106,7 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
         shown.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
                      "percent, and there may be more in the readings than vehicle and noise explain.")
     shown += ["", *_table(summary)]
-    return shown + [f"Profile: {file}" for file in summary["profile_files"]]
+    return shown
 
 
 def _sensor_lines(summary: dict[str, Any]) -> list[str]:

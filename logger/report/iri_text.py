@@ -55,3 +55,14 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
         values = "".join(f" {value:10.3f}" for value in result.row(number).values())
         printed.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
     return printed
+
+
+def response_screen(table: list[dict[str, float]]) -> list[str]:
+    """How the IRI responds to each wavelength, with bars."""
+    lines = ["IRI of a sinusoidal road by wavelength (80 km/h, 250 mm moving average)", "",
+             "wavelength  slope gain  IRI of 1 mm"]
+    for row in table:
+        bar = "#" * round(20 * row["slope_gain"])
+        figures = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
+        lines.append(f"{row['wavelength_m']:8.2f} m {figures}  {bar}")
+    return lines

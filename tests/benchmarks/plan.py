@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import ridelog
 from logger.api.bench import among
 from logger.api.lab import bench_with
+from logger.api.lab_questions import CompareQuestion
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
@@ -96,7 +97,7 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
     """The root of what the diagnosis of one effect gains, its numbers not counted, in a car that may bend as far as the
     runs ask, as it ends in: a search holds the car's numbers at two deviations, and gains more where an effect would
     bend them farther."""
-    bench = bench_with(VEHICLE, runs, (), USUAL_TOLERANCE)
+    bench = bench_with(CompareQuestion(VEHICLE, runs, tolerance=USUAL_TOLERANCE))
     posterior = bench.posterior(searches=True).without_soft_bounds()
     one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
     gain = one.gain + len(free_parameters_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))

@@ -129,8 +129,8 @@ def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pyte
     ("arguments", "rate_hz", "seconds", "complaint"),
     [
         (["--weighting", "none"], 100, 2, f"weighting 'none': expected one of {WEIGHTINGS}"),
-        (["--daily-hours", "25"], 100, 2, "at most 24 hours, found 25"),
-        (["--daily-hours", "nan"], 100, 2, "at most 24 hours, found nan"),
+        (["--daily-hours", "25"], 100, 2, "--daily-hours 25: expected 0.001 to 24 hours"),
+        (["--daily-hours", "nan"], 100, 2, "--daily-hours nan: expected 0.001 to 24 hours"),
         ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50 \(--resample takes 40 or more\)"),
         ([], 39, 2, r"ride\.csv: expected at least 80 samples a second, found 39$"),
         ([], 100, 0.5, r"ride\.csv: expected at least 1 s, found 0\.5 s"),

@@ -89,7 +89,7 @@ def test_a_record_of_zeros_is_refused(comfort) -> None:
 def test_a_file_behind_the_bare_option_is_no_rate() -> None:
     done = called("comfort", "--resample", "ride.csv")
     assert done.returncode == 2
-    assert "expected a rate in Hz, found 'ride.csv'; a file goes before --resample" in done.stderr
+    assert "--resample ride.csv: expected a rate in Hz; a file goes before --resample" in done.stderr
 
 
 def test_the_end_of_a_range_is_reported(comfort) -> None:

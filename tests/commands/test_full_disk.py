@@ -4,7 +4,6 @@ byte for byte, nothing is left beside it, one line says why, and the status is 2
 from __future__ import annotations
 
 import argparse
-import importlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 import ridelog
-from logger.commands.main import VERBS, _Parser
+from logger.commands.main import VERBS, command
 from logger.store.formats.record_file import TIME, VERTICAL
 from logger.store.log.row_format import HEADER, format_row
 
@@ -111,8 +110,7 @@ READ = {"--config", "--from", "--base", "--route", "--roads", "--smoothness", "-
 def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """All of them, with the words of their commands."""
     for verb in VERBS:
-        parser = _Parser(prog=verb)
-        importlib.import_module(f"logger.commands.{verb.replace('-', '_')}").add_arguments(parser)
+        parser, _ = command(verb)
         below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
         yield from [(f"{verb} {name}", one) for name, one in below[0].choices.items()] if below else [(verb, parser)]
 

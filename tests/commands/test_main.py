@@ -18,11 +18,12 @@ from logger.errors import BadInput, CheckFailed
 from ..support.command import called
 
 
-def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file() -> None:
+def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file_or_asked() -> None:
     files = {module.name for module in pkgutil.iter_modules(logger.commands.__path__)}
-    helpers = {"main", "lab_runs", "diagnose_same_road", "lab_model", "demo_lab", "demo_field", "numbers",
-               "record_options", "pictures", "table_files"}
-    assert files - helpers == {verb.replace("-", "_") for verb in main.VERBS}
+    helpers = {"main", "options", "screen", "demo_lab", "demo_field", "numbers",
+               "pictures", "table_files"}
+    verbs = {verb.replace("-", "_") for verb in main.VERBS if verb not in main.ASKED}
+    assert files - helpers == verbs and set(main.ASKED) <= set(main.VERBS)
 
 
 @pytest.mark.parametrize("verb", main.VERBS)
@@ -40,6 +41,13 @@ def test_help_lists_the_verbs_and_loads_nothing_heavy() -> None:
     out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     assert all(f"\n  {verb} " in out and meaning in out for verb, meaning in main.VERBS.items())
     assert out.endswith("heavy:\n")
+
+
+def test_questions_load_nothing_heavy() -> None:
+    script = ("import sys, importlib\nfrom logger.commands.main import ASKED\n"
+              "for name in ASKED.values():\n    importlib.import_module(f'logger.api.{name}'.partition(':')[0])\n"
+              "print('heavy:', *{'numpy', 'scipy', 'yaml', 'serial'} & set(sys.modules))")
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout == "heavy:\n"
 
 
 def test_the_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:

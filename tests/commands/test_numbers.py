@@ -7,7 +7,8 @@ from math import inf
 
 import pytest
 
-from logger.commands.numbers import add_number, named_numbers
+from logger.api.terms import named_numbers
+from logger.commands.numbers import add_number
 from logger.errors import BadInput
 
 

@@ -86,7 +86,7 @@ def test_runs_that_were_driven_bring_their_own_noise_and_effects(road: Path, tmp
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
     ((), "plan: expected a run, or --profile and --speed"),
-    (("--speed", "8"), "expected --profile with --speed"),
+    (("--speed", "8"), "--speed: expected --profile with it"),
     (("--profile", "ROAD"), "plan: expected a run, or --profile and --speed"),
     (("--profile", "ROAD", "--speed", "60"), "--speed 60: expected a drive of 5 s or longer, found 2 s over"),
     (("--profile", "ROAD", "--speed", "8", "--speed", "8"), "--speed 8: expected each speed once"),

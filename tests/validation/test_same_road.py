@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-import json
-from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from logger.commands.diagnose_same_road import run_same_road
+import ridelog
 from logger.errors import BadInput
 
 from .cases.case_files import write_case
 from .cases.same_road import same_road_case
 
 
-def reported_of(seed: int, effect: str | None, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+def reported_of(seed: int, effect: str | None, folder: Path) -> dict[str, Any]:
     write_case(same_road_case(seed, effect, length_m=90.0, speeds_mps=(9.0, 15.0)), folder)
     for profile in folder.glob("run*/profile.csv"):
         profile.unlink()
-    assert run_same_road(asked(folder, json=True)) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def asked(folder: Path, **more: object) -> Namespace:
-    given = {"vehicle": str(folder / "vehicle.yaml"), "runs": sorted(folder.glob("run*")), "tolerance": 0.04,
-             "effect_file": [], "json": False, "all": False, "out": None}
-    return Namespace(**given | more)
+    return ridelog.diagnose(folder / "vehicle.yaml", sorted(folder.glob("run*")), tolerance=0.04,
+                            same_road=True).as_json()
 
 
 @pytest.mark.slow
-def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    reported = reported_of(1, "sensor_mount_resonance", tmp_path, capsys)
+def test_a_missing_effect_is_found(tmp_path: Path) -> None:
+    reported = reported_of(1, "sensor_mount_resonance", tmp_path)
     first = next(one for one in reported["candidates"] if one["effect"] == reported["verdict"][0])
     assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
     assert reported["steps"][-1]["error"] < reported["steps"][1]["error"] < reported["baseline_error"]
@@ -42,12 +34,12 @@ def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
-def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    reported = reported_of(2, None, tmp_path, capsys)
+def test_nothing_missing(tmp_path: Path) -> None:
+    reported = reported_of(2, None, tmp_path)
     assert reported["verdict"] == []
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= reported["candidates"][0].keys()
 
 
 def test_one_drive_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="two runs"):
-        run_same_road(asked(tmp_path, runs=[tmp_path]))
+        ridelog.diagnose("rav4-2009", [tmp_path], same_road=True)

@@ -7,10 +7,10 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.identify.words import NORMAL_95
 from logger.chart_data import Bars, Chart, Curves, Line
 from logger.identification.prediction_error_fit import Fit
 from logger.identification.unknown_road.fisher_scoring import RoadFit
-from logger.report.identification_text import NORMAL_95
 
 Array = npt.NDArray[np.float64]
 

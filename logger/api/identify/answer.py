@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import silent, slow_words
-from logger.api.drives import Run, read_run
+from logger.api.bench import slow_words
+from logger.api.drives import Run, read_run, run_on_road
+from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
+from logger.api.lab import word_of
 from logger.api.model_checks import check_roads
-from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
+from logger.api.question import function
 from logger.api.shown import CommandResult
+from logger.api.terms import each
 from logger.api.vehicles import Model, model_of
-from logger.errors import BadInput
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
+from logger.identification.identifiability import NotIdentifiable
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import SKIP_S, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import vehicle_file
 
 if TYPE_CHECKING:
+    from logger.chart_data import Chart
     from logger.identification.drive_model import DriveModel
     from logger.identification.prediction_error_fit import Fit, FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.identification.unknown_road.road_state import Options as RoadOptions
-    from logger.profiles.excitation import Excitation
-    from logger.profiles.track import Track
-    from logger.store.formats.drive_file import Drive
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.uncertain import NumberErrors
 
@@ -40,156 +42,118 @@ USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"
 # By how much the distances of two drives over one road may disagree.
 _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
-_OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is to be found, and how.
-
-    free            names, as of ``identify``
-    start, bounds   where numbers start and stay, by name
-    obstacles       on the road: numbers [m] of a ``bump`` or a ``step``; without ``start_m`` it is looked for
-    noise           what the model leaves: one of ``NOISE_MODELS``
-    low_pass_hz     what lies above is left out [Hz]; None: nothing is
-    robust          single wild readings count less
-    tries           further starts
-    waviness        of roads that were not measured
-    anyway          go on where a run does not seem to be of its road
-    said            how an option is written in a complaint
-    """
-
-    free: Sequence[str]
-    start: Mapping[str, float] = field(default_factory=dict)
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    obstacles: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    noise: str = "auto"
-    low_pass_hz: float | None = None
-    robust: bool = False
-    tries: int = 0
-    waviness: float = USUAL_WAVINESS
-    anyway: bool = False
-    said: str = "{}"
-
-    def wrong(self, option: str, words: str) -> BadInput:
-        """The complaint about an option."""
-        return BadInput(f"{self.said.format(option)}{words}")
-
-
-@dataclass(frozen=True, eq=False)
-class FittedNumbers:
-    """A fit, the model with its numbers, the object for a program, and the lines for a person."""
-
-    fit: Fit | RoadFit
-    model: vehicle_file.Model
-    as_json: dict[str, Any]
-    lines: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(CommandResult):
     """Numbers that were found.
 
-    parameters        by name; ``standard_errors`` likewise
-    error_before      rms(measured - model) / rms(measured) with every free number where it started
-    error_after       with those found
-    converged         whether the fit came to rest; if not, do not use the numbers
-    cannot_tell       sentences that stand between the numbers and their being believed; empty: none
-    model             with the numbers
+    fit            with covariance and correlation, of measured roads with the whitened residuals as well
+    model          with the numbers
+    cannot_tell    sentences that stand between the numbers and their being believed; empty: none
     """
 
-    parameters: Mapping[str, float]
-    standard_errors: Mapping[str, float]
-    error_before: float
-    error_after: float
-    converged: bool
-    cannot_tell: tuple[str, ...]
+    title: ClassVar[str] = "Fitted numbers"
+
+    fit: Fit | RoadFit
     model: Model
+    cannot_tell: tuple[str, ...]
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """By name."""
+        return self.fit.parameters
+
+    @property
+    def standard_errors(self) -> Mapping[str, float]:
+        """By name."""
+        return self.fit.standard_errors
+
+    @property
+    def error_before(self) -> float:
+        """rms(measured - model) / rms(measured) with every free number where it started."""
+        return self.fit.error_before
+
+    @property
+    def error_after(self) -> float:
+        """The same with those found."""
+        return self.fit.error_after
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit came to rest; if not, do not use the numbers."""
+        return self.fit.converged
+
+    @property
+    def exit_status(self) -> int:
+        """Of the command."""
+        return EXIT_DONE if self.converged else EXIT_CHECK_FAILED
+
+    def charts(self) -> Sequence[Chart]:
+        """Of the residuals, and of numbers that err together."""
+        from logger.api.identify.charts import charts
+
+        return charts(self.fit)
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the fitted vehicle, its standard errors as comments."""
+        comments = [f"# {self.model.vehicle.name} with numbers fitted by ridelog identify; error "
+                    f"{self.error_before:.4f} before, {self.error_after:.4f} after"]
+        comments += [f"# {name}: {value:.6g}, standard error {self.standard_errors[name]:.2g}"
+                     for name, value in self.parameters.items()]
+        vehicle_file.write_model(path, self.model, "".join(f"{line}\n" for line in comments))
 
 
-def identify(
-    vehicle: Model | Path | str, runs: Run | Path | str | Sequence[Run | Path | str], free: Sequence[str], *,
-    start: Mapping[str, float] | None = None, bounds: Mapping[str, tuple[float, float]] | None = None,
-    obstacles: Mapping[str, Mapping[str, float]] | None = None, noise: str = "auto", low_pass_hz: float | None = None,
-    robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured",
-    waviness: float = USUAL_WAVINESS, anyway: bool = False,
-) -> Identification:
-    """Find numbers of a vehicle, of its effects, and of what is not known of the road, each with its standard error.
-
-    vehicle       as in ``read_vehicle``; what is not free stays as it says
-    runs          of one sample rate, with their profiles unless ``obstacles`` or ``road`` say otherwise; what their
-                  run.yaml says of steps, samples and places is used (``lab.readings_fit``)
-    free          names as in the vehicle's file (``sprung_mass_kg``, ``front.suspension_damping_n_s_per_m``; ``both.``
-                  for the two axles together), ``dry_friction.friction_force_n`` of an effect that the vehicle has,
-                  ``bump.height_m``, ``step.start_m``, ``speed_scale`` of the road; ``run2.`` before them for one run
-    start         where numbers start, by name; ``bounds`` where they stay
-    obstacles     ``{"bump": {"height_m": 0.1, "width_m": 3.0}}`` (Eq 4.41 of Blum 2015) or a step lies on the road [m];
-                  without ``start_m`` it is looked for
-    noise         what the model leaves: white (output error), ar (innovations form), road (roughness that the profile
-                  does not contain, through the car), or auto, the likeliest
-    low_pass_hz   what lies above is left out [Hz], and what lies above the ``pass_band_hz`` of a run's run.yaml;
-                  ``skip_s`` the beginning of each run [s]
-    robust        let single wild readings count less (Huber's loss); ``tries`` so many further starts
-    road          "measured" (``anyway``: go on where a run does not seem to be of its road); "unmeasured": each run has
-                  a road of its own, of ``waviness``; or "same": all are over one
-
-    Raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not determine.
-    Source: L. Ljung, System Identification (1999), chapters 7 and 9.
-
-    >>> true = car.with_numbers({"sprung_mass_kg": 900.0})
-    >>> drive = simulate(true, random_road(iso_class="C", length_m=150.0), 12.0, noise_mps2=0.03)
-    >>> found = identify(car, drive, ["sprung_mass_kg"])
-    >>> abs(found.parameters["sprung_mass_kg"] - 900.0) < 4 * found.standard_errors["sprung_mass_kg"], found.converged
-    (True, True)
-    """
-    for name, word, known in (("road", road, ("measured", "unmeasured", "same")), ("noise", noise, NOISE_MODELS)):
-        if word not in known:
-            raise BadInput(f"{name} {word}: expected one of {', '.join(known)}")
-    TRIES.check("tries", tries)
-    WAVINESS.check("waviness", waviness)
-    model = model_of(vehicle)
-    word = str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
-    given = [runs] if isinstance(runs, Run | Path | str) else runs
-    if not (drives := [one if isinstance(one, Run) else read_run(one) for one in given]):
+def answer(question: IdentifyQuestion) -> Identification:
+    """The numbers. BadInput and ``NotIdentifiable`` as ``IdentifyQuestion`` says."""
+    model, given = model_of(question.vehicle), each(question.runs)
+    if not given:
         raise BadInput("identify: expected a run, found none")
-    question = Question(free, start or {}, bounds or {}, obstacles or {}, noise, low_pass_hz, robust, tries, waviness,
-                        anyway)
-    flat_will_do = bool(obstacles) or road != "measured"
-    if bare := [drive for drive in drives if drive.track is None and not flat_will_do]:
-        raise BadInput(f"{bare[0].path}: expected a run with the profile that it was driven on")
-    records = records_of([(drive, drive.track) for drive in drives], skip_s, question)
-    if road == "measured":
-        question = narrowed(question, drives)
-    found = (on_measured_roads(model, word, records, question) if road == "measured" else
-             on_unmeasured_roads(model, word, records, question, one_road=road == "same"))
-    summary = found.as_json
-    return Identification("\n".join(found.lines), summary, summary["parameters"], summary["standard_errors"],
-                          summary["error_before"], summary["error_after"], summary["converged"],
-                          tuple(summary["cannot_tell"]), model_of(found.model))
+    places = [path.resolve() for path in question.runs_read()]
+    if again := next((path for path in question.runs_read() if places.count(path.resolve()) > 1), None):
+        raise BadInput(f"{again}: expected every run once, found it twice")
+    if question.road == SAME and len(given) < 2:
+        raise question.wrong("same_road", ": expected two runs or more")
+    flat_will_do = bool(question.obstacles) or question.road != MEASURED
+    drives = [run_on_road(one) if not flat_will_do else one if isinstance(one, Run) else read_run(one) for one in given]
+    records = _records(drives, question)
+    if question.road != MEASURED:
+        return _on_unmeasured_roads(model, records, question)
+    return _on_measured_roads(model, records, _narrowed(question, drives))
 
 
-def narrowed(question: Question, drives: Sequence[Drive]) -> Question:
+identify = function("identify", IdentifyQuestion, answer)
+
+
+def refusal_json(refusal: CheckFailed) -> dict[str, Any]:
+    """What a program reads where the runs do not determine the numbers."""
+    assert isinstance(refusal, NotIdentifiable)
+    return {"parameters": {}, "standard_errors": {}, "error_before": refusal.error_before, "error_after": None,
+            "converged": False, "cannot_tell": [finding.words for finding in refusal.findings]}
+
+
+def _narrowed(question: IdentifyQuestion, drives: Sequence[Run]) -> IdentifyQuestion:
     """The question without what lies above the pass band of a drive (``run.yaml``), as ``low_pass_hz`` asks for it."""
     bands = [(drive.facts.pass_band_hz, drive.rate_hz) for drive in drives]
     ends_hz = [question.low_pass_hz, *(band[1] for band, rate_hz in bands if band and band[1] < rate_hz / 2)]
     return replace(question, low_pass_hz=min((one for one in ends_hz if one is not None), default=None))
 
 
-def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s: float,
-               question: Question) -> list[Record]:
+def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
     from logger.identification.session import LEAST_SAMPLES, UnusableRun, check_records, off_rate
     from logger.profiles.track import Track
 
-    records = []
-    for drive, track in drives:
+    records, skip_s = [], SKIP_S if question.skip_s is None else question.skip_s
+    for drive in drives:
         lasts_s = len(drive.time_s) / drive.rate_hz
         if not 0 <= skip_s < lasts_s - LEAST_SAMPLES / drive.rate_hz:
-            raise BadInput(f"{drive.path}: expected at least {LEAST_SAMPLES} samples after the first {skip_s:g} s, "
-                           f"which are left out ({question.said.format('skip')}), found {lasts_s:g} s in all")
+            raise question.wrong("skip_s", f" {skip_s:g}: expected a beginning that leaves {LEAST_SAMPLES} samples or "
+                                           f"more of {drive.path}, which lasts {lasts_s:g} s")
         records.append(Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if track is None else track, skip_s, drive.facts, drive.marks()))
+                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, skip_s, drive.facts,
+                              drive.marks()))
     try:
         check_records(records)
     except UnusableRun as error:
@@ -204,24 +168,19 @@ def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s
 # --- roads that are known, but for a few numbers ---
 
 
-def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                      warn: Callable[[str], None] = silent) -> FittedNumbers:
-    """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
-
-    word    by which the user knows the vehicle
-    warn    called where it will take long
-    """
-    from logger.identification.identifiability import NotIdentifiable
+def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
+    """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``."""
+    from logger.api.identify.words import as_json, common_words, doubts, lines, record_json, record_words, tests
     from logger.identification.session import UnusableRun, error_before
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.lab.readings_fit import fit_to_readings
-    from logger.report.identification_text import as_json, common_words, lines, record_json, record_words, tests
     from logger.simulation.simulated_runs import SimulatedRuns
 
-    _check_effects(given, word, records, question, warn)
+    word = word_of(question.vehicle, given)
+    _check_effects(given, word, records, question)
     _check_rigs(records, question)
     if not question.obstacles:
-        check_roads(word, given, SimulatedRuns(records), warn, question.anyway)
+        check_roads(word, given, SimulatedRuns(records), question.warn, question.anyway)
     road, unplaced = _road(question)
 
     def model_of_records(of: list[Record]) -> DriveModel:
@@ -238,11 +197,12 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     model, checks = found.model, tests(found.model, found.fit)
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
-    return FittedNumbers(
-        fit, _fitted(given, model, fit),
-        as_json(fit, *checks) | record_json(found, common, records) | left_out_json(runs_left_out(records)),
-        [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
-         *record_words(found), *left_out_paragraph(_beside_beginnings(records))])
+    text = [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
+            *record_words(found), *left_out_paragraph(_beside_beginnings(records))]
+    return Identification(
+        "\n".join(text), as_json(fit, *checks) | record_json(found, common, records)
+        | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
+        tuple(doubts(fit, *checks)))
 
 
 def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
@@ -250,8 +210,8 @@ def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
     return runs_left_out([replace(one, skip_s=0.0) for one in records])
 
 
-def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Record], question: Question,
-                   warn: Callable[[str], None]) -> None:
+def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Record],
+                   question: IdentifyQuestion) -> None:
     """Raise BadInput for an effect that cannot be there on these roads, or one that is to be found and is not there."""
     from logger.store.formats.effect_file import check_on, shipped_effects
 
@@ -259,7 +219,7 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
         check_on(given.vehicle, one, all(record.two_tracks for record in records),
                  all(record.timed for record in records))
     if words := slow_words([one.effect for one in given.effects]):
-        warn(words)
+        question.warn(words)
     there = [one.effect.name for one in given.effects]
     for name in question.free:
         effect = name.partition(".")[0]
@@ -270,46 +230,47 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
                 "'effects' in the file"))
 
 
-def _check_rigs(records: Sequence[Record], question: Question) -> None:
+def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
     """Raise BadInput for what asks for a road, or a speed, of a rig."""
     from logger.identification.unknown_inputs import is_input
 
     rig = next((record.name for record in records if record.timed), None)
     if rig is None:
         return
-    if asked := [name for name in question.free if is_input(name)] + list(question.obstacles):
+    if asked := [name for name in question.free if is_input(name)] + list(question.obstacles or {}):
         raise BadInput(f"{rig}: expected a road for {asked[0]}; the run is driven by time")
     if question.noise == "road":
         raise question.wrong("noise", f" road: expected white, ar or auto; {rig} is driven by time, on no road")
 
 
-def _road(question: Question) -> tuple[RoadInput, list[str]]:
+def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
     from logger.identification.obstacle_paths import Bump, RoadStep
     from logger.identification.unknown_inputs import RoadInput
 
     kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
-    for name, numbers in question.obstacles.items():
+    for name, numbers in (question.obstacles or {}).items():
         if name not in kinds:
             raise BadInput(f"obstacle {name}: expected {' or '.join(kinds)}")
-        needed, said = _OBSTACLES[name], ",".join(f"{key}={value:g}" for key, value in numbers.items())
+        needed, said = OBSTACLES[name], ",".join(f"{key}={value:g}" for key, value in numbers.items())
         if not set(needed) <= set(numbers) <= {"start_m", *needed}:
             raise question.wrong(name, f" {said}: expected [start_m=M,]{','.join(f'{one}=M' for one in needed)}")
         try:
             found[name] = kinds[name](**{"start_m": 0.0, **numbers})
         except ValueError as error:
             raise question.wrong(name, f" {said}: {error}") from None
-    return RoadInput(**found), [name for name, numbers in question.obstacles.items() if "start_m" not in numbers]
+    return RoadInput(**found), [name for name, one in (question.obstacles or {}).items() if "start_m" not in one]
 
 
 def _drive_model(given: vehicle_file.Model, records: list[Record], road: RoadInput, unplaced: list[str],
-                 question: Question) -> DriveModel:
+                 question: IdentifyQuestion) -> DriveModel:
     from logger.identification.session import drive_model, obstacle_starts
 
     try:
         starts = obstacle_starts(given.vehicle, records, road, unplaced)
     except ValueError as error:
-        raise question.wrong("", str(error)) from None
+        obstacle, _, words = str(error).partition(":")
+        raise question.wrong(obstacle, f":{words}") from None
     parameters = _free(given, road, starts, len(records), question)
     try:
         return drive_model(given.vehicle, given.effects, parameters, records, road)
@@ -318,7 +279,7 @@ def _drive_model(given: vehicle_file.Model, records: list[Record], road: RoadInp
 
 
 def _free(given: vehicle_file.Model, road: RoadInput, found: Mapping[str, float], runs: int,
-          question: Question) -> list[Free]:
+          question: IdentifyQuestion) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
     from logger.identification.unknown_inputs import EACH, expanded, is_input, run_and_name
@@ -331,8 +292,8 @@ def _free(given: vehicle_file.Model, road: RoadInput, found: Mapping[str, float]
         raise question.wrong("free", f" {','.join(question.free)}: expected names with commas between them, each once")
     named = {run_and_name(name)[1] for name in names}
     names += [name for name in found if run_and_name(name)[1] not in named]
-    start = {one: value for name, value in question.start.items() for one in expanded(name, runs)}
-    between = {one: ends for name, ends in question.bounds.items() for one in expanded(name, runs)}
+    start = {one: value for name, value in (question.start or {}).items() for one in expanded(name, runs)}
+    between = {one: ends for name, ends in (question.bounds or {}).items() for one in expanded(name, runs)}
     for option, said in (("start", set(start)), ("bounds", set(between))):
         if unknown := said - set(names):
             raise question.wrong(option, f" {sorted(unknown)[0]}: expected one of what is free ({', '.join(names)})")
@@ -358,12 +319,12 @@ def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: f
     return free(given.vehicle, name, start, between)
 
 
-def _options(model: DriveModel, question: Question) -> FitOptions:
+def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
     from logger.identification.session import fit_options
 
     half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
-        raise question.wrong("low-pass", f" {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz")
+        raise question.wrong("low_pass_hz", f" {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz")
     return fit_options(model, question.noise, low_pass_hz, question.robust, question.tries)
 
 
@@ -391,20 +352,19 @@ def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
 # --- roads of which only the kind is known ---
 
 
-def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                        one_road: bool) -> FittedNumbers:
+def _on_unmeasured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
     """The fit over roads that were not measured: one for all runs, or one for each. BadInput and ``NotIdentifiable`` as
     ``identify``."""
+    from logger.api.identify.unmeasured_words import as_json, lines
     from logger.identification.session import UnusableRun, drives_of
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.road_fit import fit_roads
-    from logger.report.unknown_road_text import as_json, lines
     from logger.vehicle.frequency_response import AxleResponse
 
     options, question = _road_options(question)
     if given.effects:
-        raise BadInput(f"{word}: expected a car without effects where the road was not measured, found "
-                       f"{', '.join(one.effect.name for one in given.effects)}")
+        raise BadInput(f"{word_of(question.vehicle, given)}: expected a car without effects where the road was not "
+                       f"measured, found {', '.join(one.effect.name for one in given.effects)}")
     try:
         drives = drives_of(records)
     except UnusableRun as error:
@@ -414,15 +374,16 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
         car = AxleResponse(given.vehicle, parameters, drives[0].rate_hz)
     except ValueError as error:
         raise question.wrong("free", f": {error}") from None
+    one_road = question.road == SAME
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
-    return FittedNumbers(
-        fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))),
-                                errors=_road_fit_errors(fit)),
-        {**as_json(fit, parameters), "runs": [record.name for record in records],
-         **left_out_json(runs_left_out(records))},
-        [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters),
-         *left_out_paragraph(_beside_beginnings(records))])
+    model = vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))), errors=_road_fit_errors(fit))
+    text = [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters),
+            *left_out_paragraph(_beside_beginnings(records))]
+    return Identification(
+        "\n".join(text), {**as_json(fit, parameters), "runs": [record.name for record in records],
+                          **left_out_json(runs_left_out(records))}, fit, model_of(model),
+        tuple(finding.words for finding in fit.verdict))
 
 
 def _road_fit_errors(fit: RoadFit) -> NumberErrors:
@@ -436,18 +397,16 @@ def _road_fit_errors(fit: RoadFit) -> NumberErrors:
     return NumberErrors.of_covariance(list(fit.parameters), relative * np.outer(units, units))
 
 
-def _road_options(question: Question) -> tuple[RoadOptions, Question]:
+def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:
     """How to fit, and the question without what is not the car's. BadInput for what needs a known road."""
     from logger.identification.unknown_road.road_state import Options
 
-    unused = {**dict.fromkeys(question.obstacles, True), "low-pass": question.low_pass_hz, "robust": question.robust,
+    unused = {**(question.obstacles or {}), "low_pass_hz": question.low_pass_hz, "robust": question.robust,
               "tries": question.tries, "noise": question.noise != "auto"}
     if given := [option for option, value in unused.items() if value]:
-        raise question.wrong(given[0], f": expected a road whose profile is known, not "
-                                       f"{question.said.format('unmeasured-road')} or "
-                                       f"{question.said.format('same-road')}")
+        raise question.wrong(given[0], ": expected a road whose profile is known, found one that was not measured")
     names = [name for name in question.free if name != _FREE_WAVINESS]
-    return (Options(waviness=question.waviness, free_waviness=_FREE_WAVINESS in question.free,
+    return (Options(waviness=question.waviness or USUAL_WAVINESS, free_waviness=_FREE_WAVINESS in question.free,
                     place_off_m=_PLACES_OFF_M, scale_off=_SCALE_OFF), replace(question, free=names))
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.identify.words import NORMAL_95
 from logger.identification.unknown_road.fisher_scoring import RoadFit
 from logger.identification.unknown_road.road_state import GD_N0, NOISE, OFFSET
-from logger.report.identification_text import NORMAL_95
 from logger.vehicle.named_parameters import Free
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}

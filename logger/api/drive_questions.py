@@ -1,0 +1,330 @@
+"""What the verbs about a record, a drive or a car alone are asked: comfort, estimate, calibrate and modes."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
+
+from drivers.catalogue import names
+from logger.api.question import Argument, LongQuestion, Option, Out, Question, Verb
+from logger.api.ranges import (
+    ADDED,
+    AUTO,
+    COMMON_IRI,
+    COMMON_SPEED_MPS,
+    DAILY_HOURS,
+    IRI,
+    LOW_PASS,
+    MASS_FACTOR,
+    MODAL_METHODS,
+    MODAL_METHODS_GONE,
+    NOISE,
+    PASSENGERS,
+    RESPONSES,
+    SEED,
+    SPEED,
+    WINDOW,
+)
+from logger.api.terms import Anyway, ResampleHz, Unit, Vehicle, VehicleName, file_of
+from logger.errors import BadInput
+from logger.units import WINDOW_M
+
+if TYPE_CHECKING:
+    from logger.store.formats.channel_file import ChannelRecord
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.record_file import AccelerationRecord
+
+PICTURES = Out("write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat")
+_WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
+
+
+@dataclass(frozen=True)
+class ComfortQuestion(Question):
+    """How a recorded ride feels and what it does to health: ISO 2631-1 values of an acceleration record.
+
+    FILE is CSV with the columns t_s and accel_z_mps2 (vertical, at the seat), evenly sampled at 80 Hz or more for 1 s
+    or longer, perhaps accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is the standard's
+    formula, magnitude and phase, applied to the whole record by Fourier transform.
+
+    A record that repeats samples, whose times are uneven, or that is in g is refused, with the option that mends it.
+    What is doubtful is named on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
+
+    In Python: takes records and runs as well; raises BadInput for what is none of this, for what makes the values
+    wrong (repeated samples, gravity in g), and as ``read_record``. What is doubtful is in ``doubts``, a line each.
+
+    >>> found = comfort(read_run(folder))
+    >>> found.comfort, round(found.a_w_mps2, 2)
+    ('a_little_uncomfortable', 0.32)
+    """
+
+    record: Annotated[Union["AccelerationRecord", "Drive", Path, str], Argument(
+        "CSV with t_s,accel_z_mps2[,accel_x_mps2,accel_y_mps2]", metavar="FILE", read=Path)]
+    weighting: Annotated[str, Option(
+        f"weighting of accel_z_mps2: one of {_WEIGHTINGS} (default: wk). With wk, accel_x_mps2 and accel_y_mps2 are "
+        "weighted by wd and combined with it", metavar="NAME")] = "wk"
+    _: KW_ONLY
+    daily_hours: Annotated[float | None, Option(
+        "hours a day of such riding, for the health values (default: the length of the record)", DAILY_HOURS,
+        "H")] = None
+    unit: Unit = None
+    resample_hz: ResampleHz = None
+
+    def named(self) -> str:
+        return str(self.record)
+
+    def files_read(self) -> Sequence[Path]:
+        return file_of(self.record)
+
+
+def _noise(text: str) -> float | str:
+    try:
+        return text if text == AUTO else float(text)
+    except ValueError:
+        raise ValueError(f"expected {AUTO}, or a number in {NOISE.unit}") from None
+
+
+def _check_noise(noise_mps2: float | str) -> None:
+    if noise_mps2 != AUTO and (isinstance(noise_mps2, str) or NOISE.fault(noise_mps2)):
+        raise ValueError(f"expected {AUTO}, or {NOISE.words}")
+
+
+@dataclass(frozen=True)
+class EstimateQuestion(LongQuestion):
+    """The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
+
+    RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies
+    in the folder, the estimates are compared with its exact IRI. Beside them stands the limit: what an estimator could
+    reach that knew the road's spectrum, the sensor's noise and the car exactly.
+
+      ridelog estimate run --vehicle rav4-2009
+      ridelog estimate drive.csv --vehicle mycar.yaml --step 0.613 --profile-out road.csv
+
+    A distance may go back by up to 1 m, as one corrected by GPS does; it is then computed again, as the integral of
+    speed_mps plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are
+    brought to 100 Hz. Repeated samples, uneven times and values in g are refused, with the option that mends them.
+
+    The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its own IRI too
+    low. A drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI: the limit's R2 is
+    given for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one.
+
+    In Python: raises BadInput for a drive that cannot be used, or of another road than its profile's, what makes the
+    result wrong (repeated samples, gravity in g), and as ``read_run`` and ``read_vehicle``. Source: a smoother of the
+    road's state as ISO 8608 lets expect it (``logger.estimation``).
+
+    >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
+    >>> found.iri_m_per_km.shape == found.iri_exact_m_per_km.shape == (len(found.flags),)
+    True
+    """
+
+    run: Annotated[Union["Drive", Path, str], Argument("folder with drive.csv, or a drive.csv", metavar="RUN",
+                                                       read=Path)]
+    vehicle: Annotated[Vehicle, Option(
+        "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which also says where the "
+        "sensor sits; in Python a model as well", metavar="NAME|FILE", read=str)]
+    _: KW_ONLY
+    noise_mps2: Annotated[float | Literal["auto"] | None, Option(
+        f"r.m.s. noise of one reading before rounding, {NOISE.words}; auto: learnt from the drive, with a standard "
+        "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2", read=_noise,
+        check=_check_noise)] = None
+    step_mps2: Annotated[float | None, Option(
+        "step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
+        "MPS2")] = None
+    window_m: Annotated[float, Option("length of a window [m] (default: 7.62, 25 ft)", WINDOW, "M")] = WINDOW_M
+    unit: Unit = None
+    resample_hz: ResampleHz = None
+    anyway: Anyway = False
+
+    def named(self) -> str:
+        return str(self.run)
+
+    def files_read(self) -> Sequence[Path]:
+        from logger.api.bench import files_of
+        from logger.store.formats.drive_file import DRIVE, PROFILE
+
+        return [*files_of(self.vehicle), *(one for run in file_of(self.run) for one in (run, run / DRIVE,
+                                                                                         run / PROFILE))]
+
+    def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
+        for profile in files.get("--profile-out", ()):
+            written = [path for given in files.values() for path in given]
+            taken = {path.resolve() for path in (*self.files_read(), *written)}
+            part = re.compile(rf"{re.escape(profile.stem)}-[1-9][0-9]*{re.escape(profile.suffix)}")
+            folder = profile.parent.resolve()
+            beside = {path for path in taken if path.parent == folder} | {*(
+                folder.iterdir() if folder.is_dir() else ())}
+            if clash := [path for path in beside if part.fullmatch(path.name) and path.resolve() in taken]:
+                raise BadInput(f"--profile-out {profile}: expected another name, its parts could be written over "
+                               f"{clash[0]}")
+
+
+@dataclass(frozen=True)
+class CalibrateQuestion(LongQuestion):
+    """How much a vehicle shakes on roads of known roughness: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
+
+    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; one line per speed comes out, and
+    how far one road lies off it. The result is kept beside the vehicle's file (NAME.calibration.json), or in the user's
+    cache, and found again, unless an effect of your own is in it.
+
+      ridelog calibrate --vehicle rav4-2009
+      ridelog calibrate --vehicle mycar.yaml --passengers 2
+
+    In Python: raises BadInput for numbers out of range, and as ``read_vehicle``. What is found of a model is not kept.
+    Source: Blum 2015, section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
+
+    >>> found = calibrate(car)
+    >>> found.iri_per_accel_rms.slope.round(1).tolist()
+    [27.9, 18.2, 13.3, 10.9, 9.5, 7.9, 7.1]
+    """
+
+    vehicle: VehicleName
+    _: KW_ONLY
+    window_m: Annotated[float, Option(
+        "length of a window [m], 2 to 200 (default: 7.62, 25 ft)", metavar="M")] = WINDOW_M
+    low_pass_hz: Annotated[float | None, Option(
+        "low_pass_hz of the recorder's settings (default: none; the filters of every recorder, against gravity and "
+        "aliasing, always apply)", LOW_PASS, "HZ")] = None
+    passengers: Annotated[int, Option(
+        "people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a quarter car "
+        "a quarter", PASSENGERS, "N")] = 0
+    sprung_mass_factor: Annotated[float, Option(
+        "so many times the body's mass, springs and inertias staying as they are", MASS_FACTOR, "X")] = 1.0
+    seed: Annotated[int, Option("another number, other roads (default: 1)", SEED, "N")] = 1
+    recompute: Annotated[bool, Option("do not look for a stored result")] = False
+
+    stays: ClassVar[bool] = True
+
+    def files_read(self) -> Sequence[Path]:
+        from logger.api.bench import files_of
+
+        return files_of(self.vehicle)
+
+
+def _columns(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
+
+
+@dataclass(frozen=True)
+class ModesQuestion(Question):
+    """Natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
+
+    FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response
+    to random forces; --input names a column with a force or motion that was measured with it. Nobody has to pick poles:
+    the order and the modes are chosen by rule, and what the record does not support is listed as rejected, with the
+    reason.
+
+      ridelog modes push.csv --method era
+      ridelog modes drive.csv --vehicle mycar.yaml
+      ridelog modes --vehicle mycar.yaml --iri 6 --speed 20
+
+    A drive needs the vehicle: the road, and the second axle that follows the first, put peaks into its spectrum that
+    are no modes. Its springs, dampers and masses are fitted to the spectrum, and the modes are those of the numbers
+    found; wheelbase, contact patch and the sensor's place stay as its file says. A record without speed_mps takes
+    --speed.
+
+    With --vehicle and no FILE they are those of a vehicle's file with its effects; the standard deviations follow from
+    the standard errors that the file carries. Laws that are not linear are what they come to on a road at a speed.
+
+    In Python: the record has 100 samples or more; of a vehicle alone as ``vehicle_modes``. Raises BadInput for what
+    does not fit together, a record that is too short for it, and as ``read_channels``. Source: P. van Overschee and
+    B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
+
+    >>> t_s = np.arange(1000) / 100
+    >>> top = np.exp(-0.02 * 2 * np.pi * 1.5 * t_s) * np.cos(2 * np.pi * 1.5 * t_s)
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(1000)
+    >>> found = modes(make_channels({"top": top + noise}, rate_hz=100.0), "era")
+    >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
+    ([1.5], [0.02])
+    """
+
+    record: Annotated[Union["ChannelRecord", Path, str], Argument(
+        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)]
+    method: Annotated[str | None, Option(
+        f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid beside a measured input "
+        "(default: as the record is); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; none with a "
+        "vehicle", metavar="NAME", choices=MODAL_METHODS)] = None
+    _: KW_ONLY
+    columns: Annotated[Sequence[str] | None, Option(
+        "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and place)",
+        metavar="A,B,...", read=_columns)] = None
+    input_column: Annotated[str | None, Option("column of the measured input", metavar="COLUMN", flag="--input")] = None
+    order: Annotated[int | None, Option(
+        "states of the model (for a free decay the most that are tried) instead of the order chosen by rule",
+        metavar="N")] = None
+    response: Annotated[str | None, Option(
+        f"{' or '.join(RESPONSES)}; without it the record is looked at", metavar="KIND", choices=RESPONSES)] = None
+    from_s: Annotated[float | None, Option("leave out what is before this t_s [s]", metavar="S")] = None
+    to_s: Annotated[float | None, Option("leave out what is after this t_s [s]", metavar="S")] = None
+    vehicle: Annotated[Vehicle | None, Option(
+        "the modes of a vehicle's file; with a FILE, the vehicle that was driven", metavar="NAME|FILE",
+        read=str)] = None
+    speed_mps: Annotated[float | None, Option(
+        f"of a vehicle alone: at which laws that are not linear are looked at (default: {COMMON_SPEED_MPS:g}); of a "
+        "FILE: at which it was driven, if it does not say so", SPEED, "MPS")] = None
+
+    def named(self) -> str:
+        return Path(self.record).name if isinstance(self.record, Path | str) else "record"
+
+    def files_read(self) -> Sequence[Path]:
+        return file_of(self.record)
+
+
+    def __post_init__(self) -> None:
+        if self.method in MODAL_METHODS_GONE:
+            beside = " with `input_column`" if "x" in str(self.method) else ""
+            raise self.wrong("method", f" {self.method}: no longer offered, it missed or made up modes: expected "
+                                       f"`method` {MODAL_METHODS_GONE[str(self.method)]}{beside}")
+        super().__post_init__()
+
+
+@dataclass(frozen=True)
+class ModesCommand(ModesQuestion):
+    """At the terminal a vehicle alone, or an example, can be asked for as well."""
+
+    record: Annotated[Union["ChannelRecord", Path, str], Argument(
+        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = Path()
+    _: KW_ONLY
+    iri_m_per_km: Annotated[float | None, Option(
+        f"of a vehicle alone: road for laws that are not linear (default: {COMMON_IRI:g})", IRI, "M_PER_KM")] = None
+    example: Annotated[str | None, Option(
+        "five-storey: the model building of the reference dissertation, instead of FILE", metavar="NAME",
+        choices=("five-storey",))] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        alone = (f"`example` {self.example}" if self.example is not None else
+                 f"`vehicle` {self.vehicle}" if self.vehicle is not None and self.record == Path() else None)
+        if self.example is not None and self.vehicle is not None:
+            raise self.complaint(f"`vehicle` {self.vehicle}: expected no `example` with it")
+        if alone is not None:
+            if self.record != Path():
+                raise self.complaint(f"{alone}: expected no FILE with it, found {self.record}")
+            of_files = ("method", "columns", "input_column", "order", "response", "from_s", "to_s")
+            if given := [one for one in of_files if getattr(self, one) is not None]:
+                raise self.wrong(given[0], f": expected a FILE with it, not {alone}")
+        if (self.iri_m_per_km is not None and (self.vehicle is None or self.record != Path())) or (
+                self.speed_mps is not None and self.vehicle is None):
+            raise self.complaint("`iri_m_per_km` and `speed_mps`: expected `vehicle` with them"
+                                 + (", and no FILE with `iri_m_per_km`" if self.vehicle is not None else ""))
+        if alone is None and self.record == Path():
+            raise self.complaint("modes: expected a FILE (try 'ridelog modes --help')")
+
+    def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
+        """Poles and pictures are of a record alone."""
+        if self.record == Path() and any(files.values()):
+            flag = next(flag for flag, paths in files.items() if paths)
+            raise self.complaint(f"{flag}: expected a FILE with it")
+        if files.get("--diagram") and (self.method == "decrement" or self.vehicle is not None):
+            raise self.complaint("--diagram: expected a method with poles, not "
+                                 + (f"`method` {self.method}" if self.vehicle is None else "`vehicle`"))
+
+
+COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort_of", (PICTURES,))
+CALIBRATE = Verb(CalibrateQuestion, "logger.api.calibration:calibration_of", (
+    Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
+ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
+    Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),
+    Out("write the estimated profile as CSV", "--profile-out", "FILE", ("*",), many=False, is_drawn=False)))
+MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (
+    Out("write the poles of all orders, for a stabilisation diagram", "--diagram", "FILE.csv", ("*",), many=False,
+        is_drawn=False), PICTURES))

@@ -1,0 +1,142 @@
+"""What ``ridelog identify`` is asked."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Annotated
+
+from logger.api.question import Argument, Entries, LongQuestion, Option, Out, Switches, Verb
+from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
+from logger.api.terms import Anyway, Runs, VehicleName, names_of, paths_of
+
+OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
+"""What lies on a road, and its numbers beside ``start_m``."""
+MEASURED, UNMEASURED, SAME = "measured", "unmeasured", "same"
+
+
+def _number(text: str) -> tuple[str, float]:
+    name, values = _numbers(text, 1)
+    return name, values[0]
+
+
+def _interval(text: str) -> tuple[str, tuple[float, float]]:
+    name, values = _numbers(text, 2)
+    return name, (values[0], values[1])
+
+
+def _numbers(text: str, count: int) -> tuple[str, list[float]]:
+    name, _, rest = text.partition("=")
+    try:
+        values = [float(piece) for piece in rest.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(isfinite, values)):
+        raise ValueError(f"expected PARAM={','.join(['NUMBER'] * count)}")
+    return name, values
+
+
+def _obstacle(text: str) -> dict[str, float]:
+    return dict(map(_number, text.split(",")))
+
+
+@dataclass(frozen=True)
+class IdentifyQuestion(LongQuestion):
+    """Vehicle parameters from drives over known roads: a grey-box prediction-error fit.
+
+    Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it
+    was driven on, or, of a rig, with drive.csv (t_s,accel_z_mps2) and the excitation.csv
+    (t_s,elevation_m[,elevation_rear_m]) that drove it. What is free is named as in the vehicle's file; both.NAME is the
+    front and rear axle together.
+
+      ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
+      ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
+          --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --low-pass 20 --out fitted.yaml
+
+    The numbers of an effect that the vehicle's file has are free by the effect's name:
+
+      ridelog identify run --vehicle mycar.yaml --free sprung_mass_kg,dry_friction.friction_force_n
+
+    What is not known of the road can be free as well: a bump (Eq 4.41 of Blum 2015) or a step of which only the kind is
+    known, and the scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle,
+    and its start is looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a
+    single run, NAME).
+
+      ridelog identify drive.csv --vehicle rav4-2009 --bump height_m=0.15,width_m=2.6 --free bump.height_m
+      ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
+
+    With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of
+    the waviness that is said or, with road.waviness free, found. Drives over one road at different speeds say far more
+    (--same-road).
+
+      ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
+      ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
+
+    Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
+    that leave no trace at the sensor, and numbers of which only a combination can be estimated; masses, springs and
+    dampers share one scale, so one of them has to be known.
+
+    In Python: raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not
+    determine. Source: L. Ljung, System Identification (1999), chapters 7 and 9.
+
+    >>> true = car.with_numbers({"sprung_mass_kg": 900.0})
+    >>> drive = simulate(true, random_road(iso_class="C", length_m=150.0), 12.0, noise_mps2=0.03)
+    >>> found = identify(car, drive, ["sprung_mass_kg"])
+    >>> abs(found.parameters["sprung_mass_kg"] - 900.0) < 4 * found.standard_errors["sprung_mass_kg"], found.converged
+    (True, True)
+    """
+
+    vehicle: VehicleName
+    runs: Annotated[Runs, Argument("folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; "
+                                   "of one sample rate", metavar="RUN", read=Path, many=list)]
+    free: Annotated[Sequence[str], Option(
+        "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
+        "step.start_m, speed_scale or road.waviness of the road", metavar="PARAM,...", read=names_of)]
+    _: KW_ONLY
+    start: Annotated[Mapping[str, float] | None, Option(
+        "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,
+        many=dict)] = None
+    bounds: Annotated[Mapping[str, tuple[float, float]] | None, Option(
+        "where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat",
+        metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, Entries(
+        'what lies on the road [m], such as {"bump": {"height_m": 0.1, "width_m": 3.0}}; without start_m it is '
+        "looked for", read=_obstacle, by_name={
+            "bump": ("PARAM=M,...", "a speed bump on the road: [start_m=M,]height_m=M,width_m=M; free as "
+                                    "bump.height_m ..."),
+            "step": ("PARAM=M,...", "a step, up or with a negative height down: [start_m=M,]height_m=M; free as "
+                                    "step.height_m")})] = None
+    noise: Annotated[str, Option(
+        "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
+        "not contain, through the car); auto: the likeliest", choices=NOISE_MODELS)] = "auto"
+    low_pass_hz: Annotated[float | None, Option(
+        "leave out frequencies above it, for example 20; so does the pass_band_hz of a run.yaml", metavar="HZ")] = None
+    robust: Annotated[bool, Option("let single wild readings count less (Huber's loss)")] = False
+    tries: Annotated[int, Option("so many further starts, spread around", TRIES, "N")] = 0
+    skip_s: Annotated[float | None, Option(
+        "beginning of each run that is left out [s] (default: 2)", metavar="S")] = None
+    road: Annotated[str, Switches(
+        "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
+        "one", choices=(MEASURED, UNMEASURED, SAME), by_value={
+            UNMEASURED: ("unmeasured-road", "the roads were not measured; each run has one of its own"),
+            SAME: ("same-road", "the road was not measured; all runs are over the same one; their places may be off "
+                                "by 10 m, their distances by 1 per cent")})] = MEASURED
+    waviness: Annotated[float | None, Option(
+        "of a road that was not measured (default: 2); to find it, add road.waviness to --free", WAVINESS, "W")] = None
+    anyway: Anyway = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.waviness is not None and self.road == MEASURED:
+            raise self.wrong("waviness", ": expected a road that was not measured (`unmeasured_road` or `same_road`)")
+
+    def named(self) -> str:
+        return ", ".join(map(str, self.runs_read()))
+
+    def runs_read(self) -> Sequence[Path]:
+        return paths_of(self.runs)
+
+
+VERB = Verb(IdentifyQuestion, "logger.api.identify.answer:answer", (Out(
+    "write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the residual and of correlated "
+    "numbers; may repeat", metavar="FILE", others=("*",)),), "logger.api.identify.answer:refusal_json")

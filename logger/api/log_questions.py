@@ -1,0 +1,142 @@
+"""What the verbs about segment logs are asked: sections and passes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from re import fullmatch
+from typing import Annotated
+
+from drivers.catalogue import names
+from logger.api.question import Argument, Option, Out, Question, Verb
+from logger.api.ranges import LIMIT
+from logger.api.terms import Localized, limit_of
+from logger.units import FOOT_M, MILE_M
+
+LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
+SYSTEMS = ("si", "us")
+_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
+_FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
+
+
+def length_of(length: str | float) -> float:
+    """A length in metres, or with its unit, such as 100m, 0.1mi, 500ft, 1km [m]. ValueError for anything else."""
+    text = length if isinstance(length, str) else f"{length:f}m"
+    found = fullmatch(r"([0-9.]+)\s*(m|km|mi|ft)", text.strip())
+    try:
+        length_m = float(found[1]) * _UNITS_M[found[2]] if found else 0.0
+    except ValueError:
+        length_m = 0.0
+    if not LEAST_M <= length_m <= MOST_M:
+        raise ValueError(f"expected a length with its unit, such as 100m, 0.1mi or 500ft, from {LEAST_M:g} m to "
+                         f"{MOST_M / 1000:g} km")
+    return length_m
+
+
+def _check_day(day: str) -> None:
+    try:
+        date.fromisoformat(day)
+    except ValueError:
+        raise ValueError("expected a date such as 2026-04-30") from None
+
+
+Logs = Annotated[Path | str | Sequence[Path | str], Argument(
+    "folder of segment logs at any depth, exported stick, or log file; open ones too", metavar="LOGS", read=Path,
+    many=list)]
+
+
+@dataclass(frozen=True)
+class LogsQuestion(Question):
+    """One about segment ``logs``."""
+
+    logs: Logs
+
+    @property
+    def places(self) -> list[Path]:
+        """Where the logs are."""
+        return [Path(self.logs)] if isinstance(self.logs, str | Path) else [Path(one) for one in self.logs]
+
+    def named(self) -> str:
+        return ", ".join(map(str, self.places))
+
+    def files_read(self) -> Sequence[Path]:
+        from logger.store.log.log_reader import find_logs_in
+
+        return [log for log, _ in find_logs_in(self.places)]
+
+
+@dataclass(frozen=True)
+class SectionsQuestion(LogsQuestion):
+    """Logs in sections of one length, as road agencies file them: mean IRI with its standard error, condition, comfort.
+
+      ridelog sections /media/RIDELOG --length 0.1mi --units us
+      ridelog sections drive-logs/ --length 100m --out sections.geojson
+      ridelog sections drive-logs/ --length 100m --route route.geojson
+
+    Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its
+    windows by length, over as much of it as has an IRI, which is said beside it. Its standard error counts what its
+    windows' errors share; where the logs of an older version do not say what that is, neighbours count as sharing all.
+    Rows flagged ``unsettled`` stand in no mean.
+
+    With --route they count by the measures of a line, for each pass over it and in either direction. The line may say
+    begin_km and end_km; points with a number km are its kilometre posts.
+
+    In Python: raises BadInput for no log, none with an intact row, and a file that is no route.
+
+    >>> found = sections(folder / "logs", "0.1mi")
+    >>> bool((found.known_m <= found.length_m + 1e-6).all())
+    True
+    """
+
+    length: Annotated[str | float, Option(
+        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m)", metavar="LENGTH",
+        read=str, check=length_of)] = 100.0
+    units: Annotated[str, Option("of what is printed", choices=SYSTEMS)] = SYSTEMS[0]
+    route: Annotated[Path | str | None, Option(
+        "count by the measures of this line, along and against it", metavar="LINE.geojson", read=Path)] = None
+    localized_m_per_km: Localized = None
+
+
+@dataclass(frozen=True)
+class PassesQuestion(LogsQuestion):
+    """Repeated drives combined by place and direction: the mean of all passes with its standard error, what changed,
+    and places that somebody should go and see.
+
+      ridelog passes /media/RIDELOG --out means.html --visit places.gpx
+      ridelog passes spring/ autumn/ --split 2026-07-01 --out changes.geojson
+
+    Each drive is matched to those before it as a whole: by its places, its direction, and the receiver's error, which
+    changes over minutes. Streets some 15 m apart or more are distinguished, lanes of one direction are not. The
+    standard error of a mean includes the errors that all windows of one drive share (the car, its tires, its load),
+    estimated from how drives differ. It cannot include what all drives share, such as a wrong vehicle file.
+
+    In Python: raises BadInput for no log, and none with an intact row that counts.
+
+    >>> found = passes(folder / "logs")
+    >>> bool((found.drives >= 1).all())
+    True
+    """
+
+    length: Annotated[str | float, Option(
+        "of a cell of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
+        check=length_of)] = 25.0
+    since: Annotated[str | None, Option(
+        "rows from this day on (UTC), such as 2026-04-30; those without a date then do not count", metavar="DAY",
+        check=_check_day)] = None
+    until: Annotated[str | None, Option("rows before this day (UTC)", metavar="DAY", check=_check_day)] = None
+    split: Annotated[str | None, Option(
+        "what changed between the drives before this day and those from it on", metavar="DAY", check=_check_day)] = None
+    above_m_per_km: Annotated[float | None, Option(
+        "from which IRI [m/km, or at a terminal as 160in/mi] a place is to be visited (default: 2.68, poor by 23 CFR "
+        "490.313)", LIMIT, "IRI", read=limit_of)] = None
+
+
+_TABLES = f"{' '.join(_FORMATS)} (in SI units)"
+SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
+    f"write the sections as {_TABLES}, or a page or picture of them (.html .png .svg .pdf); may repeat",
+    metavar="FILE", others=_FORMATS),))
+PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
+    Out(f"write the means as {_TABLES}, or a page with map and curves (.html) or picture (.png .svg .pdf); may repeat",
+        metavar="FILE", others=_FORMATS),
+    Out("write the places to visit: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", _FORMATS,
+        many=False, is_drawn=False)))

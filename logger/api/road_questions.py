@@ -1,0 +1,95 @@
+"""What the verbs about measured profiles are asked: iri, and road classify."""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Union
+
+from logger.api.question import Argument, Option, Out, Question, Verb
+from logger.api.terms import Localized, ResampleM
+
+if TYPE_CHECKING:
+    from logger.store.formats.profile_file import Profile
+
+PICTURES = Out("write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat")
+
+ProfileFile = Annotated[Union["Profile", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
+
+
+@dataclass(frozen=True)
+class ProfileQuestion(Question):
+    """One about a ``profile``, or its file."""
+
+    profile: ProfileFile
+
+    def named(self) -> str:
+        """The file's name."""
+        return Path(self.profile).name if isinstance(self.profile, Path | str) else "profile"
+
+    def files_read(self) -> Sequence[Path]:
+        """The profile's, where it is a file."""
+        return [Path(self.profile)] if isinstance(self.profile, Path | str) else []
+
+
+@dataclass(frozen=True)
+class IriQuestion(ProfileQuestion):
+    """Exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
+
+    PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]) or ERD, evenly spaced by 300 mm or less and at least
+    11 m long. With two wheel tracks: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
+
+    In Python: raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
+
+    >>> found = iri(random_road(iso_class="B", length_m=400.0, seed=3))
+    >>> round(found.iri_m_per_km, 2), found.windows_m_per_km.round(2).tolist()
+    (4.44, [4.3, 4.69, 4.44, 4.32])
+    """
+
+    window_m: Annotated[float, Option(
+        "length of a window [m] (default: 100, as road agencies report; a tenth of a mile is 160.9344, the service's "
+        "25 ft are 7.62)", metavar="M")] = 100.0
+    resample_m: ResampleM = None
+    localized_m_per_km: Localized = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.window_m > 0:
+            raise self.wrong("window_m", f" {self.window_m:g}: expected a length above 0 m")
+
+
+@dataclass(frozen=True)
+class IriCommand(IriQuestion):
+    """At the terminal the response of the IRI itself can be asked for as well."""
+
+    profile: Annotated[Union["Profile", Path, str], Argument(
+        "CSV or ERD file", metavar="PROFILE", read=Path)] = Path()
+    _: KW_ONLY
+    response: Annotated[bool, Option(
+        "without a profile: how strongly the IRI responds to each wavelength, as a table")] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.response and (self.profile != Path() or self.localized_m_per_km is not None):
+            raise self.wrong("response", ": expected no PROFILE and no `localized_m_per_km`, it is the response of the "
+                                         "IRI itself")
+        if not self.response and self.profile == Path():
+            raise self.complaint("expected a PROFILE, or `response`")
+
+
+@dataclass(frozen=True)
+class ClassifyQuestion(ProfileQuestion):
+    """Class, degree of roughness and waviness of a profile of at least 100 m (ISO 8608).
+
+    In Python: raises BadInput for one that is too short or too odd, and as ``read_profile``.
+
+    >>> found = classify(random_road(iso_class="C", length_m=500.0))
+    >>> found.road_class, abs(found.waviness - 2.0) < 3 * found.waviness_std
+    ('C', True)
+    """
+
+    resample_m: ResampleM = None
+
+
+IRI = Verb(IriCommand, "logger.api.roads:asked_iri", (PICTURES,))
+CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (
+    Out("write the smoothed spectrum of the (left) track as CSV", "--psd", "FILE", ("*",), False, False), PICTURES))

@@ -1,0 +1,110 @@
+"""Fields that the questions of several verbs have in common."""
+
+from collections.abc import Sequence
+from math import isfinite
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+from logger.api.question import Argument, Option
+from logger.api.ranges import LIMIT, TOLERANCE, USUAL_TOLERANCE
+from logger.errors import BadInput
+from logger.units import INCH_PER_MILE_M_PER_KM
+
+if TYPE_CHECKING:
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.vehicle_file import Model
+
+Vehicle = Union["Model", Path, str]
+"""A model, or the name or file of one."""
+Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
+"""One run or several: records (``ridelog.Run``), or their folders."""
+
+VehicleName = Annotated[Vehicle, Option(
+    "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
+    metavar="NAME|FILE", read=str)]
+Anyway = Annotated[bool, Option("go on where a run does not seem to be of this road or this car, or in these units")]
+TrackedRuns = Annotated[Runs, Argument(
+    "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
+Tolerance = Annotated[float | None, Option(
+    "how far off the vehicle's masses, springs and dampers may well be, as a share (default: "
+    f"{USUAL_TOLERANCE:g}, and 0.1 where a search or the fit of an effect finds that the file is a rough one; what you "
+    "say holds)", TOLERANCE, "SHARE")]
+LowPass = Annotated[float | None, Option(
+    "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
+    "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
+EffectFiles = Annotated[Sequence[Path | str], Option(
+    "a Python file with an effect of your own, to be tried as well; may repeat. The names hysteresis and "
+    "frame_friction are taken too: ridelog has these effects, and tries them only where they are asked for",
+    metavar="FILE.py", read=str, many=list, flag="--effect-file")]
+
+
+def limit_of(text: str) -> float:
+    """An IRI in m/km, of one with in/mi or m/km written behind it, or nothing."""
+    value, is_us = text.strip().removesuffix("in/mi").removesuffix("m/km"), text.strip().endswith("in/mi")
+    try:
+        return float(value) * (INCH_PER_MILE_M_PER_KM if is_us else 1.0)
+    except ValueError:
+        raise ValueError("expected a number, as 2.5 (m/km) or 160in/mi") from None
+
+
+Localized = Annotated[float | None, Option(
+    "list where the IRI over 25 ft, which slides along, is above this, in m/km, or at a terminal as 160in/mi (AASHTO "
+    "R 54)", LIMIT, "IRI", read=limit_of)]
+Unit = Annotated[str | None, Option(
+    "unit of the accelerations, whatever they look like (default: m/s2, and a record that is plainly in g is refused)",
+    choices=("mps2", "g"))]
+
+
+def _rate_hz(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError("expected a rate in Hz; a file goes before --resample") from None
+
+
+ResampleHz = Annotated[float | None, Option(
+    "for a record whose times are uneven, come in bursts, or whose samples repeat: drop the repeats and lay it on an "
+    "even grid of HZ through an anti-alias filter; without HZ (in Python 0): of the record's own rate, 100 Hz at "
+    "least. The result says that it was done", metavar="HZ", read=_rate_hz, bare=0.0)]
+ResampleM = Annotated[float | None, Option(
+    "for an unevenly spaced profile: lay straight lines between its samples and take a sample every M metres; this "
+    "changes the IRI, and the result says that it was done; what was between wide samples stays unknown",
+    metavar="M")]
+
+
+def names_of(text: str) -> list[str]:
+    """Names with commas between them."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def each(given: Any) -> list[Any]:
+    """One run or several, as a list."""
+    return list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+
+
+def paths_of(given: Runs) -> list[Path]:
+    """Those of them that are files or folders."""
+    return [Path(one) for one in each(given) if isinstance(one, str | PathLike)]
+
+
+def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
+    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
+    name, _, rest = text.partition(":")
+    if "=" in name and "/" not in name:
+        raise BadInput(f"{option} {text}: expected NAME:PARAM=VALUE, with a colon after the name")
+    found: dict[str, float] = {}
+    for piece in rest.split(",") if rest else ():
+        parameter, _, value = piece.partition("=")
+        try:
+            found[parameter] = float(value)
+        except ValueError:
+            found[parameter] = float("nan")
+        if not isfinite(found[parameter]):
+            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
+    return name, found
+
+
+def file_of(given: object) -> list[Path]:
+    """The file that is read, where something is given by its file."""
+    return [Path(given)] if isinstance(given, Path | str) else []

@@ -1,0 +1,214 @@
+"""Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING
+from pathlib import Path
+from types import NoneType
+from typing import Any, get_args
+
+from logger.api.outputs import check_outs
+from logger.api.question import (
+    Argument,
+    Asking,
+    Entries,
+    LongQuestion,
+    Option,
+    Out,
+    Question,
+    Switches,
+    Verb,
+    WrongOption,
+    askings,
+    help_of,
+)
+from logger.commands.pictures import PICTURES, parted, write_result
+from logger.commands.screen import on_screen, warned, wipe
+from logger.errors import BadInput, CheckFailed
+from logger.files import together
+from logger.printable import printable
+
+
+class Asked:
+    """A verb that is declared by its question, as the modules of this folder declare one."""
+
+    def __init__(self, place: str) -> None:
+        self._verb: Verb = _named(place)
+        self.__doc__ = help_of(self._verb.question)
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare its arguments."""
+        declare(parser, self._verb)
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Carry it out."""
+        return run(self._verb, args)
+
+
+def declare(parser: argparse.ArgumentParser, verb: Verb) -> None:
+    """The arguments of a verb: its question's, its files', and ``--json``."""
+    for one in askings(verb.question):
+        _add(parser, one)
+    for out in verb.outs:
+        parser.add_argument(out.flag, type=Path, metavar=out.metavar, required=out.required, help=out.help,
+                            **_many(out.many))
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def _many(repeats: bool) -> dict[str, Any]:
+    return {"action": "append"} if repeats else {}
+
+
+def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
+    option = one.option
+    if isinstance(option, Switches):
+        for value, (name, words) in (option.by_value or {}).items():
+            parser.add_argument(f"--{name}", dest=f"{one.name}.{value}", action="store_true", help=words)
+    elif isinstance(option, Entries):
+        for name, (metavar, words) in (option.by_name or {}).items():
+            parser.add_argument(f"--{name}", dest=f"{one.name}.{name}", metavar=metavar, help=words,
+                                type=_reader(f"--{name}", option, one.kind))
+    elif isinstance(option, Argument):
+        is_optional = one.default is not MISSING
+        nargs = ("*" if is_optional else "+") if option.many else "?" if is_optional else None
+        parser.add_argument(one.name, nargs=nargs, metavar=option.metavar, help=one.help,
+                            type=_reader(str(option.metavar), option, one.kind))
+    elif one.default is False:
+        parser.add_argument(one.flag, dest=one.name, action="store_true", help=one.help)
+    else:
+        parser.add_argument(one.flag, dest=one.name, required=one.default is MISSING, help=one.help,
+                            metavar=option.metavar or "|".join(option.choices), **_many(option.many is not None),
+                            **({} if option.bare is None else {"nargs": "?", "const": option.bare}),
+                            type=_reader(one.flag, option, one.kind))
+
+
+def _reader(flag: str, option: Option, kind: Any) -> Callable[[str], Any]:
+    """What makes a value of a text; a complaint names the option and the text."""
+    kinds = [one for one in get_args(kind) if one is not NoneType] or [kind]
+    make: Callable[[str], Any] = option.read or _number(kinds[0], option) or str
+    if make in (Path, str):
+        return make
+
+    def read(text: str) -> Any:
+        try:
+            return make(text)
+        except ValueError as error:
+            raise BadInput(f"{flag} {text}: {error}") from None
+
+    return read
+
+
+def _number(kind: Any, option: Option) -> Callable[[str], float] | None:
+    if kind not in (int, float):
+        return None
+    unit = option.range.unit if option.range else ""
+
+    def number(text: str) -> float:
+        try:
+            return float(text) if kind is float else int(text)
+        except ValueError:
+            without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""
+            what = ("a number" if kind is float else "a whole number") + f" in {unit}" * bool(unit)
+            raise ValueError(f"expected {what}{without}") from None
+
+    return number
+
+
+def asked(verb: Verb, args: argparse.Namespace) -> Any:
+    """The question of a command line."""
+    values: dict[str, Any] = {}
+    for one in askings(verb.question):
+        if isinstance(one.option, Entries):
+            entries = {name: getattr(args, f"{one.name}.{name}") for name in one.option.by_name or {}}
+            given: Any = {name: value for name, value in entries.items() if value is not None} or None
+        elif isinstance(one.option, Switches):
+            given = _switched(one, args)
+        else:
+            given = getattr(args, one.name)
+            given = one.option.many(given) if one.option.many and given is not None else given
+        if given is not None:
+            values[one.name] = given
+    if issubclass(verb.question, LongQuestion):
+        values |= {"progress": warned if verb.question.stays else on_screen(), "warn": warned}
+    return verb.question(**values)
+
+
+def _switched(one: Asking, args: argparse.Namespace) -> str | None:
+    """The value whose switch was given. BadInput for two."""
+    switches = one.option.by_value if isinstance(one.option, Switches) else None
+    on = [(value, name) for value, (name, _) in (switches or {}).items() if getattr(args, f"{one.name}.{value}")]
+    if len(on) > 1:
+        raise BadInput(f"--{on[0][1]}: expected no --{on[1][1]} with it")
+    return on[0][0] if on else None
+
+
+@contextmanager
+def respelled(question: type[Question]) -> Iterator[None]:
+    """A complaint about an option has its name at the terminal."""
+    flags = {one.name: one.flag for one in askings(question)}
+    try:
+        yield
+    except WrongOption as error:
+        raise error.spelled(flags) from None
+
+
+def run(verb: Verb, args: argparse.Namespace) -> int:
+    """Ask what a command line asks, write the files and print the answer; the exit status."""
+    paths: Mapping[Out, list[Path]] = {one: _paths(args, one) for one in verb.outs}
+    try:
+        with respelled(verb.question):
+            question = asked(verb, args)
+            _check_outs(paths, question)
+            found = _named(verb.answers)(question)
+    except CheckFailed as refusal:
+        if not (args.json and verb.refusal):
+            raise
+        print(json.dumps(_named(verb.refusal)(refusal), allow_nan=False))
+        print(f"ridelog: {refusal}", file=sys.stderr)
+        return refusal.exit_status
+    finally:
+        wipe()
+    with together():
+        for out, those in paths.items():
+            pictures, others = parted(those) if out.is_drawn else ([], those)
+            for path in others:
+                found.write(path, out.flag)
+            write_result(pictures, found, question.named())
+    if args.json:
+        print(json.dumps(found.as_json(), allow_nan=False))
+    else:
+        words = found.next_words(question, {out.flag: those for out, those in paths.items()})
+        print(found.text, *([f"\n{words}"] if words else []), sep="\n")
+    for words in found.remarks:
+        print(printable(f"ridelog: {question.named()}: {words}"), file=sys.stderr)
+    return int(found.exit_status)
+
+
+def _named(place: str) -> Any:
+    """What a module and a name in it are: ``logger.api.lab:compared``."""
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def _paths(args: argparse.Namespace, out: Out) -> list[Path]:
+    given = getattr(args, out.flag.lstrip("-").replace("-", "_"))
+    return list(given) if out.many and given else [given] if given is not None and not out.many else []
+
+
+def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None:
+    """BadInput for a file that cannot be written, is read, or has an ending that is not offered."""
+    for out, paths in asked_for.items():
+        offered = [*(PICTURES if out.is_drawn else ()), *out.others]
+        if wrong := [path for path in paths if path.suffix.lower() not in offered and "*" not in offered]:
+            one_of = "one of " * (len(offered) > 1)
+            raise BadInput(f"{out.flag} {wrong[0]}: expected a file that ends in {one_of}{', '.join(offered)}")
+    if any(asked_for.values()):
+        check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], question.runs_read(),
+                   question.files_read())
+        question.check_written({out.flag: paths for out, paths in asked_for.items()})

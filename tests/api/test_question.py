@@ -1,0 +1,111 @@
+"""A verb's options are declared once: its command line, its function in Python and its checks say the same."""
+
+import argparse
+import inspect
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+
+from logger.api.question import Argument, Asking, Entries, Option, Question, Switches, Verb, askings, function
+from logger.api.ranges import Range
+from logger.commands import options
+from logger.commands.main import ASKED
+from logger.errors import BadInput
+
+
+def _pair(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    if not value:
+        raise ValueError("expected NAME=NUMBER")
+    return name, float(value)
+
+
+@dataclass(frozen=True)
+class Ask(Question):
+    """How it rides.
+
+      ridelog ride road.csv
+
+    In Python: the same.
+    """
+
+    road: Annotated[Path, Argument("the road", metavar="ROAD", read=Path)]
+    _: KW_ONLY
+    rate_hz: Annotated[float, Option("samples a second", Range(10, 1000, "Hz"), "HZ")] = 100.0
+    tries: Annotated[int, Option("so many", Range(0, 9), "N")] = 0
+    speeds_mps: Annotated[list[float] | tuple[float, ...], Option(
+        "of a drive; may repeat", Range(1, 50, "m/s"), "MPS", read=float, many=list, flag="--speed")] = ()
+    start: Annotated[Mapping[str, float] | None, Option("from where", read=_pair, many=dict)] = None
+    lies: Annotated[Mapping[str, Any] | None, Entries("what lies there", read=_pair, by_name={
+        "bump": ("N=M", "a bump"), "hole": ("N=M", "a hole")})] = None
+    surface: Annotated[str, Switches("of what it is", choices=("dry", "wet", "icy"), by_value={
+        "wet": ("wet-road", "it rains"), "icy": ("ice", "it is cold")})] = "dry"
+    kind: Annotated[str, Option("of model", choices=("ar", "ma"))] = "ar"
+    quick: Annotated[bool, Option("be quick")] = False
+
+
+def asked(*words: str) -> Question:
+    parser = argparse.ArgumentParser(exit_on_error=False)
+    verb = Verb(Ask, "")
+    options.declare(parser, verb)
+    with options.respelled(Ask):
+        return options.asked(verb, parser.parse_args(words))
+
+
+def test_a_command_line_makes_the_question_that_python_makes() -> None:
+    assert asked("a.csv") == Ask(Path("a.csv"))
+    assert asked("a.csv", "--rate", "50", "--tries", "3", "--speed", "10", "--speed", "20", "--start", "m=3",
+                 "--start", "k=4", "--bump", "h=1", "--ice", "--kind", "ma", "--quick") == Ask(
+        Path("a.csv"), rate_hz=50.0, tries=3, speeds_mps=[10.0, 20.0], start={"m": 3.0, "k": 4.0},
+        lies={"bump": ("h", 1.0)}, surface="icy", kind="ma", quick=True)
+
+
+@pytest.mark.parametrize(("words", "values", "complaint"), [
+    (["--rate", "5"], {"rate_hz": 5}, "{} 5: expected 10 to 1000 Hz"),
+    (["--rate", "nan"], {"rate_hz": float("nan")}, "{} nan: expected 10 to 1000 Hz"),
+    (["--tries", "10"], {"tries": 10}, "{} 10: expected 0 to 9"),
+    (["--speed", "9", "--speed", "90"], {"speeds_mps": [9.0, 90.0]}, "{} 90: expected 1 to 50 m/s"),
+    (["--kind", "x"], {"kind": "x"}, "{} x: expected one of ar, ma"),
+])
+def test_what_is_out_of_range_is_one_sentence_in_both(words: list[str], values: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(BadInput) as there:
+        asked("a.csv", *words)
+    with pytest.raises(BadInput) as here:
+        Ask(Path("a.csv"), **values)
+    assert str(there.value) == complaint.format(words[0]) and str(here.value) == complaint.format(*values)
+
+
+@pytest.mark.parametrize(("words", "complaint"), [
+    (["--rate", "30mph"], "--rate 30mph: expected a number in Hz, without its unit"),
+    (["--tries", "1.5"], "--tries 1.5: expected a whole number"),
+    (["--start", "m"], "--start m: expected NAME=NUMBER")])
+def test_what_cannot_be_read_is_named(words: list[str], complaint: str) -> None:
+    with pytest.raises(BadInput, match=f"^{complaint}$"):
+        asked("a.csv", *words)
+
+
+def test_of_two_switches_one_would_be_lost() -> None:
+    with pytest.raises(BadInput, match="--wet-road: expected no --ice with it"):
+        asked("a.csv", "--wet-road", "--ice")
+
+
+def test_the_function_has_the_questions_fields_and_words() -> None:
+    ride = function("ride", Ask, lambda one: one)
+    assert ride(Path("a.csv"), tries=2) == Ask(Path("a.csv"), tries=2)
+    assert list(inspect.signature(ride).parameters) == [*(one.name for one in askings(Ask))]
+    assert ride.__name__ == "ride" and "samples a second (10 to 1000 Hz; default: 100)" in str(ride.__doc__)
+
+
+def every_option() -> list[tuple[str, Asking]]:
+    return [(verb, one) for verb, place in ASKED.items()
+            for one in askings(options._named(f"logger.api.{place}").question)]
+
+
+def test_each_option_is_explained_and_each_number_has_its_unit() -> None:
+    assert not [(verb, one.name) for verb, one in every_option() if not one.option.help]
+    units = {"_hz": "Hz", "_mps": "m/s", "_mps2": "m/s2", "_m": "m"}
+    assert not [(verb, one.name) for verb, one in every_option() for end, unit in units.items()
+                if one.name.endswith(end) and one.option.range and one.option.range.unit != unit]
