@@ -16,7 +16,7 @@ from logger.units import FOOT_M, MILE_M
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
 SYSTEMS = ("si", "us")
 _UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
-_FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
+FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
 
 
 def length_of(length: str | float) -> float:
@@ -33,7 +33,8 @@ def length_of(length: str | float) -> float:
     return length_m
 
 
-def _check_day(day: str) -> None:
+def check_day(day: str) -> None:
+    """ValueError for what is no day."""
     try:
         date.fromisoformat(day)
     except ValueError:
@@ -122,21 +123,21 @@ class PassesQuestion(LogsQuestion):
         check=length_of)] = 25.0
     since: Annotated[str | None, Option(
         "rows from this day on (UTC), such as 2026-04-30; those without a date then do not count", metavar="DAY",
-        check=_check_day)] = None
-    until: Annotated[str | None, Option("rows before this day (UTC)", metavar="DAY", check=_check_day)] = None
+        check=check_day)] = None
+    until: Annotated[str | None, Option("rows before this day (UTC)", metavar="DAY", check=check_day)] = None
     split: Annotated[str | None, Option(
-        "what changed between the drives before this day and those from it on", metavar="DAY", check=_check_day)] = None
+        "what changed between the drives before this day and those from it on", metavar="DAY", check=check_day)] = None
     above_m_per_km: Annotated[float | None, Option(
         "from which IRI [m/km, or at a terminal as 160in/mi] a place is to be visited (default: 2.68, poor by 23 CFR "
         "490.313)", LIMIT, "IRI", read=limit_of)] = None
 
 
-_TABLES = f"{' '.join(_FORMATS)} (in SI units)"
+_TABLES = f"{' '.join(FORMATS)} (in SI units)"
 SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
     f"write the sections as {_TABLES}, or a page or picture of them (.html .png .svg .pdf); may repeat",
-    metavar="FILE", others=_FORMATS),))
+    metavar="FILE", others=FORMATS),))
 PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
     Out(f"write the means as {_TABLES}, or a page with map and curves (.html) or picture (.png .svg .pdf); may repeat",
-        metavar="FILE", others=_FORMATS),
-    Out("write the places to visit: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", _FORMATS,
+        metavar="FILE", others=FORMATS),
+    Out("write the places to visit: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", FORMATS,
         many=False, is_drawn=False)))

@@ -255,8 +255,8 @@ def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tu
     decay = inputs is None and (decays(record.samples) if question.response is None else
                                 question.response == "decay")
     if method in _ONLY_DECAYS and not decay:
-        raise ValueError(f"expected a free decay for `method` {method}, found a motion that goes on: `method` ssi finds "
-                         f"its modes; `response` decay if it is a decay")
+        raise ValueError(f"expected a free decay for `method` {method}, found a motion that goes on: `method` ssi "
+                         f"finds its modes; `response` decay if it is a decay")
     if method == "decrement":
         if len(record.names) > 1:
             raise ValueError(f"expected one column for the decrement (`columns`), found "
