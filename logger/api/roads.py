@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.question import function
-from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
-from logger.api.road_questions import ClassifyQuestion, IriCommand, IriQuestion
+from logger.api.road_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
@@ -84,61 +83,30 @@ def write_profile(path: Path | str, profile: Profile) -> None:
     drive_file.write_profile(Path(path), drive_file.track_of(profile))
 
 
-def random_road(
-    *, iso_class: str | None = None, gd_n0_cm3: float | None = None, iri_m_per_km: float | None = None,
-    length_m: float = 1000.0, spacing_m: float = 0.05, seed: int = 1, waviness: float = 2.0,
-) -> Profile:
-    """A random road with the displacement spectrum Gd(n) = Gd(n0) (n / n0)^-w of ISO 8608 (Eq 4.1, 4.2 of Blum 2015).
-
-    iso_class    A to H: the geometric mean of its degrees of roughness; or
-    gd_n0_cm3    a degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]; or
-    iri_m_per_km    an IRI, of which Gd(n0) follows (Eq 4.40, or for a waviness other than 2 from its own relation)
-    length_m     11 m or more; ``spacing_m`` between samples, 0.3 m or less [m]
-    seed         one seed is one road
-    waviness     w, 1.5 to 3
-
-    Raises BadInput for what is none of this.
-
-    >>> random_road(iso_class="B", length_m=20.0)
-    Profile
-      length                               20  m
-      begins at                             0  m
-      spacing                            0.05  m
-      samples                             401
-      wheel tracks                          1
-      elevation, standard deviation  0.005887  m
-    """
+def random_road_of(question: RandomRoadQuestion) -> Profile:
+    """The answer to ``RandomRoadQuestion``, which says what is raised."""
     from logger.roads.iso8608 import generate
 
-    ROAD_WAVINESS.check("waviness", waviness)
-    LENGTH.check("length_m", length_m)
-    SPACING.check("spacing_m", spacing_m)
-    roughness_cm3 = roughness_of(iso_class, gd_n0_cm3, iri_m_per_km, length_m, waviness)
-    if length_m / spacing_m > MOST_ROAD_SAMPLES:
-        raise BadInput(f"length_m {length_m:g}, spacing_m {spacing_m:g}: expected at most {MOST_ROAD_SAMPLES} samples")
-    return Profile(0.0, spacing_m, generate(roughness_cm3, length_m, spacing_m, seed, waviness), None)
+    elevation_m = generate(roughness_of(question), question.length_m, question.spacing_m, question.seed,
+                           question.waviness)
+    return Profile(0.0, question.spacing_m, elevation_m, None)
 
 
-def roughness_of(iso_class: str | None, gd_n0_cm3: float | None, iri_m_per_km: float | None, length_m: float,
-                 waviness: float) -> float:
-    """Gd(n0) of a road [cm3] that is asked for by one of the first three. BadInput for none, several, or one that there
-    is not."""
+random_road = function("random_road", RandomRoadQuestion, random_road_of)
+
+
+def roughness_of(question: RandomRoadQuestion) -> float:
+    """Gd(n0) of the road that is asked for [cm3]."""
     from logger.roads import gd_iri, iso8608
 
-    if sum(one is not None for one in (iso_class, gd_n0_cm3, iri_m_per_km)) != 1:
-        raise BadInput("random_road: expected one of iso_class, gd_n0_cm3 and iri_m_per_km")
-    if iso_class is not None:
-        if iso_class not in iso8608.CLASS_GD_N0_CM3:
-            raise BadInput(f"iso_class {iso_class}: expected one of {', '.join(iso8608.CLASS_GD_N0_CM3)}")
-        return iso8608.CLASS_GD_N0_CM3[iso_class]
-    if gd_n0_cm3 is not None:
-        ROUGHNESS.check("gd_n0_cm3", gd_n0_cm3)
-        return gd_n0_cm3
-    assert iri_m_per_km is not None
-    IRI.check("iri_m_per_km", iri_m_per_km)
-    if waviness == iso8608.STANDARD_WAVINESS:
-        return iso8608.gd_n0_from_iri(iri_m_per_km)
-    return gd_iri.gd_of_road(iri_m_per_km, length_m, waviness).value
+    if question.iso_class is not None:
+        return iso8608.CLASS_GD_N0_CM3[question.iso_class]
+    if question.gd_n0_cm3 is not None:
+        return question.gd_n0_cm3
+    assert question.iri_m_per_km is not None
+    if question.waviness == iso8608.STANDARD_WAVINESS:
+        return iso8608.gd_n0_from_iri(question.iri_m_per_km)
+    return gd_iri.gd_of_road(question.iri_m_per_km, question.length_m, question.waviness).value
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -61,11 +61,15 @@ def declare(parser: argparse.ArgumentParser, verb: Verb) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
-def add_verbs(parser: argparse.ArgumentParser, dest: str, verbs: Mapping[str, tuple[Verb, str]]) -> None:
-    """Verbs below a verb, by name, each with what it does."""
-    below = parser.add_subparsers(dest=dest, required=True, metavar="|".join(verbs))
+def add_verbs(parser: argparse.ArgumentParser, dest: str, verbs: Mapping[str, tuple[Verb, str]]
+              ) -> dict[str, argparse.ArgumentParser]:
+    """Verbs below a verb, by name, each with what it does; their parsers."""
+    below, found = parser.add_subparsers(dest=dest, required=True, metavar="|".join(verbs)), {}
     for name, (verb, words) in verbs.items():
-        declare(below.add_parser(name, help=words, allow_abbrev=False, description=help_of(verb.question)), verb)
+        found[name] = below.add_parser(name, help=words, allow_abbrev=False, description=help_of(verb.question),
+                                       formatter_class=parser.formatter_class)
+        declare(found[name], verb)
+    return found
 
 
 def _many(repeats: bool) -> dict[str, Any]:

@@ -124,15 +124,16 @@ def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.Captu
     (["--iri", "inf"], "--iri inf: expected 0.01 to 1000 m/km"),
     (["--gd", "1", "--seed", "-1"], "--seed -1: expected 0 or more"),
     (["--gd", "1", "--length", "1e6", "--spacing", "0.01"], "at most 20000000 samples"),
-    (["--gd", "1", "--json"], "--json: expected --out FILE"),
+    (["--gd", "1", "--json"], "--json: expected --out FILE"), ([], "expected one of --class, --gd and --iri"),
+    (["--class", "A", "--iri", "2"], "expected one of --class, --gd and --iri"),
+    (["--class", "J"], "--class J: expected one of A, B"),
 ])
 def test_a_road_that_cannot_be_made(arguments: list[str], message: str) -> None:
     with pytest.raises(BadInput, match=message):
         main(["road", "generate", *arguments])
 
 
-@pytest.mark.parametrize("arguments", [[], ["generate"], ["generate", "--class", "J"],
-                                       ["generate", "--class", "A", "--iri", "2"], ["classify"]])
+@pytest.mark.parametrize("arguments", [[], ["generate", "--klass", "A"], ["classify"]])
 def test_wrong_use_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
         main(["road", *arguments])
