@@ -306,10 +306,11 @@ class Estimate(CommandResult):
 
     title: ClassVar[str] = "Roughness from acceleration"
 
-    @property
-    def remarks(self) -> Sequence[str]:
-        """The doubts."""
-        return self.doubts
+    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
+        """The doubts, and that there is no profile, where one was to be written."""
+        none = [f"No profile in {path}: the readings resolve no wavelengths over a stretch longer than the longest of "
+                "them" for path in written.get("--profile-out", ()) if not self.profile]
+        return [*self.doubts, *none]
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the windows as CSV, or the profile, each of its parts as a file of its own."""
@@ -325,10 +326,7 @@ class Estimate(CommandResult):
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """Where the profile is."""
-        if files := self._json["profile_files"]:
-            return "\n".join(f"Profile: {file}" for file in files)
-        return "".join(f"No profile in {path}: the readings resolve no wavelengths over a stretch longer than the "
-                       "longest of them" for path in written.get("--profile-out", ()))
+        return "\n".join(f"Profile: {file}" for file in self._json["profile_files"])
 
     def charts(self) -> Sequence[Chart]:
         """The IRI along the way with its standard error, and that of the profile where it is known."""

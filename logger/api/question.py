@@ -185,7 +185,8 @@ def _check(one: Asking, value: Any) -> None:
         if one.option.check is not None:
             one.option.check(value)
     except ValueError as error:
-        raise WrongOption(f"`{one.name}` {value}: {error}") from None
+        shown = format(value, "g") if isinstance(value, float) else value
+        raise WrongOption(f"`{one.name}` {shown}: {error}") from None
     if choices and value not in choices:
         raise WrongOption(f"`{one.name}` {value}: expected one of {', '.join(choices)}")
 

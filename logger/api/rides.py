@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -93,8 +93,7 @@ class Comfort(CommandResult):
 
     title: ClassVar[str] = "Ride comfort"
 
-    @property
-    def remarks(self) -> Sequence[str]:
+    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
         """The doubts."""
         return self.doubts
 

@@ -78,9 +78,8 @@ class CommandResult(Shown):
 
         return page(self.title, of, self.text, self.charts())
 
-    @property
-    def remarks(self) -> Sequence[str]:
-        """What its command says on stderr, a line each."""
+    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
+        """What its command says on stderr, a line each; ``written``: the files of the command, by option."""
         return ()
 
     def write(self, path: Path, option: str = "--out") -> None:

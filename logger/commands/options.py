@@ -191,12 +191,13 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
             for path in others:
                 found.write(path, out.flag)
             write_result(pictures, found, question.named())
+    written = {out.flag: those for out, those in paths.items()}
     if args.json:
         print(json.dumps(found.as_json(), allow_nan=False))
     else:
-        words = found.next_words(question, {out.flag: those for out, those in paths.items()})
+        words = found.next_words(question, written)
         print(found.text, *([f"\n{words}"] if words else []), sep="\n")
-    for words in found.remarks:
+    for words in found.remarks(written):
         print(printable(f"ridelog: {question.named()}: {words}"), file=sys.stderr)
     return int(found.exit_status)
 

@@ -289,10 +289,11 @@ def test_a_short_drive_has_windows_without_a_profile(
     road, windows = tmp_path / "p.csv", tmp_path / "w.csv"
     asked = ["estimate", str(drive), "--vehicle", CAR, "--profile-out", str(road), "--out", str(windows)]
     assert main(asked) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("IRI ") for line in lines)
-    why = f"No profile in {road}: the readings resolve no wavelengths over a stretch longer than the longest of them"
-    assert lines[-1] == why
+    out, err = capsys.readouterr()
+    assert any(line.startswith("IRI ") for line in out.splitlines())
+    why = (f"ridelog: {drive}: No profile in {road}: the readings resolve no wavelengths over a stretch longer than the "
+           "longest of them")
+    assert err.startswith(why)
     assert windows.read_text().count("\n") > 10
     assert main([*asked, "--json"]) == 0
     out, err = capsys.readouterr()
@@ -413,7 +414,7 @@ def test_files_that_will_not_do(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
-    (("--noise", "0"), "--noise 0: expected 0.0001 to 100 m/s2"),
+    (("--noise", "0"), "--noise 0: expected auto, or 0.0001 to 100 m/s2"),
     (("--step", "-1"), "--step -1: expected 0 to 100 m/s2"),
     (("--window", "nan"), "--window nan: expected 1 to 1000 m"),
 ])
