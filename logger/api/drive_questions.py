@@ -26,7 +26,7 @@ from logger.api.ranges import (
     SPEED,
     WINDOW,
 )
-from logger.api.terms import Anyway, ResampleHz, Unit, Vehicle, VehicleName, file_of
+from logger.api.terms import Anyway, ResampleHz, Unit, Vehicle, VehicleName
 from logger.errors import BadInput
 from logger.units import WINDOW_M
 
@@ -69,12 +69,6 @@ class ComfortQuestion(Question):
         "H")] = None
     unit: Unit = None
     resample_hz: ResampleHz = None
-
-    def named(self) -> str:
-        return str(self.record)
-
-    def files_read(self) -> Sequence[Path]:
-        return file_of(self.record)
 
 
 def _noise(text: str) -> float | str:
@@ -135,15 +129,10 @@ class EstimateQuestion(LongQuestion):
     resample_hz: ResampleHz = None
     anyway: Anyway = False
 
-    def named(self) -> str:
-        return str(self.run)
-
     def files_read(self) -> Sequence[Path]:
         from logger.api.bench import files_of
-        from logger.store.formats.drive_file import DRIVE, PROFILE
 
-        return [*files_of(self.vehicle), *(one for run in file_of(self.run) for one in (run, run / DRIVE,
-                                                                                         run / PROFILE))]
+        return [*super().files_read(), *files_of(self.vehicle)]
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         for profile in files.get("--profile-out", ()):
@@ -261,12 +250,6 @@ class ModesQuestion(Question):
     speed_mps: Annotated[float | None, Option(
         f"of a vehicle alone: at which laws that are not linear are looked at (default: {COMMON_SPEED_MPS:g}); of a "
         "FILE: at which it was driven, if it does not say so", SPEED, "MPS")] = None
-
-    def named(self) -> str:
-        return Path(self.record).name if isinstance(self.record, Path | str) else "record"
-
-    def files_read(self) -> Sequence[Path]:
-        return file_of(self.record)
 
 
     def __post_init__(self) -> None:

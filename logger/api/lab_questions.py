@@ -23,22 +23,16 @@ class LabQuestion(LongQuestion):
     low_pass_hz: LowPass = None
     anyway: Anyway = False
 
-    def named(self) -> str:
-        return ", ".join(map(str, self.runs_read()))
-
-    def runs_read(self) -> Sequence[Path]:
-        return paths_of(getattr(self, "runs", ()))
-
     def files_read(self) -> Sequence[Path]:
         from logger.api.bench import files_of
 
         given: Any = self
-        return [*files_of(given.vehicle), *map(Path, getattr(self, "effect_files", ()))]
+        return [*super().files_read(), *files_of(given.vehicle)]
 
     def command(self, words: str) -> str:
         """A command line about the same vehicle and runs."""
         given: Any = self
-        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {' '.join(map(str, self.runs_read()))}"
+        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {' '.join(map(str, paths_of(given.runs)))}"
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,8 @@ class AddEffectQuestion(LabQuestion):
         from logger.api.bench import files_of
 
         own = Path(str(self.name).partition(":")[0])
-        return [*files_of(self.vehicle)[1:], *map(Path, self.effect_files), *([own] if own.is_file() else [])]
+        read = [one for one in super().files_read() if one not in files_of(self.vehicle)[:1]]
+        return [*read, *([own] if own.is_file() else [])]
 
 
 @dataclass(frozen=True)
@@ -221,9 +216,6 @@ class PlanQuestion(LabQuestion):
             raise self.wrong("speeds_mps", ": expected `profile` with it, the road to be driven")
         if again := [one for number, one in enumerate(self.speeds_mps) if one in self.speeds_mps[:number]]:
             raise self.wrong("speeds_mps", f" {again[0]:g}: expected each speed once")
-
-    def files_read(self) -> Sequence[Path]:
-        return [*super().files_read(), *([Path(self.profile)] if isinstance(self.profile, Path | str) else [])]
 
 
 @dataclass(frozen=True)

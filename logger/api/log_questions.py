@@ -57,9 +57,6 @@ class LogsQuestion(Question):
         """Where the logs are."""
         return [Path(self.logs)] if isinstance(self.logs, str | Path) else [Path(one) for one in self.logs]
 
-    def named(self) -> str:
-        return ", ".join(map(str, self.places))
-
     def files_read(self) -> Sequence[Path]:
         from logger.store.log.log_reader import find_logs_in
 

@@ -76,7 +76,7 @@ class Modes(CommandResult):
 
 def modes_of(question: ModesQuestion) -> Modes:
     """The answer to ``ModesQuestion``, which says what is raised."""
-    return _modes_by(found_modes(question.record, question), question.named())
+    return _modes_by(found_modes(question.record, question), Path(question.named()).name or "record")
 
 
 modes = function("modes", ModesQuestion, modes_of)

@@ -145,16 +145,14 @@ class Question:
         return WrongOption(words)
 
     def named(self) -> str:
-        """What it is asked of, such as the names of files."""
-        return ""
-
-    def runs_read(self) -> Sequence[Path]:
-        """Folders of runs that are read, where they are files."""
-        return ()
+        """What it is asked of: the files that are arguments by their place."""
+        return ", ".join(str(path) for one in askings(type(self)) if isinstance(one.option, Argument)
+                         for path in _paths(getattr(self, one.name)))
 
     def files_read(self) -> Sequence[Path]:
-        """Other files that are read."""
-        return ()
+        """Files and folders that are read, where they are given by their paths."""
+        return [path for one in askings(type(self)) if one.option.read is Path
+                for path in _paths(getattr(self, one.name))]
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         """Raise BadInput where files to write, by their options, could be written over by others of the answer."""
@@ -173,6 +171,12 @@ class LongQuestion(Question):
 
     stays: ClassVar[bool] = False
     """Whether what is under way stays on the screen."""
+
+
+def _paths(given: Any) -> list[Path]:
+    """The paths in the value of a field: one, several, or none."""
+    several = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    return [Path(one) for one in several if isinstance(one, Path | str)]
 
 
 def _check(one: Asking, value: Any) -> None:

@@ -1,6 +1,5 @@
 """What the verbs about measured profiles and random ones are asked: iri, road classify, road generate."""
 
-from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Union
@@ -23,14 +22,6 @@ class ProfileQuestion(Question):
     """One about a ``profile``, or its file."""
 
     profile: ProfileFile
-
-    def named(self) -> str:
-        """The file's name."""
-        return Path(self.profile).name if isinstance(self.profile, Path | str) else "profile"
-
-    def files_read(self) -> Sequence[Path]:
-        """The profile's, where it is a file."""
-        return [Path(self.profile)] if isinstance(self.profile, Path | str) else []
 
 
 @dataclass(frozen=True)

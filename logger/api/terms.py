@@ -36,7 +36,7 @@ LowPass = Annotated[float | None, Option(
 EffectFiles = Annotated[Sequence[Path | str], Option(
     "a Python file with an effect of your own, to be tried as well; may repeat. The names hysteresis and "
     "frame_friction are taken too: ridelog has these effects, and tries them only where they are asked for",
-    metavar="FILE.py", read=str, many=list, flag="--effect-file")]
+    metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
 
 
 def limit_of(text: str) -> float:
@@ -104,7 +104,3 @@ def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
             raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
     return name, found
 
-
-def file_of(given: object) -> list[Path]:
-    """The file that is read, where something is given by its file."""
-    return [Path(given)] if isinstance(given, Path | str) else []

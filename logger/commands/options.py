@@ -221,6 +221,6 @@ def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None
             one_of = "one of " * (len(offered) > 1)
             raise BadInput(f"{out.flag} {wrong[0]}: expected a file that ends in {one_of}{', '.join(offered)}")
     if any(asked_for.values()):
-        check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], question.runs_read(),
-                   question.files_read())
+        read = question.files_read()
+        check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], read, read)
         question.check_written({out.flag: paths for out, paths in asked_for.items()})

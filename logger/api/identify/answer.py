@@ -17,7 +17,7 @@ from logger.api.lab import word_of
 from logger.api.model_checks import check_roads
 from logger.api.question import function
 from logger.api.shown import CommandResult
-from logger.api.terms import each
+from logger.api.terms import each, paths_of
 from logger.api.vehicles import Model, model_of
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
 from logger.identification.identifiability import NotIdentifiable
@@ -109,8 +109,9 @@ def answer(question: IdentifyQuestion) -> Identification:
     model, given = model_of(question.vehicle), each(question.runs)
     if not given:
         raise BadInput("identify: expected a run, found none")
-    places = [path.resolve() for path in question.runs_read()]
-    if again := next((path for path in question.runs_read() if places.count(path.resolve()) > 1), None):
+    paths = paths_of(question.runs)
+    places = [path.resolve() for path in paths]
+    if again := next((path for path in paths if places.count(path.resolve()) > 1), None):
         raise BadInput(f"{again}: expected every run once, found it twice")
     if question.road == SAME and len(given) < 2:
         raise question.wrong("same_road", ": expected two runs or more")

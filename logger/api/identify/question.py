@@ -8,7 +8,7 @@ from typing import Annotated
 
 from logger.api.question import Argument, Entries, LongQuestion, Option, Out, Switches, Verb
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
-from logger.api.terms import Anyway, Runs, VehicleName, names_of, paths_of
+from logger.api.terms import Anyway, Runs, VehicleName, names_of
 
 OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
 """What lies on a road, and its numbers beside ``start_m``."""
@@ -129,12 +129,6 @@ class IdentifyQuestion(LongQuestion):
         super().__post_init__()
         if self.waviness is not None and self.road == MEASURED:
             raise self.wrong("waviness", ": expected a road that was not measured (`unmeasured_road` or `same_road`)")
-
-    def named(self) -> str:
-        return ", ".join(map(str, self.runs_read()))
-
-    def runs_read(self) -> Sequence[Path]:
-        return paths_of(self.runs)
 
 
 VERB = Verb(IdentifyQuestion, "logger.api.identify.answer:answer", (Out(
