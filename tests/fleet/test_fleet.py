@@ -188,7 +188,7 @@ def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, 
     (["ingest", "LOGS", "--to", "TOWN"], r"expected the car's name in the description beside it, or --car NAME"),
     (["summarise", "TOWN", "--by", "route"], r"--by route: expected a dataset that was begun with --roads"),
     (["summarise", "TOWN", "--engine", "oracle"], r"--engine oracle: expected duckdb, spark://HOST:PORT"),
-    (["summarise", "TOWN", "--since", "spring"], r"--since spring: expected a day such as 2026-03-01"),
+    (["summarise", "TOWN", "--since", "spring"], r"--since spring: expected a date such as 2026-04-30"),
     (["summarise", "TOWN", "--since", "2030-01-01"], r"expected at least one pass with an IRI in that time"),
 ])
 def test_wrong_use_is_one_line(arguments: list[str], complaint: str, logs: Path, tmp_path: Path) -> None:
