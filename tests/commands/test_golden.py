@@ -1,4 +1,4 @@
-"""Verbs print the numbers that they printed: what changes them on purpose renews the file (``tests.support.golden``)."""
+"""Verbs print the numbers that they printed; what is to change them renews the file (``tests.support.golden``)."""
 
 from __future__ import annotations
 
