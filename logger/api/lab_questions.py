@@ -1,13 +1,23 @@
 """What the lab's verbs are asked: compare, diagnose, add-effect, learn, plan and lab."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from logger.api.question import Argument, LongQuestion, Option, Out, Verb
 from logger.api.ranges import ADDED, NOISE, SPEED
-from logger.api.terms import Anyway, EffectFiles, LowPass, Runs, Tolerance, TrackedRuns, VehicleName, paths_of
+from logger.api.terms import (
+    Anyway,
+    Candidates,
+    EffectFiles,
+    LowPass,
+    Runs,
+    Tolerance,
+    TrackedRuns,
+    VehicleName,
+    paths_of,
+)
 
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Profile
@@ -93,7 +103,7 @@ class DiagnoseQuestion(LabQuestion):
     vehicle: VehicleName
     runs: TrackedRuns
     _: KW_ONLY
-    candidates: Collection[str] | None = None
+    candidates: Candidates = None
     effect_files: EffectFiles = ()
     list_all: Annotated[bool, Option("list all candidates, not the first 8", flag="--all")] = False
     same_road: Annotated[bool, Option(
@@ -113,8 +123,8 @@ class AddEffectQuestion(LabQuestion):
     the effects with their standard errors, the car's refitted numbers, and the history of the model. The old one stays
     as it is unless --out names it.
 
-    In Python: ``start`` has numbers of the effect by name, where its fit begins. Raises BadInput as ``compare``, and
-    for an effect that there is not, that the model has, or that cannot be there.
+    In Python: raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot
+    be there.
 
     >>> found = add_effect("sensor_gain", car, runs, start={"gain": 1.1})
     >>> found.helps, found.error_after < 0.5 * found.error_before
@@ -129,7 +139,7 @@ class AddEffectQuestion(LabQuestion):
     vehicle: VehicleName
     runs: TrackedRuns
     _: KW_ONLY
-    start: Mapping[str, float] | None = None
+    start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
     effect_files: EffectFiles = ()
 
     def files_read(self) -> Sequence[Path]:
@@ -207,7 +217,7 @@ class PlanQuestion(LabQuestion):
         "MPS2")] = None
     step_mps2: Annotated[float, Option(
         "the planned sensor gives whole multiples of this only [m/s2]", ADDED, "MPS2")] = 0.0
-    candidates: Collection[str] | None = None
+    candidates: Candidates = None
     effect_files: EffectFiles = ()
 
     def __post_init__(self) -> None:
@@ -230,10 +240,8 @@ class LabLoopQuestion(LabQuestion):
     file for each step (vehicle-1.yaml ...), the law (law.py), and story.html, the page of all of it. It takes minutes,
     and the compiler of the ``lab`` extra.
 
-    In Python: ``ask``, given the name of an effect that was found missing, gives that of the one to be added, or None
-    for none; without it all that is missing is added. ``learns`` says whether a law is learned at all. Raises BadInput
-    as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer that is no effect; OSError
-    for files that cannot be written.
+    In Python: raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer
+    that is no effect; OSError for files that cannot be written.
 
     >>> story = lab(car, runs, folder / "lab", candidates=["sensor_gain", "time_offset"])
     >>> [one.effect for one in story.additions], story.comparisons[-1].missing
@@ -247,10 +255,12 @@ class LabLoopQuestion(LabQuestion):
     out: Annotated[Path | str, Option(
         "folder for the vehicle files and the page", metavar="DIR", read=Path)] = Path("ridelog-lab")
     _: KW_ONLY
-    ask: Callable[[str], str | None] = str
-    candidates: Collection[str] | None = None
+    ask: Annotated[Callable[[str], str | None],
+                   "given the name of an effect that was found missing, gives that of the one to be added, or None for "
+                   "none; without it all that is missing is added"] = str
+    candidates: Candidates = None
     effect_files: EffectFiles = ()
-    learns: bool = True
+    learns: Annotated[bool, "whether a law is learned at all"] = True
 
 
 COMPARE = Verb(CompareQuestion, "logger.api.lab:compared", (Out(

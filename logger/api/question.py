@@ -4,6 +4,7 @@ Problem: an option of a verb was declared four times, for the terminal, for Pyth
 the four came apart. Solution: a frozen dataclass for each verb, whose annotations carry range, unit and help::
 
     tries: Annotated[int, Option("further starts, spread around", Range(0, 1000))] = 0
+    progress: Annotated[Notify, "called with what is under way: in Python alone"] = silent
 
 The arguments of the command line (``logger.commands.options``), the function in Python (``function``), the checks
 (``Question``) and the reference are read from it. Modules with questions load nothing heavy.
@@ -11,6 +12,7 @@ The arguments of the command line (``logger.commands.options``), the function in
 
 import inspect
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from numbers import Real
@@ -29,6 +31,7 @@ Notify = Callable[[str], None]
 _UNIT = re.compile(r"_(hz|s|m|kg|cm3|mps2?|m_per_km)$")
 """Ends of fields' names that are units: an option is called without."""
 
+_WIDTH = 120
 _IN_PYTHON = "\nIn Python: "
 """Where the part of a question's docstring begins that is of no use at the terminal."""
 
@@ -160,14 +163,10 @@ class Question:
 
 @dataclass(frozen=True, kw_only=True)
 class LongQuestion(Question):
-    """One whose answer takes a while.
+    """One whose answer takes a while."""
 
-    progress    called with what is under way, such as ``print``
-    warn        called with what should be known before it takes long
-    """
-
-    progress: Notify = silent
-    warn: Notify = silent
+    progress: Annotated[Notify, "called with what is under way, such as print"] = silent
+    warn: Annotated[Notify, "called with what should be known before it takes long"] = silent
 
     stays: ClassVar[bool] = False
     """Whether what is under way stays on the screen."""
@@ -203,8 +202,8 @@ def askings(question: type[Any]) -> tuple[Asking, ...]:
         if isinstance(one.type, str):
             raise TypeError(f"{question.__module__}: expected annotations that are no text; questions stand in modules "
                             "without 'from __future__ import annotations'")
-        if get_origin(one.type) is Annotated:
-            kind, option = get_args(one.type)
+        kind, option = get_args(one.type)[:2] if get_origin(one.type) is Annotated else (one.type, None)
+        if isinstance(option, Option):
             default = one.default if one.default_factory is MISSING else one.default_factory()
             found.append(Asking(one.name, kind, option, default))
     return tuple(sorted(found, key=lambda one: (not isinstance(one.option, Argument), one.default is not MISSING)))
@@ -218,23 +217,46 @@ def function(name: str, question: Callable[P, Asked], answer: Callable[[Asked], 
     of = question if isinstance(question, type) else type(question)
     ask.__name__ = ask.__qualname__ = name
     ask.__module__ = of.__module__
-    ask.__doc__ = "\n".join([inspect.getdoc(of) or "", "", *described(of)])
-    plain = [one.replace(annotation=get_args(one.annotation)[0]) if get_origin(one.annotation) is Annotated else one
-             for one in inspect.signature(of).parameters.values()]
-    ask.__dict__["__signature__"] = inspect.Signature(plain)
+    ask.__doc__ = "\n".join([inspect.getdoc(of) or "", "", *_described(of)])
+    ask.__dict__["__signature__"] = inspect.Signature([
+        one.replace(annotation=_Shown(one.annotation), default=_Shown(one.default) if callable(one.default) and
+                    one.default is not one.empty else one.default) for one in _parameters(of)])
     return ask
+
+
+def _parameters(question: type[Any]) -> list[inspect.Parameter]:
+    """Of a function that asks it: what is under way is reported last."""
+    return sorted(inspect.signature(question).parameters.values(),
+                  key=lambda one: (one.kind, one.name in ("progress", "warn")))
+
+
+class _Shown:
+    """What help shows of a type, or of a function that is a default."""
+
+    def __init__(self, one: Any) -> None:
+        plain = get_args(one)[0] if get_origin(one) is Annotated else one
+        is_named = isinstance(plain, type) or inspect.isfunction(plain)
+        words = plain.__name__ if is_named else str(plain)
+        without_homes = re.sub(r"\b(typing|pathlib|collections\.abc)\.", "", words)
+        self._words = re.sub(r"ForwardRef\('(\w+)'\)", r"\1", without_homes)
+
+    def __repr__(self) -> str:
+        return self._words
+
+
+def _described(question: type[Any]) -> Iterator[str]:
+    """The fields of a question in lines: names, and what they are."""
+    asked, kinds = {one.name: one.help for one in askings(question)}, {one.name: one.type for one in fields(question)}
+    known = {one.name: asked.get(one.name) or get_args(kinds[one.name])[1] for one in _parameters(question)
+             if get_origin(kinds[one.name]) is Annotated}
+    width = max(map(len, known), default=0) + 2
+    for name, words in known.items():
+        yield from textwrap.wrap(words, _WIDTH, initial_indent=f"{name:{width}}", subsequent_indent=" " * width)
 
 
 def help_of(question: type[Any]) -> str:
     """What a question is, for the terminal: without the part on Python."""
     return (inspect.getdoc(question) or "").partition(_IN_PYTHON)[0].rstrip()
-
-
-def described(question: type[Any]) -> Iterator[str]:
-    """The fields of a question in lines: names, and what they are."""
-    width = max((len(one.name) for one in askings(question)), default=0)
-    for one in askings(question):
-        yield f"{one.name:{width}}  {one.help.replace('%%', '%')}"
 
 
 # --- a verb of the command line ---

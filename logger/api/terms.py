@@ -1,6 +1,6 @@
 """Fields that the questions of several verbs have in common."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import isfinite
 from os import PathLike
 from pathlib import Path
@@ -30,6 +30,7 @@ Tolerance = Annotated[float | None, Option(
     "how far off the vehicle's masses, springs and dampers may well be, as a share (default: "
     f"{USUAL_TOLERANCE:g}, and 0.1 where a search or the fit of an effect finds that the file is a rough one; what you "
     "say holds)", TOLERANCE, "SHARE")]
+Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 LowPass = Annotated[float | None, Option(
     "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
     "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
