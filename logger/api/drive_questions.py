@@ -131,8 +131,10 @@ class EstimateQuestion(LongQuestion):
 
     def files_read(self) -> Sequence[Path]:
         from logger.api.bench import files_of
+        from logger.store.formats.drive_file import DRIVE, PROFILE
 
-        return [*super().files_read(), *files_of(self.vehicle)]
+        given = super().files_read()
+        return [*given, *(run / name for run in given for name in (DRIVE, PROFILE)), *files_of(self.vehicle)]
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         for profile in files.get("--profile-out", ()):
