@@ -13,6 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -76,6 +77,21 @@ class ReadingQuality:
     oversample: int = 1
 
 
+@dataclass(frozen=True)
+class OtherSettings:
+    """Settings that would suit another road better, as a settings file has them; empty: there is none.
+
+    wider      of a larger range
+    finer      of a smaller one, in which readings from ``finer_end_mps2`` on [m/s2] would stand at the end
+    oftener    of more readings per sample
+    """
+
+    wider: str = ""
+    finer: str = ""
+    finer_end_mps2: float = inf
+    oftener: str = ""
+
+
 class Accelerometer(ABC, Generic[Settings]):
     """One kind of accelerometer.
 
@@ -111,6 +127,10 @@ class Accelerometer(ABC, Generic[Settings]):
     @abstractmethod
     def readings(self, settings: Settings) -> ReadingQuality:
         """What single readings are."""
+
+    def others(self, settings: Settings) -> OtherSettings:
+        """What could be set instead."""
+        return OtherSettings()
 
     @abstractmethod
     def facts(self, settings: Settings) -> dict[str, Any]:

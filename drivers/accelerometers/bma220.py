@@ -17,7 +17,7 @@ from array import array
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import inf, sqrt
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -44,7 +44,7 @@ from drivers.accelerometers._bma220_registers import (
     WATCHDOG,
     WATCHDOG_CODE,
 )
-from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality
+from drivers.accelerometers.accelerometer import Accelerometer, OtherSettings, ReadingQuality
 from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
@@ -60,6 +60,8 @@ NOISE_MPS2 = 0.1  # r.m.s., beside its steps, through the filter that goes with 
 LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some more in the kernel
 USUAL_OVERSAMPLE = 4  # a quarter of the time of such a bus; the estimator stays 100 times as fast as the drive
 
+_FAST_BUS = " (and the bus to 400 kHz)"
+LARGEST_USEFUL_G = 8  # at 16 an IRI is no better than the mean of the road's windows (tests/benchmarks/noise.py)
 RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
 FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
 BANDWIDTHS_HZ = tuple(sorted(hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE))
@@ -333,6 +335,18 @@ class _Bma220(Accelerometer[Bma220Config]):
         another one a recording does not say, and it has to give the same rows."""
         hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.reads, 1))
         return ReadingQuality(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
+
+    def others(self, settings: Bma220Config) -> OtherSettings:
+        """The next ranges up to 8 g, beyond which its steps hide all but the roughest roads, and more reads."""
+        ranges = [range_g for range_g in sorted(RANGE_CODES) if range_g <= LARGEST_USEFUL_G]
+        larger = [range_g for range_g in ranges if range_g > settings.range_g]
+        smaller = [range_g for range_g in ranges if range_g < settings.range_g]
+        reads = USUAL_OVERSAMPLE if settings.reads < USUAL_OVERSAMPLE else LARGEST_OVERSAMPLE
+        return OtherSettings(
+            wider=f"range_g: {larger[0]}" if larger else "",
+            finer=f"range_g: {smaller[-1]}" if smaller else "",
+            finer_end_mps2=31 * mps2_per_count(smaller[-1]) if smaller else inf,
+            oftener=f"oversample: {reads}{_FAST_BUS * (reads > USUAL_OVERSAMPLE)}" if reads > settings.reads else "")
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
         """Range, scale, filter, rate."""

@@ -52,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
 @dataclass(frozen=True)
 class Outcome:
     """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive
-    showed of the receiver's delay, of which the rows took ``known``, and of the sensor's noise."""
+    showed of the receiver's delay, of which the rows took ``known``, of the sensor's noise, and
+    which setting would suit it better."""
 
     directory: Path
     files: list[Path]
@@ -64,6 +65,7 @@ class Outcome:
     receiver: dict[str, Any]
     known: Any
     noise: NoiseLearning
+    better: str
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, SI units in the names."""
@@ -78,6 +80,7 @@ class Outcome:
             "torn_tail": self.torn_tail,
             "receiver": self.receiver,
             "noise": self.noise.fields(),
+            "better_setting": self.better or None,
             "summary": summary_json(self.summary),
         }
 
@@ -90,6 +93,8 @@ class Outcome:
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
         lines += [*drive_words(self.receiver, self.known), f"Sensor's noise: {self.noise.words()}"]
+        if self.better:
+            lines.append(f"Sensor's settings: {self.better}")
         lines.append(f"Logs: {self.directory} ({counted(len(self.files), 'file')}, {counted(self.rows, 'row')})")
         return "\n".join(lines)
 
@@ -134,7 +139,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
     learning = NoiseLearning(out, pipeline, config.accelerometer, noise)
     return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known,
-                   learning)
+                   learning, pipeline.range_use.advice)
 
 
 def _written(out: Path, session: int) -> tuple[list[Path], Any]:

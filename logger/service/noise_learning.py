@@ -24,9 +24,6 @@ FILE_NAME = "sensor-noise"
 _WHAT = "the sensor's noise"
 _KEYS = ("noise_mps2", "noise_std_mps2", "noise_drives")
 _OF = "of"
-# Larger ones leave smooth roads at low speed without any reading (tests/benchmarks/noise.py: at 20 mph R2 0.93 at 2 g,
-# where they are 0.6, and 0.84 at 4 g of those two thirds of windows that have an estimate at all).
-_HIDING_STEP_MPS2 = 1.0
 
 
 @dataclass(frozen=True)
@@ -126,13 +123,7 @@ class NoiseLearning:
         return header_fields(now) if now is not None else dict(zip(_KEYS, (None, None, 0), strict=True))
 
     def words(self) -> str:
-        """One line for ``ridelog status``, with what to do where the steps are too large."""
-        step_mps2 = self._config.kind.readings(self._config.settings).step_mps2
-        if step_mps2 <= _HIDING_STEP_MPS2:
-            return self._noise_words()
-        return f"{self._noise_words()}; steps of {step_mps2:.2g} m/s2 hide smooth roads: set a smaller range"
-
-    def _noise_words(self) -> str:
+        """One line for ``ridelog status``."""
         noise, now = self._config.noise_mps2, self.now
         if isinstance(noise, float):
             return f"{noise:.3g} m/s2 by the settings"

@@ -26,6 +26,7 @@ from logger.service.comfort_columns import ComfortColumns
 from logger.service.frozen_sensor import Stillness
 from logger.service.iri_queue import RoughnessQueue, Waiting
 from logger.service.odometer import Odometer
+from logger.service.range_use import RangeUse
 from logger.service.repetition import Repetition
 from logger.service.signal_chain import GRID_STEP_US, SignalChain
 from logger.service.speed_check import SpeedCheck
@@ -71,11 +72,12 @@ def longest_wait_us(bridge_s: float) -> int:
 
 
 class Pipeline:
-    """The whole way from readings to records of one service run. ``alignment`` learns beside it and changes no row."""
+    """The whole way from readings to records of one service run. ``alignment`` and ``range_use`` learn beside it and
+    change no row."""
 
     def __init__(
         self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
-        alignment: DriveAlignment, comfort: ComfortColumns,
+        alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse,
     ) -> None:
         self._settings = settings
         self._chain = chain
@@ -97,6 +99,7 @@ class Pipeline:
         self.repetition = Repetition()
         self.speed_check = SpeedCheck()
         self.alignment = alignment
+        self.range_use = range_use
 
     @property
     def waiting_samples(self) -> int:
@@ -126,6 +129,7 @@ class Pipeline:
         self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
         self.stillness.take(block, fixes)
         self.repetition.take(block)
+        self.range_use.take(block, fixes)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
         self._release(self._settled_until_us(now_us))
@@ -239,7 +243,9 @@ class Pipeline:
         )
 
     def _records(self) -> list[WindowRecord]:
-        return [self._record(waiting, estimate) for waiting, estimate in self._roughness.ready()]
+        records = [self._record(waiting, estimate) for waiting, estimate in self._roughness.ready()]
+        self.range_use.count(records)
+        return records
 
     def _record(self, waiting: Waiting, estimate: WindowEstimate | None) -> WindowRecord:
         window, place = waiting.window, waiting.place

@@ -33,6 +33,7 @@ from logger.service.comfort_columns import ComfortColumns
 from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
 from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
+from logger.service.range_use import RangeUse
 from logger.service.receiver_learning import at_start, from_fields, header_fields, is_loggers
 from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
 from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
@@ -141,7 +142,8 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
     alignment = DriveAlignment(axis.column, axis.sign)
     columns = ComfortColumns(_noise_floor(sensor, low_pass_hz), sensor.sensor)
     relation = rms_relation(car, recorder_gain(low_pass_hz))
-    return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns)
+    return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns,
+                    RangeUse(config.accelerometer.kind.others(config.accelerometer.settings)))
 
 
 def _driven_share(car: Car) -> float:
