@@ -23,8 +23,9 @@ from logger.service.signal_chain import Axis
 
 FILE_NAME = "receiver-delay"
 _WHAT = "the receiver's delay"
-UNKNOWN = Belief(0.10, 0.10)
-"""Before anything was learnt: receivers are late by 0.05 to 0.3 s."""
+UNKNOWN = Belief(0.14, 0.07)
+"""Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
+value to twice that."""
 MOST_DELAY_S = 2.0
 _KEYS = ("latency_s", "latency_std_s", "latency_drives")
 

@@ -4,8 +4,8 @@
         [--draws 2]
 
 Recorded bytes of a BMA220, read once a sample, and of a receiver of 1 Hz whose places wander by 0.8 m over 40 s and
-which is late, on roads whose roughness changes (``changing_roads.sectioned_road``) and in a town (``--mph 0``). R2, bias and
-the windows within one and two standard errors, of 25 ft windows, at the places that the rows tell:
+which is late, on roads whose roughness changes (``changing_roads.sectioned_road``) and in a town (``--mph 0``). R2,
+bias and the windows within one and two standard errors, of 25 ft windows, at the places that the rows tell:
 
 exact            no receiver: places as they are, the noise given
 right places     replay, a receiver that does not wander, its delay in the settings

@@ -42,7 +42,7 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
 
 
 @pytest.mark.parametrize(("range_g", "reads", "clipped", "hidden", "beyond", "said"), [
-    (2, 4, 0.14, 0.0, 1.0, ""),  # as measured: 2 g was still better
+    (2, 4, 0.08, 0.0, 1.0, ""),  # as measured: 2 g was still better
     (2, 4, 0.30, 0.0, 1.0, "in 30% of this drive's windows it stood at an end of its range: set range_g: 4"),
     (4, 4, 0.30, 0.0, 1.0, "set range_g: 8"),
     (8, 4, 0.9, 0.0, 1.0, ""),  # steps at 16 g say nothing
