@@ -16,6 +16,7 @@ from logger.api.shown import CommandResult
 from logger.api.terms import Runs, each, named_numbers
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
+from logger.lab.selection.add_effect import Number as ShiftedNumber
 from logger.store.formats import drive_file, vehicle_file
 
 if TYPE_CHECKING:
@@ -87,23 +88,6 @@ def comparison_of(found: compare_results.Comparison) -> Comparison:
     summary = as_json(found)
     return Comparison("\n".join(comparison_lines(found)), summary, found, found.plain.error, found.refitted.error,
                       {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
-
-
-@dataclass(frozen=True)
-class ShiftedNumber:
-    """A number of the car, refitted without an effect and with it, each with its standard error.
-
-    nominal    as it was given
-    biased     whether the missing effect had pulled it away
-    """
-
-    name: str
-    nominal: float
-    without: float
-    without_standard_error: float
-    found: float
-    standard_error: float
-    biased: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -182,12 +166,10 @@ def addition_of(found: add_results.AddedEffects, model: Model) -> AddedEffect:
     from logger.report.lab_text import addition_lines
 
     new = found.new[-1]
-    numbers = tuple(ShiftedNumber(one.name, one.nominal, one.without, one.without_standard_error, one.found,
-                                  one.standard_error, one.biased) for one in found.moved)
     return AddedEffect(
         "\n".join(addition_lines(found)), as_json(found), found, new.effect.name, dict(new.values),
         dict(new.standard_errors), found.error_before, found.error_refitted, found.error_after,
-        found.noise_floor_error, found.p_value, found.helps, numbers, model)
+        found.noise_floor_error, found.p_value, found.helps, tuple(found.moved), model)
 
 
 def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = True) -> Bench:

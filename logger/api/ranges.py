@@ -55,11 +55,6 @@ class Limit(Range):
 LIMIT = Limit(0.01, float("inf"), "m/km")
 
 
-def check_limit(name: str, m_per_km: float) -> None:
-    """BadInput for an IRI from which on a road is to be called rough, and that no road has; ``name``: of what it is."""
-    LIMIT.check(name, m_per_km)
-
-
 TOLERANCE = Range(0.001, 0.5)
 USUAL_TOLERANCE = 0.04
 """How far off a car's masses, springs and dampers may well be, as a share."""

@@ -28,16 +28,6 @@ _BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
-def lab_runs(folders: Sequence[Path], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
-    """The runs in some folders, as ``checked_runs``. BadInput for one that cannot be read, or is there twice."""
-    from logger.store.formats.drive_file import read_run
-
-    places = [folder.resolve() for folder in folders]
-    if again := next((one for number, one in enumerate(folders) if places[number] in places[:number]), None):
-        raise BadInput(f"{again}: expected each run once")
-    return checked_runs(list(map(read_run, folders)), thin, vehicle)
-
-
 def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
     """Runs of one sample rate; of about 100 samples a second, or as many as the ``vehicle`` needs, if they have many
     more and may be thinned (``thin``).

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.outputs import check_outs
 from logger.errors import BadInput
 from logger.files import together, write_file
 from logger.report.drawing import ENDINGS
@@ -21,12 +19,6 @@ PICTURES = (PAGE, *ENDINGS)
 HELP = "write a page with pictures; .png, .svg or .pdf: the pictures alone"
 
 
-def add_out(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--out`` of a command that writes nothing else with it."""
-    parser.add_argument("--out", type=Path, action="append", default=[], metavar="FILE.html",
-                        help=f"{HELP}; may repeat")
-
-
 def is_picture(path: Path) -> bool:
     """Whether a file that was asked for is one."""
     return path.suffix.lower() in PICTURES
@@ -35,13 +27,6 @@ def is_picture(path: Path) -> bool:
 def parted(asked: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     """Of files that ``--out`` was given: the pictures, and the others."""
     return [path for path in asked if is_picture(path)], [path for path in asked if not is_picture(path)]
-
-
-def check_pictures(asked: Sequence[Path], read: Iterable[Path], beside: Sequence[tuple[str, Path | None]] = ()) -> None:
-    """Raise BadInput where a file of ``--out`` is none of a picture, or cannot be written, nor those ``beside`` it."""
-    if other := next((path for path in asked if not is_picture(path)), None):
-        raise BadInput(f"--out {other}: expected a file that ends in one of {', '.join(PICTURES)}")
-    check_outs([*beside, *(("--out", path) for path in asked)], read=read)
 
 
 def write_pictures(paths: Sequence[Path], title: str, of: str, text: str, charts_of: Callable[[], Sequence[Chart]]

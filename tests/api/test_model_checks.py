@@ -11,12 +11,13 @@ import pytest
 
 from logger.api.bench import known_effects, silent
 from logger.api.model_checks import check_model, predicted
-from logger.api.run_checks import lab_runs
+from logger.api.run_checks import checked_runs
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.lab.road_match import match_below_bounce
 from logger.shipped import vehicle_file
 from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import read_model
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
@@ -37,7 +38,7 @@ def driven(tmp_path: Path, road: str, speed_mps: float, effect: str) -> Simulate
     main(["road", "generate", "--class", road, "--length", "250", "--seed", "5", "--out", str(folder / "profile.csv")])
     main(["simulate", "--vehicle", "rav4-2009", "--profile", str(folder / "profile.csv"), "--speed", f"{speed_mps:g}",
           "--effect", effect, "--out", str(folder / "drive.csv")])
-    return lab_runs([folder])
+    return checked_runs([read_run(folder)])
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import pytest
 
 from logger.api.bench import sought_effects
 from logger.api.outputs import check_out
-from logger.api.run_checks import lab_runs
+from logger.api.run_checks import checked_runs
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
@@ -374,14 +374,15 @@ def test_times_that_are_rounded_differently_are_of_one_rate(fits: None, runs: li
 
 def test_fast_records_are_thinned_where_an_effect_is_sought(runs: list[str], tmp_path: Path) -> None:
     folders = [Path(rated(runs[0], tmp_path / f"{rate_hz:g}", rate_hz, 6)) for rate_hz in (100.0, 200.0, 400.0, 1000.0)]
-    (usual,) = lab_runs(folders[:1]).runs
+    (usual,) = checked_runs([read_run(folders[0])]).runs
     for folder in folders:
-        (thinned,) = lab_runs([folder]).runs
+        (thinned,) = checked_runs([read_run(folder)]).runs
         assert thinned.rate_hz == pytest.approx(100.0)
         count = min(len(thinned.measured_mps2), len(usual.measured_mps2)) - 50
         assert thinned.distance_m[:count] == pytest.approx(usual.distance_m[:count])
         off = (thinned.measured_mps2 - usual.measured_mps2[: len(thinned.measured_mps2)])[50:count]
         assert off.std() < 0.05 * usual.measured_mps2.std()
     with pytest.raises(BadInput, match=r"200/drive.csv: expected 100 samples a second, as in .*100, found 200"):
-        lab_runs(folders)
-    assert [one.count for one in lab_runs(folders[2:3], thin=False).runs] == [len(read_run(folders[2]).time_s)]
+        checked_runs(list(map(read_run, folders)))
+    (whole,) = checked_runs([read_run(folders[2])], thin=False).runs
+    assert whole.count == len(read_run(folders[2]).time_s)

@@ -21,12 +21,13 @@ from pathlib import Path
 
 from logger.api.bench import known_effects, silent
 from logger.api.model_checks import check_model
-from logger.api.run_checks import lab_runs
+from logger.api.run_checks import checked_runs
 from logger.errors import BadInput
 from logger.lab.another_car import POOR_ERROR
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import Model, read_model
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.compose import compose
@@ -101,7 +102,7 @@ def made(kind: str, seed: int) -> tuple[list[Run], Model]:
     with tempfile.TemporaryDirectory() as name:
         write_case(case(kind, seed), Path(name))
         folders = sorted(path.parent for path in Path(name).glob("*/drive.csv"))
-        return list(lab_runs(folders).runs), read_model(Path(name) / "vehicle.yaml")
+        return list(checked_runs(list(map(read_run, folders))).runs), read_model(Path(name) / "vehicle.yaml")
 
 
 def refusal(runs: list[Run], model: Model) -> str | None:
