@@ -13,16 +13,17 @@ import numpy.typing as npt
 from logger import bounds
 from logger.api.drive_questions import EstimateQuestion
 from logger.api.question import Notify, function, silent
-from logger.api.ranges import ADDED, RATE, SPEED
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
-from logger.api.vehicles import Model, car_on, model_of
+from logger.api.simulate_question import SimulateQuestion
+from logger.api.terms import named_numbers
+from logger.api.vehicles import car_on, model_of
 from logger.chart_data import line
 from logger.errors import BadInput
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
-from logger.store.formats import drive_file, vehicle_file
+from logger.store.formats import drive_file, profile_file, vehicle_file
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
 from logger.store.formats.run_file import facts_beside, write_run_facts
 
@@ -197,34 +198,8 @@ def make_run(
     return Run(Path(name), rate_hz, np.arange(len(accel)) / rate_hz, accel, speed, distance, None, None, profile)
 
 
-def simulate(
-    vehicle: Model | Path | str, profile: Profile | Path | str,
-    speed_mps: float | tuple[npt.ArrayLike, npt.ArrayLike], *,
-    obstacles: Mapping[str, Mapping[str, float]] | None = None, rate_hz: float = 100.0, noise_mps2: float = 0.0,
-    step_mps2: float = 0.0, seed: int = 1, name: str = "simulated",
-) -> Run:
-    """What a vehicle's accelerometer would record on a road: a run from the front tires' start on the profile on.
-
-    vehicle       a model, or a name or file as in ``read_vehicle``; its effects are simulated with it
-    profile       the road [m]; of two tracks a full car uses both, other cars the left one
-    speed_mps     the same all the way, 0.1 to 100 [m/s], until a second after the last wheel has left the profile; or
-                  times (k,) [s], growing, and speeds (k,) [m/s] with straight lines between them
-    obstacles     on the road: ``{"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}`` (Eq 4.41 of Blum 2015),
-                  or a step, ramp, plate, pothole
-    rate_hz       samples a second, 10 to 10 000, band-limited as a recorder does it (flat to 0.38 of the rate)
-    noise_mps2    r.m.s. of the sensor's noise [m/s2], made of ``seed``; ``step_mps2`` what it rounds to [m/s2]
-    name          of the run; each of several needs its own
-
-    Raises BadInput for what no car can do, obstacles that do not lie on the road, and as ``read_vehicle`` and
-    ``read_profile``.
-
-    >>> run = simulate("rav4-2009", random_road(iso_class="B", length_m=100.0), speed_mps=10.0)
-    >>> run.accel_z_mps2.shape, round(float(run.accel_z_mps2.std()), 2)
-    ((1130,), 0.27)
-    >>> braking = simulate("rav4-2009", run.profile, ([0.0, 5.0, 10.0], [12.0, 12.0, 0.0]))
-    >>> round(float(braking.distance_m[-1]), 2)
-    90.0
-    """
+def simulated(question: SimulateQuestion) -> Run:
+    """The answer to ``SimulateQuestion``, which says what is raised."""
     from logger.simulation.virtual_drive import (
         SENSOR,
         Obstacle,
@@ -236,27 +211,28 @@ def simulate(
     )
     from logger.vehicle.structure import body_point
 
-    RATE.check("rate_hz", rate_hz)
-    ADDED.check("noise_mps2", noise_mps2)
-    ADDED.check("step_mps2", step_mps2)
-    if not isinstance(speed_mps, tuple):
-        SPEED.check("speed_mps", speed_mps)
-    model = model_of(vehicle)
-    road = profile if isinstance(profile, Profile) else read_profile(profile)
+    model, name, speed = model_of(question.vehicle), question.name, question.speed_mps
+    given, rate_hz = question.obstacles or {}, question.rate_hz
+    obstacles = ([Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
+                 if isinstance(given, Mapping) else
+                 [Obstacle(*named_numbers(text, "obstacle"), f"obstacle {text}") for text in given])
+    road = question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile)
     try:
-        track = with_obstacles(drive_file.track_of(road), [
-            Obstacle(kind, values, f"obstacle {kind}") for kind, values in (obstacles or {}).items()])
+        track = with_obstacles(drive_file.track_of(road), obstacles)
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
         place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
-        knots = (_knots(*speed_mps, name) if isinstance(speed_mps, tuple) else
-                 at_one_speed(track, float(car.structure.behind_m.max()), speed_mps))
+        knots = (_knots(*speed, name) if isinstance(speed, tuple) else
+                 at_one_speed(track, float(car.structure.behind_m.max()), speed))
         motion = motion_along(*knots, track.start_m, rate_hz)
         columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,
-                                 SensorErrors(noise_mps2, step_mps2, seed))
+                                 SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
     time_s, accel_z_mps2, recorded_mps, distance_m = columns.values()
     return Run(Path(name), rate_hz, time_s, accel_z_mps2, recorded_mps, distance_m, None, None, _profile_of(track))
+
+
+simulate = function("simulate", SimulateQuestion, simulated)
 
 
 def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:

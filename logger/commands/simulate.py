@@ -1,35 +1,19 @@
-"""What a vehicle's accelerometer would record on a road: a drive, simulated.
-
-  ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
-  ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --effect tire_damping:tire_damping_n_s_per_m=200 \\
-      --effect wheel_lift --out drive.csv
-  ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
-      --out run/drive.csv --profile-out run/profile.csv
-  ridelog simulate --vehicle ./rig.yaml --excitation run/excitation.csv --rate 500 --out run/drive.csv
-
-The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires at
-the start of the profile, after a flat road, and is sampled as a recorder does it, behind a filter that is flat up to
-0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run. A rig that is
-driven by time (--excitation) has no speed and no distance; its drive.csv lasts as long as the excitation.csv beside it.
-
-Physical effects are those of the vehicle's file, then those of --effect; --list-effects lists them. The speed
-asked for is the true one: with speed_scale the drive's own columns say something else.
-"""
+"""``ridelog simulate`` at a terminal: files are read and written, and what was made is said."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
-from math import inf
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.api.outputs import check_outs
-from logger.api.ranges import ADDED, RATE, SPEED
+from logger.api.simulate_question import SIMULATE, SimulateCommand, SimulateQuestion
 from logger.api.terms import named_numbers
-from logger.commands.numbers import add_number
-from logger.commands.pictures import HELP, parted, write_pictures
+from logger.commands import options
+from logger.commands.pictures import parted, write_pictures
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import together
 from logger.printable import printable
@@ -42,7 +26,7 @@ if TYPE_CHECKING:
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
 
-_FLAT_M = (1.0, 10_000.0)
+__doc__ = options.help_of(SimulateQuestion)
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
 OUTPUTS = ("wheels", "travel", "tires", "body")
 
@@ -53,61 +37,23 @@ USAGE = """ridelog simulate --vehicle NAME|FILE (--profile FILE | --flat M | --e
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog simulate``."""
     parser.usage = USAGE
-    parser.add_argument("--vehicle", metavar="NAME|FILE",
-                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
-    road = parser.add_mutually_exclusive_group()
-    road.add_argument("--profile", type=Path, metavar="FILE",
-                      help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
-                           "both, other cars the left one")
-    road.add_argument("--excitation", type=Path, metavar="FILE",
-                      help="what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m"
-                           "[,elevation_rear_m]); without --speed")
-    add_number(road, "--flat", *_FLAT_M, "m", metavar="M", help="a flat road of this length instead [m]")
-    parser.add_argument("--obstacle", action="append", default=[], metavar="NAME:PARAM=VALUE,...",
-                        help="add one to the road; may repeat. bump (Eq 4.41): start_m, height_m, width_m; step: "
-                             "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; "
-                             "pothole: start_m, depth_m, length_m[, edge_m]")
-    speed = parser.add_mutually_exclusive_group()
-    add_number(speed, "--speed", *SPEED, metavar="MPS", help="the same all the way [m/s]")
-    speed.add_argument("--speed-file", type=Path, metavar="FILE",
-                       help="CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME[:PARAM=VALUE,...]",
-                        help="a physical effect, or the path of a Python file with one of your own; may repeat. What "
-                             "is not said is at its usual value; takes the place of the vehicle's own effect of that "
-                             "name")
-    parser.add_argument("--list-effects", action="store_true",
-                        help="print the effects there are, with their parameters, and do nothing else")
-    parser.add_argument("--out", type=Path, action="append", default=[], metavar="FILE",
-                        help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run. FILE.html: "
-                             f"{HELP}; may repeat")
-    parser.add_argument("--profile-out", type=Path, metavar="FILE",
-                        help="write the road that was driven as well, with its obstacles")
-    add_number(parser, "--rate", *RATE, default=100.0, metavar="HZ",
-               help="samples a second (default: 100)")
-    add_number(parser, "--noise", *ADDED, default=0.0, metavar="MPS2",
-               help="r.m.s. of the sensor's noise [m/s2]")
-    add_number(parser, "--step", *ADDED, default=0.0, metavar="MPS2",
-               help="the sensor gives whole multiples of this only [m/s2]")
-    add_number(parser, "--seed", 0, inf, kind=int, default=1, metavar="N",
-               help="another number, another noise (default: 1)")
-    parser.add_argument("--output", action="append", default=[], metavar="WHAT",
-                        help="further columns; may repeat. wheels: their acceleration; travel: extension of the "
-                             "suspensions; tires: height of the wheels over the road; body:ahead_m=X,left_m=Y: "
-                             "acceleration of another point of the body, from the centre of gravity")
-    parser.add_argument("--json", action="store_true", help="print what was made as one JSON object")
+    options.declare(parser, SIMULATE)
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog simulate``."""
-    if args.list_effects:
+    with options.respelled(SimulateCommand):
+        question: SimulateCommand = options.asked(SIMULATE, args)
+    if question.list_effects:
         _list_effects(args.json)
     else:
-        _simulate(args)
+        _simulate(question, args)
     return EXIT_DONE
 
 
-def _simulate(args: argparse.Namespace) -> None:
+def _simulate(question: SimulateCommand, args: argparse.Namespace) -> None:
     import numpy as np
 
     from logger.api.drives import Run
@@ -116,18 +62,19 @@ def _simulate(args: argparse.Namespace) -> None:
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
     from logger.store.formats.drive_file import COLUMNS, TIME, write_drive, write_profile
 
-    pictures, drives = parted(args.out)
-    _check_given(args, drives)
-    _check_files(args)
-    vehicle, effects, said = _model(args.vehicle, args.effect)
-    track = _rig(args) if args.excitation is not None else _road(args)
+    pictures, drives = parted(args.out or [])
+    _check_given(question, drives)
+    _check_files(question, args)
+    vehicle, effects, said = _model(str(question.vehicle), question.effects)
+    track = _road(question) if question.excitation is None else _rig(question.excitation)
     car = car_on(vehicle, effects, said, track)
-    outputs = _outputs(args.output, car.vehicle, car.structure)
-    motion = _motion(args, track, float(car.structure.behind_m.max()))
+    outputs = _outputs(question.outputs, car.vehicle, car.structure)
+    motion = _motion(question, track, float(car.structure.behind_m.max()))
     away = COLUMNS[2:] if track.timed else ()
     try:
-        columns = recorded_drive(car, bool(effects), outputs, track.begun(float(motion.time_s[0])), motion, args.rate,
-                                 SensorErrors(args.noise, args.step, args.seed))
+        columns = recorded_drive(car, bool(effects), outputs, track.begun(float(motion.time_s[0])), motion,
+                                 question.rate_hz,
+                                 SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
     except ValueError as error:
         raise BadInput(f"{car.vehicle.name}: {error}") from None
     accel, speed_mps, distance_m = (columns[name] for name in COLUMNS[1:])
@@ -136,15 +83,15 @@ def _simulate(args: argparse.Namespace) -> None:
         "speed_mean_mps": float(speed_mps.mean())}
     made: dict[str, Any] = {
         "vehicle": vehicle.name, "model": vehicle.model, "file": str(drives[0]), "samples": len(accel),
-        "rate_hz": args.rate, "duration_s": len(accel) / args.rate, **way,
+        "rate_hz": question.rate_hz, "duration_s": len(accel) / question.rate_hz, **way,
         "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
-        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed,
+        "noise_mps2": question.noise_mps2, "step_mps2": question.step_mps2, "seed": question.seed,
         "more_columns": list(columns)[len(COLUMNS):],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
     words = _in_words(made)
-    drive = Run(drives[0], args.rate, columns[TIME], accel, speed_mps, distance_m, None, None)
+    drive = Run(drives[0], question.rate_hz, columns[TIME], accel, speed_mps, distance_m, None, None)
     with together():
         for path in drives:
             write_drive(path, {name: one for name, one in columns.items() if name not in away})
@@ -170,31 +117,25 @@ def _in_words(made: dict[str, Any]) -> str:
 # --- what was asked for ---
 
 
-def _check_given(args: argparse.Namespace, drives: list[Path]) -> None:
+def _check_given(question: SimulateCommand, drives: list[Path]) -> None:
     """What is needed for a drive, though not for a list of effects."""
-    if args.excitation is not None:
-        others = {"--speed": args.speed is not None, "--speed-file": args.speed_file, "--obstacle": args.obstacle,
-                  "--profile-out": args.profile_out}
-        if beside := [name for name, given in others.items() if given]:
-            raise BadInput(f"{beside[0]}: expected none of it with --excitation: a rig stands, and has no road")
-    needed = {"--vehicle": args.vehicle,
-              "--profile or --flat": args.profile or args.excitation or args.flat is not None,
-              "--speed or --speed-file": args.speed is not None or args.speed_file or args.excitation,
+    stands = question.excitation is not None
+    needed = {"--vehicle": question.vehicle,
+              "--profile or --flat": stands or question.profile or question.flat_m is not None,
+              "--speed or --speed-file": stands or question.speed_mps is not None or question.speed_file,
               "--out": drives}
-    missing = [name for name, given in needed.items() if not given]
-    if missing:
+    if missing := [name for name, given in needed.items() if not given]:
         raise BadInput(f"simulate: expected {', '.join(missing)} (try 'ridelog simulate --help')")
 
 
-def _check_files(args: argparse.Namespace) -> None:
+def _check_files(question: SimulateCommand, args: argparse.Namespace) -> None:
     from logger.shipped import vehicle_path
 
-    read = (vehicle_path(args.vehicle), args.profile, args.excitation, args.speed_file)
     check_outs([*(("--out", path) for path in args.out), ("--profile-out", args.profile_out)],
-               read=[path for path in read if path is not None])
+               read=[vehicle_path(str(question.vehicle)), *question.files_read()])
 
 
-def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
+def _model(name: str, wanted: Sequence[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
     """The vehicle and its effects, those of its file and those asked for, and where each was said, by name."""
     from logger.shipped import vehicle_path
     from logger.store.formats.effect_file import effect_named
@@ -219,7 +160,7 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
     return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked
 
 
-def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
+def _outputs(wanted: Sequence[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
     """Outputs by the names of their columns, the sensor's first."""
     from logger.simulation.virtual_drive import SENSOR
     from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
@@ -247,7 +188,7 @@ def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[
 # --- the road and the way ---
 
 
-def _road(args: argparse.Namespace) -> Track:
+def _road(question: SimulateCommand) -> Track:
     """The road with the obstacles on it. BadInput for files and obstacles that are not what they should be."""
     import numpy as np
 
@@ -257,36 +198,41 @@ def _road(args: argparse.Namespace) -> Track:
     from logger.store.formats.drive_file import track_of
     from logger.store.formats.profile_file import read_profile
 
-    if args.flat is not None:
-        track = Track(args.flat, np.zeros(2))
+    if question.flat_m is not None:
+        track = Track(question.flat_m, np.zeros(2))
     else:
-        profile = read_profile(args.profile, judged=True)
+        assert question.profile is not None  # as was checked
+        profile = read_profile(question.profile, judged=True)
         track = track_of(profile)
         if words := doubt_of(profile.elevation_m, profile.spacing_m):
-            print(printable(f"ridelog: {args.profile}: {words}"), file=sys.stderr)
-    wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
+            print(printable(f"ridelog: {question.profile}: {words}"), file=sys.stderr)
+    wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in question.obstacles or ()]
     try:
         return with_obstacles(track, wanted)
     except ValueError as error:
         raise BadInput(str(error)) from None
 
 
-def _rig(args: argparse.Namespace) -> Excitation:
+def _rig(path: Path) -> Excitation:
     from logger.store.formats.excitation_file import read_excitation
 
-    return read_excitation(args.excitation)
+    return read_excitation(path)
 
 
-def _motion(args: argparse.Namespace, track: Track | Excitation, wheelbase_m: float) -> FrontAxleMotion:
+def _motion(question: SimulateCommand, track: Track | Excitation, wheelbase_m: float) -> FrontAxleMotion:
     from logger.profiles.excitation import Excitation
     from logger.simulation.virtual_drive import at_one_speed, motion_along, standing
     from logger.store.formats.drive_file import read_speeds
 
     if isinstance(track, Excitation):
-        return standing(track, args.rate)
-    knots = (at_one_speed(track, wheelbase_m, args.speed) if args.speed is not None else read_speeds(args.speed_file))
+        return standing(track, question.rate_hz)
+    if question.speed_file is not None:
+        knots = read_speeds(question.speed_file)
+    else:
+        assert question.speed_mps is not None  # as was checked
+        knots = at_one_speed(track, wheelbase_m, question.speed_mps)
     try:
-        return motion_along(*knots, track.start_m, args.rate)
+        return motion_along(*knots, track.start_m, question.rate_hz)
     except ValueError as error:
         raise BadInput(str(error)) from None
 

@@ -201,7 +201,8 @@ def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [["diagnose", "--same-road", "--all"], ["lab"]], ids=["same road", "lab"])
+@pytest.mark.parametrize("more", [["diagnose", "--same-road", "--all"], ["diagnose", "--all"], ["lab"]],
+                         ids=["same road", "diagnose", "lab"])
 def test_a_search_is_the_commands(
     more: list[str], names: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -212,19 +213,22 @@ def test_a_search_is_the_commands(
     few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset")}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     folders = [tmp_path / "slow", tmp_path / "fast"]
-    out = [] if "--same-road" in more else ["--out", str(tmp_path / "lab")]
+    out = ["--out", str(tmp_path / "lab")] if "lab" in more else []
+    is_one_road = "--same-road" in more
     short = ridelog.random_road(iso_class="C", length_m=90.0, seed=2)  # a road that is estimated takes its square
-    runs = names["runs"] if out else [ridelog.simulate(names["car"], short, speed_mps, noise_mps2=0.03)
+    runs = names["runs"] if not is_one_road else [ridelog.simulate(names["car"], short, speed_mps, noise_mps2=0.03)
                                       for speed_mps in (9.0, 15.0)]
     for folder, run in zip(folders, runs, strict=True):
         ridelog.write_run(folder, run)
     assert main([*more, "--vehicle", "rav4-2009", *map(str, folders), *out, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose_same_road(
-        "rav4-2009", folders)
+    found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose(
+        "rav4-2009", folders, same_road=is_one_road, list_all=True)
     assert json.loads(json.dumps(found.as_json())) == printed
     assert found.figures() and found._repr_html_().count("<svg") == 1
-    if not out:
+    if is_one_road:
         assert list(found.run_errors) == list(map(str, folders)) and found.cannot_tell
+    if not out:
         assert main([*more, "--vehicle", "rav4-2009", *map(str, folders)]) == 0
-        assert capsys.readouterr().out.rstrip() == repr(found)
+        said, _, todo = capsys.readouterr().out.rstrip().partition("\n\nNext: ")
+        assert said == repr(found) and (todo == "") == is_one_road
