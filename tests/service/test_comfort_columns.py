@@ -106,6 +106,22 @@ def test_rows_hold_the_ride_its_error_and_the_raw_value(records: list[WindowReco
     assert np.mean([row.a_w_mps2 for row in whole]) < np.mean([row.a_w_raw_mps2 for row in whole])
 
 
+def test_rows_tell_what_errors_of_the_iri_share(records: list[WindowRecord]) -> None:
+    """The receiver's delay and a place of some metre cost something everywhere; a noise that is given costs nothing."""
+    seen = 0
+    for row in records:
+        parts = (row.iri_level_std_m_per_km, row.iri_common_std_m_per_km, row.iri_place_std_m_per_km)
+        if row.iri_m_per_km is None:
+            assert (row.iri_std_m_per_km, *parts) == (None,) * 4
+            continue
+        assert row.iri_std_m_per_km is not None
+        level, common, place = (part for part in parts if part is not None)
+        assert np.hypot(np.hypot(level, common), place) < row.iri_std_m_per_km
+        assert level > 0 and place > 0
+        seen += "gps_lost" not in row.flags
+    assert seen > 30
+
+
 def test_rows_without_readings_hold_no_ride(records: list[WindowRecord]) -> None:
     for row in records:
         if row.a_w_raw_mps2 is None:
