@@ -44,6 +44,9 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
     if isfinite(found.scatter.drive):
         yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
                f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
+        if found.scatter.alike > 0:
+            yield (f"Of the variance of their own errors {found.scatter.alike:.0%} is alike in all drives over a "
+                   "place: more drives do not make that part smaller")
     else:
         yield ("No cell was passed by two drives: what all windows of one drive share (the car, its tires, its load) "
                "is not known, and not in the standard errors")
@@ -122,6 +125,7 @@ def as_json(found: CombinedDrives) -> dict[str, Any]:
     """The figures; null where nothing is known."""
     return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
             "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
+            "errors_alike": found.scatter.alike,
             "cells": [cell_values(found, index) for index in range(len(found.iri.key))],
             "visits": [visit_values(found, one) for one in found.visits]}
 

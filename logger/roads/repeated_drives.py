@@ -7,7 +7,8 @@ are not known beforehand; their variances are estimated from all cells that were
 random-effects model; DerSimonian & Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and
 stand in each standard error. The variance of d does not fall with the passes of one drive over a place, nor with the
 length of a stretch: it falls with the number of drives. Of s, what is common to all windows of a car and its sensor
-does not fall with anything; the difference of two periods does not have it.
+does not fall with anything; the difference of two periods does not have it. So it is with the part of s that drives
+over one place have alike.
 """
 
 from __future__ import annotations
@@ -105,14 +106,17 @@ class Scatter:
 
     drive    standard deviation of what is common to a drive
     passes   of what is of each pass alone
+    alike    share of the variance of their own errors that drives over one place have alike
     """
 
     drive: float
     passes: float
+    alike: float = 0.0
 
 
 def scatter_of(passes: Passes) -> Scatter:
-    """Both variances out of all cells that several drives passed, by their moments; never negative."""
+    """Both variances out of all cells that several drives passed, by their moments; never negative. Passes that differ
+    less than their own errors have a part of these alike: what no drive resolves is the same road each time."""
     key, cell = np.unique(passes.key, return_inverse=True)
     count = np.bincount(cell, minlength=len(key))
     several = count[cell] > 1
@@ -124,6 +128,8 @@ def scatter_of(passes: Passes) -> Scatter:
     own = passes.own_variance[several] / mean[cell][several]**2
     # Residuals against a mean of c passes have (c - 1) / c of the variance.
     share = 1.0 - 1.0 / count[cell][several]
+    expected = float(np.sum(share * own))
+    alike = max(1.0 - float(np.sum(ratio**2)) / expected, 0.0) if expected > 0 else 0.0
     all_of_it = max(float(np.sum(ratio**2 - share * own) / np.sum(share)), 0.0)
     drive = passes.drive[several]
     number = np.bincount(drive)
@@ -135,7 +141,7 @@ def scatter_of(passes: Passes) -> Scatter:
     weight = np.bincount(drive, share)[use]**2 - np.bincount(drive, share)[use]
     common = max(float(level.sum() / weight.sum()), 0.0) if len(weight) and weight.sum() > 0 else 0.0
     common = min(common, all_of_it)
-    return Scatter(float(np.sqrt(common)), float(np.sqrt(all_of_it - common)))
+    return Scatter(float(np.sqrt(common)), float(np.sqrt(all_of_it - common)), alike)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +150,7 @@ class Means:
 
     drives              how many passed each
     iri_m_per_km        mean, weighted by the variances of the passes, with its standard error
-    common_std_m_per_km    what of that is common to all cells, and to all drives
+    common_std_m_per_km    what of that its drives have alike
     first_s, last_s     of the passes [s since 1970]; NaN: not known
     """
 
@@ -174,7 +180,10 @@ def means(passes: Passes, scatter: Scatter) -> Means:
     first, last = np.full(len(key), np.inf), np.full(len(key), -np.inf)
     np.fmin.at(first, cell, passes.time_s)
     np.fmax.at(last, cell, passes.time_s)
-    common = np.bincount(cell, weight * passes.iri_errors.parts()[1], len(key)) / total
+    own = np.sqrt(np.maximum(passes.own_variance, 0.0))
+    common, mean_own, square = (np.bincount(cell, one, len(key)) / total for one in (
+        weight * passes.iri_errors.parts()[1], weight * own, (weight * own) ** 2 / total[cell]))
+    common = np.sqrt(common**2 + scatter.alike * np.maximum(mean_own**2 - square, 0.0))
     return Means(key, np.bincount(cell, minlength=len(key)).astype(np.intp),
                  np.bincount(cell, weight * passes.iri_m_per_km, len(key)) / total, np.sqrt(1.0 / total + common**2),
                  common,

@@ -74,7 +74,8 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     at_m = np.asarray(cell_m * number, dtype=np.float64)
     of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order],
                                 which.ravel()[order], len(by_drive))
-    own = np.bincount(pair[0], (of_drives.std**2 - of_drives.common_std**2) * by_drive**2)
+    of_drive = np.sqrt(of_drives.std**2 - of_drives.common_std**2) * by_drive
+    own = (1 - scatter.alike) * np.bincount(pair[0], of_drive**2) + scatter.alike * np.bincount(pair[0], of_drive) ** 2
     own += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))
     own += np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
     common = np.bincount(pair[0], of_drives.common_std * by_drive)

@@ -106,6 +106,23 @@ def test_what_all_drives_of_a_car_share_stays_in_a_mean_and_is_in_no_change() ->
     assert changes(passes, Scatter(0.0, 0.0), 3.5e7).change_std_m_per_km == pytest.approx((2 * 0.3**2 / 4) ** 0.5)
 
 
+def test_errors_that_all_drives_over_a_place_have_alike_stay_in_its_mean() -> None:
+    """Three drives over 900 cells: half of the variance of each error is that of the place."""
+    rng = np.random.default_rng(9)
+    of_place, of_pass = rng.standard_normal((1, 900)), rng.standard_normal((3, 900))
+    value = (3.0 + 0.3 * (of_place + of_pass) / np.sqrt(2)).T.ravel()
+    passes = Passes(np.repeat(np.arange(900), 3), np.tile(np.arange(3), 900), 1e7 * np.tile(np.arange(3.0), 900), value,
+                    alone(np.full(2700, 0.3)), np.full(2700, 25.0))
+    scatter = scatter_of(passes)
+    assert scatter.alike == pytest.approx(0.5, abs=0.06)
+    assert scatter.drive == scatter.passes == 0.0
+    found = means(passes, scatter)
+    off = (found.iri_m_per_km - 3.0) / found.iri_std_m_per_km
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(1.0, abs=0.08)
+    # What is alike is in no difference; that the rest is smaller than told is not used against a road.
+    assert changes(passes, scatter, 1.5e7).change_std_m_per_km == pytest.approx(0.3 * np.sqrt(1 + 1 / 2))
+
+
 def test_a_mean_is_weighted_by_its_errors() -> None:
     passes = Passes(np.array([1, 1, 9]), np.array([0, 1, 0]), np.array([0.0, 10.0, 5.0]), np.array([2.0, 4.0, 3.0]),
                     alone(np.array([0.1, 0.2, 0.3])), np.full(3, 25.0))
