@@ -105,6 +105,7 @@ def test_how_sure_a_word_is() -> None:
     assert suggestion(4.0, 0.5)[1] == pytest.approx(0.9545, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_gdal_reads_what_is_to_be_reviewed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pyogrio = pytest.importorskip("pyogrio")
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0

@@ -29,6 +29,7 @@ def fixes(rate_hz: float, seed: int) -> tuple[Observations, np.ndarray, np.ndarr
     return Observations(at, speed + NOISE_MPS * rng.standard_normal(len(at)), np.ones(len(at))), distance, speed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [1.0, 5.0, 10.0])
 def test_motion_is_nearer_to_the_truth_than_the_fixes_and_knows_their_noise(rate_hz: float) -> None:
     speeds, _, speed = fixes(rate_hz, 1)
@@ -49,6 +50,7 @@ def test_errors_of_the_distance_are_as_large_as_they_are_said_to_be() -> None:
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
 
 
+@pytest.mark.slow
 def test_a_wild_fix_hardly_counts() -> None:
     speeds, _, _ = fixes(1.0, 3)
     wild = speeds.value.copy()

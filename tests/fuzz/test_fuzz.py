@@ -26,7 +26,8 @@ HUGE_GB = 0.02
 LONGEST_S = 20.0
 
 
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.slow) if name == "pasco_ps2119" else name for name in TARGETS])
 def test_damaged_input_is_refused_in_one_line_or_read_as_it_stands(name: str) -> None:
     with Workshop() as folder:
         tally = fuzz(TARGETS[name](folder), seed=1, inputs=INPUTS.get(name, 500))

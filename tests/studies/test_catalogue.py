@@ -14,8 +14,10 @@ from logger.studies.study import DISSERTATION, Effort, Item, Result, alike, stud
 
 from ..support.study_results import STUDIES, study_result
 
-SLOW = ("section-7-2-input", "table-6-3")
-"""Studies that take seconds with the least effort."""
+SLOW = ("section-7-2-input", "table-6-3", "iso-8041-bursts", "table-6-1", "fig-4-27", "five-modes", "table-4-4",
+        "section-7-2-speed", "fig-5-22", "fig-6-9", "section-7-2-other-vehicles", "section-7-2-sensor-position",
+        "fig-6-23")
+"""Studies that take more than half a second with the least effort."""
 
 
 def stands_alone(text: str, pictures: int) -> None:

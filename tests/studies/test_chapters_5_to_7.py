@@ -119,6 +119,7 @@ def test_the_trendlines_are_those_of_the_integral() -> None:
     assert numbers(result("fig-6-6").tables[1].rows, 2) == pytest.approx(computed, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_maps_hold_every_segment() -> None:
     roughness, comfort = (one.chart for one in result("fig-6-23", 0.1).pictures[2:])
     assert isinstance(roughness, Field)

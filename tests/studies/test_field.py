@@ -43,6 +43,7 @@ def test_the_check_profile_s_printed_values() -> None:
     assert values[-1].ours == pytest.approx(5.476206e-3, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_bursts_are_those_of_the_benchmark_and_agree() -> None:
     assert iso_8041_bursts.PRINTED_MPS2 == BURSTS
     wave = iso_8041_bursts.saw_teeth(4)

@@ -29,6 +29,7 @@ def test_the_tables_of_25_starts() -> None:
     assert max(one.max() for one in printed) < 3
 
 
+@pytest.mark.slow
 def test_all_starts_end_alike() -> None:
     rows = study_result("table-4-4").tables[0].rows
     ours = np.array([row[2::2] for row in rows], dtype=float)
@@ -73,6 +74,7 @@ def test_a_step_that_is_taken_for_higher_makes_the_car_heavier() -> None:
     assert ours[1] == pytest.approx(875, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_valley_of_wrong_bumps_slants() -> None:
     field = study_result("fig-4-27", 0.4).pictures[0].chart
     assert isinstance(field, Field)
@@ -80,6 +82,7 @@ def test_the_valley_of_wrong_bumps_slants() -> None:
     assert best[0] < best[-1]
 
 
+@pytest.mark.slow
 def test_estimating_the_bump_mends_the_mass() -> None:
     rows = study_result("table-6-1").tables[2].rows
     assert rows[2][1] < 0.5 * rows[1][1] + 1

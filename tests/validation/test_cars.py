@@ -10,6 +10,8 @@ import pytest
 from .simulator.cars import GRAVITY_MPS2, Axle, Car, Physics, assemble, integrate, ride
 from .simulator.corner_laws import INNER, damper_force, damper_rate_of
 
+pytestmark = pytest.mark.slow  # the examination's own car is tried before an examination
+
 CAR = Car("half_car", 650.0, 1000.0, Axle(1.2, 45.0, 24_000.0, 1500.0, 210_000.0),
           Axle(1.5, 40.0, 21_000.0, 1350.0, 190_000.0), 0.2)
 QUARTER = Car("quarter_car", 320.0, np.inf, replace(CAR.front, cg_distance_m=0.0), None, 0.2)

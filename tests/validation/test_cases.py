@@ -21,6 +21,8 @@ from .simulator.outsiders import OUTSIDERS
 from .simulator.roads import random_road
 from .simulator.scene import Drive, Scene, clean_acceleration, measured
 
+pytestmark = pytest.mark.slow  # the examination's own car is tried before an examination
+
 RNG = np.random.default_rng
 ALL = EFFECTS | OUTSIDERS | NEWCOMERS
 
@@ -147,7 +149,6 @@ def test_files_are_the_contract_and_hide_the_answer(kind: str, effect: str | Non
         assert effect != "roll" or header.endswith("elevation_right_m")
 
 
-@pytest.mark.slow
 def test_a_distance_wanders_as_far_as_its_wrong_speed_takes_it() -> None:
     far_m, near_m = [], []
     for seed in range(12):

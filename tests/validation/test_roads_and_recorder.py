@@ -9,6 +9,8 @@ from scipy.signal import butter, csd, freqs, welch
 from .simulator.recorder import HUNDREDTH_G_MPS2, Noise, Sensor, band_limited, record
 from .simulator.roads import CLASS_GD_M3, random_road, wheel_path
 
+pytestmark = pytest.mark.slow  # the examination's own car is tried before an examination
+
 STEP_S = 1 / 4000
 
 
