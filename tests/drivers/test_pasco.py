@@ -357,6 +357,7 @@ def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, cou
     assert clock.lost > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance_ppm", [10, 50, 500])
 @pytest.mark.parametrize("off_ppm", [-50, -400, -5000, 30])
 def test_a_tight_tolerance_makes_no_losses(tolerance_ppm, off_ppm):

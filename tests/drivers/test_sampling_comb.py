@@ -77,12 +77,14 @@ def undated_share(rate_hz: int, kept: np.ndarray) -> float:
     return float(np.mean(times_us[10 * rate_hz:] == NO_TIME))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [110, 125, 150, 200, 250, 400])
 @pytest.mark.parametrize(("every", "count"), [(50, 1), (100, 2), (25, 1)])
 def test_even_losses_of_a_faster_sensor_are_no_slower_clock(rate_hz: int, every: int, count: int) -> None:
     assert undated_share(rate_hz, np.arange(rate_hz * 60) % every >= count) > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate_hz", "lost"), [(110, 0.0), (150, 0.0), (200, 0.0), (400, 0.0), (200, 0.003),
                                                (250, 0.003), (400, 0.003)])
 def test_few_losses_by_chance_leave_a_faster_sensor_dated(rate_hz: int, lost: float) -> None:

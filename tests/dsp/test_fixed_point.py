@@ -117,6 +117,7 @@ def test_scales_are_not_coarser_than_they_must_be() -> None:
             assert max(used) > 0.99
 
 
+@pytest.mark.slow
 @every_cascade
 @given(seed=st.integers(0, 2**32), size=st.sampled_from([1e-3, 1e-6, 0.0]))
 @settings(max_examples=4)

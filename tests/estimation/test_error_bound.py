@@ -68,6 +68,7 @@ def driven_and_filtered(level: float, speed_mps: float, noise_mps2: float, seed:
     return window_iri(exact, SPACING_M, edges_m), window_iri(best, SPACING_M, edges_m)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_mps2", [0.058, 0.2])
 @pytest.mark.parametrize("speed_mps", [4.5, 13.0, 31.0])
 def test_a_filter_that_knows_everything_reaches_the_limit(speed_mps: float, noise_mps2: float) -> None:

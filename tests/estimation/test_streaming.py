@@ -251,6 +251,7 @@ def test_a_stop_of_minutes_costs_its_window_only() -> None:
     assert all(window.flags == {"faint"} for window in found if window.flags)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("garbage", [0.0, np.nan, 1e4])
 @pytest.mark.parametrize("sensor", [FINE, COARSE])
 def test_a_hole_in_the_readings(garbage: float, sensor: Sensor) -> None:

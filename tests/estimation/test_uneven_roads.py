@@ -80,6 +80,7 @@ def bumpy(iri: float, height_m: float, length_m: float, speed_mps: float) -> tup
     return road, *driven(road, speed_mps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "tolerance"), [(FINE, 0.1), (COARSE, 0.15)])
 @pytest.mark.parametrize("speed_mps", [9.0, 15.0, 22.0])
 @pytest.mark.parametrize(("height_m", "length_m"), [(0.08, 2.0), (0.05, 1.0), (-0.04, 0.6)])

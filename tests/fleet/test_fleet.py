@@ -165,6 +165,7 @@ def test_an_ingest_that_is_killed_anywhere_loses_no_row_and_takes_none_twice(eve
             Path(commit.ledger).name for commit in Dataset(again).manifest.commits}
 
 
+@pytest.mark.slow
 def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]
                                                                 ) -> None:
     place = town(6, 300.0, 5, seed=3)

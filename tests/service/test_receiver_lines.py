@@ -52,7 +52,7 @@ def minimum_alone(utc: datetime, t_s: float) -> list[str]:
     *slow(Receiver(rmc_gga_and(8), baud=4800), Receiver(rmc_gga_and(4), every_s=0.1, baud=38400),
           Receiver(minimum_alone, buffer_bytes=1024), Receiver(by_and_by),
           Receiver(rmc_gga_and(14), jumps=((-1, 2), (40, -2)))),
-    Receiver(rmc_gga_and(2), jumps=((-1, 1), (40, -1))),
+    *slow(Receiver(rmc_gga_and(2), jumps=((-1, 1), (40, -1)))),
     Receiver(rmc_gga_and(2), every_s=2),
     *slow(Receiver(rmc_gga_and(2), every_s=5), Receiver(two_rates)),
     Receiver(place_time_speed_apart),

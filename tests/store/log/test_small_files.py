@@ -21,7 +21,7 @@ from ...support.faults.small_files import HAZARDS, NAMES, THINGS, DeadFile, at_m
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=20), ids=label)
 def test_a_session_begins(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
 
