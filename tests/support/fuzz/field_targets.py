@@ -72,7 +72,7 @@ def checked_record(folder: Path) -> Target:
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         path = file.hold(data)
-        asked = record_checks.Asked(rng.choice((None, "g", "mps2")), rng.choice((None, 0.0, 100.0, 1000.0)))
+        asked = record_checks.RecordRules(rng.choice((None, "g", "mps2")), rng.choice((None, 0.0, 100.0, 1000.0)))
         if b"speed_mps" in data[:100] and rng.random() < 0.5:
             name, columns = read_columns(path)
             found = record_checks.even_columns(columns, name, asked)
