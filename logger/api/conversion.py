@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.log_questions import ConvertQuestion
 from logger.api.outputs import check_out
-from logger.api.shown import Shown
+from logger.api.question import function
+from logger.api.shown import CommandResult
 from logger.errors import BadInput
-from logger.left_out import LeftOut, counting, left_out_lines
+from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.left_rows import damaged
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Conversion(Shown):
+class Conversion(CommandResult):
     """What was written.
 
     path             the file
@@ -28,7 +30,6 @@ class Conversion(Shown):
     rows             windows in it, or ways
     placed           those of them with a place on the ground
     damaged_lines    lines of the logs that were left out
-    of               what a row is
     """
 
     path: Path
@@ -36,52 +37,32 @@ class Conversion(Shown):
     rows: int
     placed: int
     damaged_lines: int
-    of: str = "window"
-
-    @property
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """What of the logs is not in it."""
-        return counting([damaged(self.damaged_lines)])
-
-    def __repr__(self) -> str:
-        said = f"{self.path}: {counted(self.rows, self.of)}"
-        if self.placed < self.rows:
-            said += f", {self.rows - self.placed} of them without a position"
-        return "\n".join([said, *left_out_lines(self.left_out)])
 
 
-def convert(logs: Path | str | Sequence[Path | str], to: Path | str, smoothness: Path | str | None = None
-            ) -> Conversion:
-    """Write the intact rows of segment logs for other programs, in the format that the file's ending asks for.
-
-    logs    folders at any depth, or files, of segment logs; open ones too
-    to      file with one of the endings that ``ridelog convert --help`` lists; GeoPackage and Parquet need the ``maps``
-            extra. Written whole, or not at all.
-    smoothness    GeoJSON with ways of OpenStreetMap: instead of the rows, each way that was driven, with the value of
-                  the key ``smoothness`` that its IRI suggests, for a person to review
-
-    Raises BadInput for another ending, a missing extra, no log or none with an intact row, a file without ways, and
-    where none of them was driven.
-
-    >>> convert(folder / "logs", folder / "drive.geojson").rows > 0
-    True
-    """
+def converted(question: ConvertQuestion) -> Conversion:
+    """The answer to ``ConvertQuestion``, which says what is raised."""
     from logger.exchange.format import format_of, write_layer
     from logger.exchange.windows import windows_layer
     from logger.store.log.log_reader import find_logs_in, read_found
 
-    path = Path(to)
-    form = format_of(path)
-    places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    found = find_logs_in(places)
+    path, smoothness = Path(question.to), question.smoothness
+    form, found = format_of(path), find_logs_in(question.places)
     check_out(path, (), [*([] if smoothness is None else [Path(smoothness)]), *(log for log, _ in found)], "--to")
     files = read_found(found)
     if not any(one.records for one in files):
-        raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
+        raise BadInput(f"{question.named()}: expected a log with at least one intact row")
     layer = windows_layer(files) if smoothness is None else _ways(files, smoothness)
     write_layer(layer, path)
-    return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files),
-                      "window" if smoothness is None else "way")
+    rows, placed, of = len(layer.features), layer.placed, "window" if smoothness is None else "way"
+    damaged_lines = sum(one.damaged_lines for one in files)
+    left_out = counting([damaged(damaged_lines)])
+    words = f"{path}: {counted(rows, of)}" + f", {rows - placed} of them without a position" * (placed < rows)
+    made = {"file": str(path), "format": form.name, "rows" if smoothness is None else "ways": rows, "placed": placed,
+            "damaged_lines": damaged_lines, **left_out_json(left_out)}
+    return Conversion("\n".join([words, *left_out_lines(left_out)]), made, path, form.name, rows, placed, damaged_lines)
+
+
+convert = function("convert", ConvertQuestion, converted)
 
 
 def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:

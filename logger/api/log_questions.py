@@ -1,4 +1,4 @@
-"""What the verbs about segment logs are asked: sections and passes."""
+"""What the verbs about segment logs are asked: sections, passes and convert."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -129,6 +129,35 @@ class PassesQuestion(LogsQuestion):
         "490.313)", LIMIT, "IRI", read=limit_of)] = None
 
 
+@dataclass(frozen=True)
+class ConvertQuestion(LogsQuestion):
+    """Write logs as a file for other programs, by its ending: maps such as .geojson, tracks such as .gpx, tables such
+    as .csv.
+
+    Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
+    neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
+    known is empty. GeoPackage and Parquet need the ``maps`` extra. The file is written whole, or not at all.
+
+      ridelog convert /media/RIDELOG --to drive.geojson
+      ridelog convert /media/RIDELOG --smoothness ways.geojson --to review.geojson
+
+    With --smoothness each row is a way of OpenStreetMap that was driven: the value of its key smoothness that the IRI
+    suggests, how sure that is, and what is tagged. It is for a person to look through; nothing is sent anywhere.
+
+    In Python: raises BadInput for another ending, a missing extra, no log or none with an intact row, a file without
+    ways, and where none of them was driven.
+
+    >>> convert(folder / "logs", folder / "drive.geojson").rows > 0
+    True
+    """
+
+    to: Annotated[Path | str, Option(f"file to write; its ending says what: {' '.join(FORMATS)}", metavar="FILE",
+                                     read=Path)]
+    smoothness: Annotated[Path | str | None, Option(
+        "suggest OpenStreetMap's smoothness for the ways of this extract (with @id and highway)",
+        metavar="WAYS.geojson", read=Path)] = None
+
+
 _TABLES = f"{' '.join(FORMATS)} (in SI units)"
 SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
     f"write the sections as {_TABLES}, or a page or picture of them (.html .png .svg .pdf); may repeat",
@@ -138,3 +167,4 @@ PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
         metavar="FILE", others=FORMATS),
     Out("write the places to visit: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", FORMATS,
         many=False, is_drawn=False)))
+CONVERT = Verb(ConvertQuestion, "logger.api.conversion:converted")

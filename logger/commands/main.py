@@ -62,6 +62,7 @@ ASKED = {
     "add-effect": "lab_questions:ADD_EFFECT",
     "learn": "lab_questions:LEARN",
     "plan": "lab_questions:PLAN",
+    "convert": "log_questions:CONVERT",
     "sections": "log_questions:SECTIONS",
     "passes": "log_questions:PASSES",
     "iri": "road_questions:IRI",
