@@ -80,7 +80,7 @@ def test_python_gives_arrays(logs: Path) -> None:
     (["--length", "100"], "length 100: expected a length with its unit, such as 100m, 0.1mi or 500ft, from 7.62 m to"),
     (["--length", "1m"], "length 1m: expected a length"),
     (["--length", "..m"], "length ..m: expected a length"),
-    (["--out", "x.shp"], "x.shp: expected a file that ends in one of .csv, .geojson"),
+    (["--out", "x.shp"], "x.shp: expected a file that ends in one of .html, .png"),
 ])
 def test_nonsense_is_one_line(logs: Path, words: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):
