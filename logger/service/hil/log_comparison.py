@@ -74,6 +74,8 @@ class RowTolerance:
         return max(self.least, self.share * scale) if scale is not None else self.least
 
 
+_IRI_ERRORS = {"IRI std": "iri_std_m_per_km", "IRI level std": "iri_level_std_m_per_km",
+               "IRI common std": "iri_common_std_m_per_km", "IRI place std": "iri_place_std_m_per_km"}
 _COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("VDV", "vdv", "m/s1.75", "mps175"))
 
 TOLERANCES = (
@@ -96,7 +98,7 @@ TOLERANCES = (
     RowTolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
     RowTolerance("comfort", "", 0, "the words for the row's own a_w"),
     RowTolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
-    RowTolerance("IRI std", "m/km", 0.1, "as the IRI", share=0.25, of="iri_std_m_per_km"),
+    *(RowTolerance(name, "m/km", 0.1, "as the IRI", share=0.25, of=column) for name, column in _IRI_ERRORS.items()),
     RowTolerance("IRI rms", "m/km", 0.1, "in proportion to the r.m.s. acceleration", share=0.1, of="iri_rms_m_per_km"),
     RowTolerance("class", "", 0, "that of the row's own IRI"),
     RowTolerance("samples", "", 4, "as the duration, at 100 Hz"),
@@ -392,7 +394,7 @@ _MEASURES: dict[str, Measure] = {
     "crest": _of("crest_factor"),
     "comfort": _comfort_contradicts,
     "IRI": _of("iri_m_per_km"),
-    "IRI std": _of("iri_std_m_per_km"),
+    **{name: _of(column) for name, column in _IRI_ERRORS.items()},
     "IRI rms": _of("iri_rms_m_per_km"),
     "class": _class_contradicts,
     "samples": _of("samples"),
