@@ -48,8 +48,8 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
             yield (f"Of the variance of their own errors {found.scatter.alike:.0%} is alike in all drives over a "
                    "place: more drives do not make that part smaller")
     else:
-        yield ("No cell was passed by two drives: what all windows of one drive share (the car, its tires, its load) "
-               "is not known, and not in the standard errors")
+        yield ("No cell was passed by two drives: how far a drive differs as a whole (tires, load, temperature) is not "
+               "known, and not in the standard errors")
 
 
 def _visits(found: CombinedDrives) -> Iterator[str]:
