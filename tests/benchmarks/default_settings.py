@@ -47,6 +47,7 @@ from .figures import Figures
 Array = np.ndarray
 
 FIRST_SEED = 980_000
+LENGTH_M = 2400.0
 START_US = 50_000_000
 STEADY = Receiver(slow_error_m=0.0)
 
@@ -109,7 +110,7 @@ def ways(mph: float, range_g: int, noise_mps2: float, delay_s: float, seed: int)
     """One drive in each way; ``mph`` 0: a town."""
     rng = np.random.default_rng([FIRST_SEED, seed, round(mph), range_g])
     if mph:
-        drive = steady_drive(rav4(), sectioned_road(FIRST_SEED + seed, 2.0), mph * MPH_MPS, LEAD_S, GRID_HZ)
+        drive = steady_drive(rav4(), sectioned_road(FIRST_SEED + seed, 2.0, LENGTH_M), mph * MPH_MPS, LEAD_S, GRID_HZ)
     else:
         drive = varied_drive(rav4(), iso_road((2.0, 4.0)[seed % 2], 5000.0, FIRST_SEED + seed), list(TOWN), GRID_HZ)
     chip = sensor_of(range_g, noise_mps2, 1)
