@@ -13,7 +13,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -82,13 +81,12 @@ class OtherSettings:
     """Settings that would suit another road better, as a settings file has them; empty: there is none.
 
     wider      of a larger range
-    finer      of a smaller one, in which readings from ``finer_end_mps2`` on [m/s2] would stand at the end
+    finer      of smaller ones, the smallest first, each with the reading from which on it would stand at its end [m/s2]
     oftener    of more readings per sample
     """
 
     wider: str = ""
-    finer: str = ""
-    finer_end_mps2: float = inf
+    finer: tuple[tuple[str, float], ...] = ()
     oftener: str = ""
 
 

@@ -17,7 +17,7 @@ from array import array
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -344,8 +344,7 @@ class _Bma220(Accelerometer[Bma220Config]):
         reads = USUAL_OVERSAMPLE if settings.reads < USUAL_OVERSAMPLE else LARGEST_OVERSAMPLE
         return OtherSettings(
             wider=f"range_g: {larger[0]}" if larger else "",
-            finer=f"range_g: {smaller[-1]}" if smaller else "",
-            finer_end_mps2=31 * mps2_per_count(smaller[-1]) if smaller else inf,
+            finer=tuple((f"range_g: {range_g}", 31 * mps2_per_count(range_g)) for range_g in smaller),
             oftener=f"oversample: {reads}{_FAST_BUS * (reads > USUAL_OVERSAMPLE)}" if reads > settings.reads else "")
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:

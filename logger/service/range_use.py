@@ -33,7 +33,8 @@ class RangeUse:
     def __init__(self, others: OtherSettings) -> None:
         self._others = others
         self._moves = False
-        self._blocks = self._beyond = 0
+        self._ends_mps2 = np.array([end_mps2 for _, end_mps2 in others.finer])
+        self._blocks, self._beyond = 0, np.zeros(len(others.finer))
         self._windows = self._clipped = self._hidden = 0
 
     def take(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> None:
@@ -43,7 +44,7 @@ class RangeUse:
                 self._moves = fix.speed_mps > MOVING_MPS
         if self._moves and len(block):
             self._blocks += 1
-            self._beyond += bool((np.abs(block.accel_mps2) >= self._others.finer_end_mps2).any())
+            self._beyond += np.abs(block.accel_mps2).max() >= self._ends_mps2
 
     def count(self, records: Sequence[WindowRecord]) -> None:
         """More rows; those count that have an IRI, or would have one if it did not hide."""
@@ -63,10 +64,10 @@ class RangeUse:
         if clipped > CLIPPED_SHARE:
             return self._said(f"in {clipped:.0%} of this drive's windows it stood at an end of its range",
                               self._others.wider)
-        if self._beyond < CLIPPED_SHARE * self._blocks and self._others.finer:
-            seldom = f"only {self._beyond / self._blocks:.1%}" if self._beyond else "nothing"
-            return self._said(f"{seldom} of this drive went beyond half its range, whose steps are larger than they "
-                              "need be", self._others.finer)
+        for (setting, _), beyond in zip(self._others.finer, self._beyond / max(self._blocks, 1), strict=True):
+            if beyond < CLIPPED_SHARE:
+                seldom = f"only {beyond:.1%} of this drive" if beyond else "nothing of this drive"
+                return self._said(f"{seldom} would have been beyond a smaller range, and its steps are finer", setting)
         if hidden > HIDDEN_SHARE:
             return self._said(f"{hidden:.0%} of this drive's windows hide below one of its steps", self._others.oftener)
         return ""

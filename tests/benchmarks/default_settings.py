@@ -4,8 +4,9 @@
         [--draws 2]
 
 Recorded bytes of a BMA220, read once a sample, and of a receiver of 1 Hz whose places wander by 0.8 m over 40 s and
-which is late, on roads whose roughness changes (``changing_roads.sectioned_road``) and in a town (``--mph 0``). R2,
-bias and the windows within one and two standard errors, of 25 ft windows, at the places that the rows tell:
+which is late, on roads whose roughness changes (``changing_roads.sectioned_road``), at a steady speed or by stop and go
+(``--mph 0``). R2, bias and the windows within one and two standard errors, of 25 ft windows, at the places that the
+rows tell:
 
 exact            no receiver: places as they are, the noise given
 right places     replay, a receiver that does not wander, its delay in the settings
@@ -39,7 +40,7 @@ from logger.units import KNOT_MPS, MPH_MPS, STANDARD_GRAVITY_MPS2, US_PER_S, WIN
 
 from ..support.command import called
 from ..support.drives.lines import sentence
-from ..support.drives.measured import GRID_HZ, Drive, Receiver, iso_road, place_of, steady_drive, varied_drive
+from ..support.drives.measured import GRID_HZ, Drive, Receiver, place_of, steady_drive, varied_drive
 from .changing_roads import sectioned_road, sensor_of
 from .estimator import LEAD_S, TOWN, estimates, r2, rav4, reported
 from .figures import Figures
@@ -109,10 +110,10 @@ def replayed(folder: Path, drive: Drive, settings: str) -> Found:
 def ways(mph: float, range_g: int, noise_mps2: float, delay_s: float, seed: int) -> dict[str, Found]:
     """One drive in each way; ``mph`` 0: a town."""
     rng = np.random.default_rng([FIRST_SEED, seed, round(mph), range_g])
+    road = sectioned_road(FIRST_SEED + seed, 2.0, LENGTH_M)
+    drive = varied_drive(rav4(), road, [*TOWN])
     if mph:
-        drive = steady_drive(rav4(), sectioned_road(FIRST_SEED + seed, 2.0, LENGTH_M), mph * MPH_MPS, LEAD_S, GRID_HZ)
-    else:
-        drive = varied_drive(rav4(), iso_road((2.0, 4.0)[seed % 2], 5000.0, FIRST_SEED + seed), list(TOWN), GRID_HZ)
+        drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ)
     chip = sensor_of(range_g, noise_mps2, 1)
     level = STANDARD_GRAVITY_MPS2 + chip.step_mps2 * rng.uniform(-0.5, 0.5)
     felt = drive.accel_mps2 + level + noise_mps2 * rng.standard_normal(len(drive.accel_mps2))

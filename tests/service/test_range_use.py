@@ -30,7 +30,8 @@ def moving(mps: float) -> Fix:
 
 def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, beyond: float = 0.0,
          windows: int = WINDOWS) -> str:
-    """Advice after a drive of which these shares were clipped, hidden, and beyond 0.97 of half the range."""
+    """Advice after a drive of which these shares were clipped, hidden, and beyond the next smaller range; all of it was
+    beyond the one below that."""
     use = RangeUse(accelerometers()["bma220"].others(Bma220Config(range_g=range_g, oversample=reads)))
     peak = np.where(np.arange(windows) < beyond * windows, 0.49, 0.4) * range_g * STANDARD_GRAVITY_MPS2
     for one in peak:
@@ -46,9 +47,10 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
     (2, 4, 0.30, 0.0, 1.0, "in 30% of this drive's windows it stood at an end of its range: set range_g: 4"),
     (4, 4, 0.30, 0.0, 1.0, "set range_g: 8"),
     (8, 4, 0.9, 0.0, 1.0, ""),  # steps at 16 g say nothing
-    (4, 4, 0.0, 0.0, 0.0, "nothing of this drive went beyond half its range, whose steps are larger than they need be: "
-                          "set range_g: 2"),
-    (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive went beyond half its range"),
+    (4, 4, 0.0, 0.0, 0.0, "nothing of this drive would have been beyond a smaller range, and its steps are finer: set "
+                          "range_g: 2"),
+    (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive would have been beyond a smaller range, and its steps are finer: "
+                           "set range_g: 4"),
     (4, 4, 0.0, 0.02, 0.4, ""),
     (4, 4, 0.0, 0.10, 0.4, "10% of this drive's windows hide below one of its steps: set oversample: 8 (and the bus"),
     (2, 1, 0.0, 0.05, 0.0, "set oversample: 4"),
@@ -87,4 +89,4 @@ def test_status_says_it_of_a_drive_at_8_g_that_needs_2(tmp_path: Path) -> None:
     car.sample = lambda second: bytes((0, 0, 4 * (4 + car.rng.randrange(-1, 2))))
     car.speed_mps = 20.0
     status = car.drive(3 + 1.2 * FEWEST_WINDOWS * 7.62 / 20.0)
-    assert any("went beyond half its range" in line and "set range_g: 4" in line for line in advice(status))
+    assert any("beyond a smaller range" in line and "set range_g: 2" in line for line in advice(status))
