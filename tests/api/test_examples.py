@@ -20,7 +20,7 @@ import logger.api
 import ridelog
 
 MODULES = [importlib.import_module(one.name) for one in pkgutil.walk_packages(logger.api.__path__, "logger.api.")]
-SLOW = ("logger.api.lab_questions", "logger.api.diagnosis")
+SLOW = ("logger.api.lab_questions", "logger.api.diagnosis", "logger.api.fleet", "logger.api.plan")
 
 
 @pytest.fixture(scope="module")

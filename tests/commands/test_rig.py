@@ -61,6 +61,7 @@ def test_a_comparison_falls_to_the_noise_and_knows_no_speed_and_no_place(
     assert "Worst places" not in words
 
 
+@pytest.mark.slow
 def test_the_true_rig_is_right_without_a_fit(bench: Path) -> None:
     found = ridelog.compare(bench / "true.yaml", [bench / "random"])
     measured = ridelog.read_run(bench / "random").accel_z_mps2[1000:]

@@ -130,6 +130,7 @@ def test_a_minute_of_comma2k19_becomes_rows_and_a_map(tmp_path: Path, capsys: py
     assert found["figures"][0]["x"] == "east [m]"
 
 
+@pytest.mark.slow
 def test_the_size_of_gravity_tells_the_unit_of_a_car(lira_cd: Path, tmp_path: Path) -> None:
     import h5py
 

@@ -343,6 +343,7 @@ def test_samples_are_not_dated_while_more_are_lost_than_can_be_located():
     assert np.abs(times_us - truth_us[kept])[second > 80].max() < 5000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [98.5, 99.2, 100, 104])
 @pytest.mark.parametrize(("every", "count"), [(100, 1), (50, 1), (100, 2), (25, 1)])
 def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, count):

@@ -54,7 +54,7 @@ def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_waiting")
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=2), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=1), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
 
