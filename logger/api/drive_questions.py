@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
 
 from drivers.catalogue import names
-from logger.api.question import Argument, LongQuestion, Option, Out, Question, Verb
+from logger.api.question import PICTURES, Argument, LongQuestion, Option, Out, Question, Verb
 from logger.api.ranges import (
     ADDED,
     AUTO,
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
     from logger.store.formats.record_file import AccelerationRecord
 
-PICTURES = Out("write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat")
 _WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
 
 

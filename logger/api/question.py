@@ -280,6 +280,10 @@ class Out:
     required: bool = False
 
 
+PICTURES = Out("write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat")
+"""Of a verb that writes nothing else with ``--out``."""
+
+
 @dataclass(frozen=True)
 class Verb:
     """A verb of the command line.

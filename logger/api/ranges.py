@@ -49,7 +49,8 @@ class Limit(Range):
         from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
 
         found = Range(self.low, HIGHEST_LIMIT_M_PER_KM, self.unit).fault(value)
-        return found and f"{found}{limit_hint(value)}"
+        hint = limit_hint(value) if found else ""
+        return f"{found}{hint}" + f" (at a terminal write {value:g}in/mi)" * bool(hint)
 
 
 LIMIT = Limit(0.01, float("inf"), "m/km")

@@ -4,15 +4,13 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Union
 
-from logger.api.question import Argument, Option, Out, Question, Verb
+from logger.api.question import PICTURES, Argument, Option, Out, Question, Verb
 from logger.api.ranges import IRI as IRI_RANGE
 from logger.api.ranges import LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING, Range
 from logger.api.terms import Localized, ResampleM
 
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Profile
-
-PICTURES = Out("write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat")
 
 ProfileFile = Annotated[Union["Profile", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
 
