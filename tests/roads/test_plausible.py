@@ -90,7 +90,7 @@ def test_inches_are_doubted_and_no_more(tmp_path: Path, capsys: pytest.CaptureFi
                                      ["passes", "FILE", "--above"]], ids=lambda command: command[0])
 def test_a_limit_in_inches_per_mile_is_asked_for(command: list[str], tmp_path: Path) -> None:
     file = written(tmp_path / "road.csv", "distance_m,elevation_m", DISTANCE_M, smooth())
-    with pytest.raises(BadInput, match=r"160 in/mi are 2\.525 m/km \(write --\w+ 160in/mi\)"):
+    with pytest.raises(BadInput, match=r"160 in/mi are 2\.525 m/km \(at a terminal write 160in/mi\)"):
         main([*(file if word == "FILE" else word for word in command), "160"])
     assert limit_hint(2.5) == ""
 
