@@ -219,7 +219,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
-    predictions = check_model(word, model, runs, warn, shipped, anyway, tolerance.numbers)
+    predictions = check_model(word, model, runs, warn, shipped, tolerance.numbers, anyway)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
@@ -239,16 +239,14 @@ def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: 
 
 
 def tolerance_of(share: float | None) -> Tolerance:
-    """What a share either way is taken for that the user said of masses, springs and dampers: then it holds, whatever
-    the runs say. None: the usual one, and a wider one where the file turns out to be rough. BadInput for one that no
-    car's numbers have."""
+    """What a share either way is taken for that the user said of masses, springs and dampers; None: the usual one.
+    BadInput for one that no car's numbers have."""
     from logger.lab.likelihood.priors import Tolerance
 
     if share is None:
         return Tolerance()
     TOLERANCE.check("tolerance", share)
-    deviation = share / Tolerance.band
-    return Tolerance(numbers=deviation, rough=deviation)
+    return Tolerance(numbers=share / Tolerance.band)
 
 
 def known_effects(model: Model, files: Sequence[str], on_rig: bool = False

@@ -34,13 +34,12 @@ _UNITS = (
 _SENSOR_GAIN = (0.2, 5.0)
 """Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
 ANYWAY = "--anyway goes on"
-USUAL_DEVIATION = 0.025
 _NAMED = 4
 """Of the numbers of another car, so many are said."""
 
 
 def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], known: Mapping[str, Effect],
-                anyway: bool = False, numbers: float = USUAL_DEVIATION) -> list[Array]:
+                numbers: float, anyway: bool = False) -> list[Array]:
     """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
     the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
     profile is in another unit, or the road or the car is another one, unless the user wants to go on ``anyway`` (then

@@ -57,7 +57,7 @@ LIMIT = Limit(0.01, float("inf"), "m/km")
 
 
 TOLERANCE = Range(0.001, 0.5)
-USUAL_TOLERANCE = 0.04
+USUAL_TOLERANCE = 0.2
 """How far off a car's masses, springs and dampers may well be, as a share."""
 SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Range(0.0, 100.0, "m/s2")
 """Of a simulated drive; what its sensor adds, noise or steps. An estimate's steps likewise."""

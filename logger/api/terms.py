@@ -28,8 +28,7 @@ TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | None, Option(
     "how far off the vehicle's masses, springs and dampers may well be, as a share (default: "
-    f"{USUAL_TOLERANCE:g}, and 0.1 where a search or the fit of an effect finds that the file is a rough one; what you "
-    "say holds)", TOLERANCE, "SHARE")]
+    f"{USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation", TOLERANCE, "SHARE")]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 LowPass = Annotated[float | None, Option(
     "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen
@@ -46,20 +46,20 @@ class AnotherCar:
 
 
 def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                numbers: float, explains: float = 0.35, far_sigma: float = 6.0, several: int = 4) -> AnotherCar | None:
+                numbers: float, explains: float = 0.35, several: int = 4) -> AnotherCar | None:
     """The other car that a record is of; None: it may be this one.
 
     predictions           of the model (n,) per run
     numbers               standard deviation of the car's numbers, as a share
     explains              up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
-    far_sigma, several    so many numbers off by so many standard deviations are another car's (a judgement: a missing
-                          effect changes few numbers so far)
+    several               so many numbers that are unusually far off are another car's (a judgement: a missing effect
+                          changes few numbers so far)
     """
     if normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
     some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
-    wide = Posterior(some, vehicle, anything, vehicle).without_soft_bounds()
+    wide = Posterior(some, vehicle, anything, vehicle)
     error = wide.error(align(wide, wide.start(effects)).state)
     if error < POOR_ERROR:
         return None
@@ -70,7 +70,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     lengths = wide.prior.deviations < anything.numbers
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
     far = [index for index in np.argsort(-np.abs(logs)) if not lengths[index]
-           and abs(logs[index]) > far_sigma * numbers]
+           and abs(logs[index]) > UNUSUAL_SIGMA * numbers]
     if found_error > explains or len(far) < several:
         return None
     return AnotherCar(some, error, found_error,

@@ -17,9 +17,10 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.repeats import Repeats, find_repeats
+from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
@@ -113,9 +114,10 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     """
     car = compose(vehicle, effects)
     plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
-    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_soft_bounds()
-    names, deviations = posterior.prior.names, posterior.prior.deviations
-    state = fit_model(posterior, posterior.start(effects)).state
+    posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle)
+    names = posterior.prior.names
+    linear = fit_model(posterior, posterior.start(effects))
+    state = linear.state
     if posterior.error(state) > plain.error:
         # The fit weights frequencies by their noise: a gain at high ones may outweigh a loss at body bounce.
         state = posterior.start(effects)
@@ -125,13 +127,12 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
     removed = removed_from(posterior, plain.residuals.predictions, state)
-    sigmas = np.abs(state.logs / deviations)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
-                      tuple(names[index] for index in np.argsort(-sigmas) if sigmas[index] > UNUSUAL_SIGMA),
+                      tuple(posterior.prior.beyond(state.logs, standard_errors(linear).logs)),
                       removed, _tests(refitted, removed, plain))
 
 

@@ -4,15 +4,14 @@ Problem: a name alone is no answer. The reader wants to know how much an effect 
 it could be, and what these runs could not have shown anyway. Solution: a search by evidence (``selection.stepwise``)
 names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor
 has where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
-with their priors. Where the car's numbers then lie beyond their tolerance on the whole, its file is a rough one: all of
-it is done again with a wider tolerance. Noise that has a colour is distinguished from physics by what it does not
+with their priors. Noise that has a colour is distinguished from physics by what it does not
 depend on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -40,7 +39,6 @@ from logger.lab.selection.detectability import Undetectable, undetectable_effect
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
-from logger.lab.selection.rough_file import is_file_rough
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
@@ -105,7 +103,6 @@ class Diagnosis:
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
     tolerance            share by which the car's masses, springs and dampers may well be off
-    rough_file           whether they turned out to be off by more, on the whole, than they were taken to be at first
     """
 
     runs: tuple[str, ...]
@@ -128,8 +125,7 @@ class Diagnosis:
     band: ComparedBand | None = None
     car: FittedCar | None = None
     coloured: bool = False
-    tolerance: float = 0.04
-    rough_file: bool = False
+    tolerance: float = Tolerance().share
 
     @property
     def exceeds_noise(self) -> bool:
@@ -172,18 +168,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         progress("the records were filtered forth and back: searching below that")
         posterior = below
         search, selection = searched(posterior)
-    selection, after = _fit_finely(search, selection)
-    if is_file_rough(selection.before.linear, after, bool(selection.gains)):
-        # Numbers that are held back where they are not make effects of what they would explain.
-        progress("the car's numbers are off by more than their tolerance: again with a wider one")
-        wider = posterior.with_rough_file()
-        search_again, selection_again = searched(wider)
-        selection_again, after_again = _fit_finely(search_again, selection_again)
-        # A few numbers that are far off even so are not explained by a rough file.
-        if not wider.prior.any_beyond(after_again.state.logs, UNUSUAL_SIGMA):
-            found = _assess(wider, effects, present, search_again, selection_again, after_again)
-            return replace(found, rough_file=True)
-    return _assess(posterior, effects, present, search, selection, after)
+    return assess(posterior, effects, present, search, selection)
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -202,18 +187,13 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
 def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
            selection: Selection) -> Diagnosis:
     """The diagnosis by the result of a search, which is fitted again by a fine simulation."""
-    return _assess(posterior, effects, present, search, *_fit_finely(search, selection))
-
-
-def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
-            selection: Selection, after: LinearModel) -> Diagnosis:
-    """The diagnosis by the result of a search and the model that was fitted finely."""
+    selection, after = _fit_finely(search, selection)
     progress, tried = search.progress, search.effects
     nominal = posterior.start(present)
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
     progress("how certain the numbers are")
-    effects_found = standard_errors(after).effects
+    errors = standard_errors(after)
     progress("what these runs could not show")
     excess = excess_over_noise(fine, state, FALSE_ALARM)
     baseline = fine.start(present)
@@ -232,7 +212,8 @@ def _assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequen
                                                                                fine.error(state)),
         candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
-        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=effects_found,
+        conflicts=fine.prior.beyond(state.logs, errors.logs), steps=_steps(selection, posterior.error(nominal)),
+        effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
         car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
@@ -265,7 +246,7 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
     that are at an end of their range then are dropped, and those that are not unusually far from doing nothing: they
     gained because numbers of the car were held at their soft bounds, and do what these numbers may do as well."""
     search.progress("fitting it finely")
-    fine = selection.before.posterior.without_soft_bounds(fine=True)
+    fine = selection.before.posterior.simulated_finely()
     while True:
         state = selection.now.state
         start = fine.state_at(state.effects, state.logs, state.record, state.size)
@@ -278,13 +259,6 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
                 return selection, after
             ended = [weakest.effect.name]
         selection = search.without_effect(selection, ended[0])
-
-
-def _conflicts(posterior: Posterior, state: State) -> dict[str, float]:
-    """Relative changes of the numbers of the car that are in conflict with their prior."""
-    prior = posterior.prior
-    return {name: float(np.expm1(log)) for name, log, deviation in zip(
-        prior.names, state.logs, prior.deviations, strict=True) if abs(log) > CONFLICT_SIGMA * deviation}
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:

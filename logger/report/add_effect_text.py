@@ -9,7 +9,6 @@ from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.report.band_text import band_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
-from logger.report.rough_file_text import rough_file_json, rough_file_words
 
 _AT_BOUND = 1e-6
 _NAMED = 4
@@ -28,7 +27,7 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
 
 def judgement(found: AddedEffects) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
-    lines = [*removed_words(found.removed, found.band), *rough_file_words(found)]
+    lines = [*removed_words(found.removed, found.band)]
     lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, its noise alone about {}")
@@ -69,15 +68,15 @@ def _too_much(one: Number) -> str:
 
 
 MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Without, With: refitted freely, without and with the effect, as a difference from the given value, ± "
-              "standard error. Now: the value in the new file, held near the given one. Shift: from Without to With, "
+MOVED_HINT = ("Without, With: refitted without and with the effect, as a difference from the given value, ± "
+              "standard error. Now: the value in the new file. Shift: from Without to With, "
               "in standard errors; above two the number was biased because the effect was missing.")
 
 
 def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, str, str]]:
     """Under ``MOVED_HEADS``."""
     for one in moved:
-        yield (one.name, f"{one.written:.5g}", f"{one.without / one.nominal - 1:+.1%}",
+        yield (one.name, f"{one.found:.5g}", f"{one.without / one.nominal - 1:+.1%}",
                f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}", f"{one.shift:+.1f}",
                "was biased" if one.biased else "")
 
@@ -94,12 +93,12 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
         **({} if found.unseen_before is None or found.unseen_after is None else {
             "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error}),
-        **band_json(found.band), **removed_json(found.removed), **rough_file_json(found),
+        **band_json(found.band), **removed_json(found.removed), "tolerance": found.tolerance,
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
                      "without_standard_error": one.without_standard_error, "with": one.found,
                      "with_standard_error": one.standard_error, "shift_standard_errors": one.shift,
-                     "written": one.written}
+                     "written": one.found}
                     for one in found.moved],
         "signals": {name: {"error_refitted": one.before, "error_after": one.after,
                            "noise_floor_error": one.noise_floor} for name, one in found.signals.items()},

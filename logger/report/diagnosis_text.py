@@ -14,7 +14,6 @@ from logger.report import residual_text
 from logger.report.band_text import band_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
-from logger.report.rough_file_text import rough_file_json, rough_file_words
 from logger.report.text_layout import enumerated
 from logger.vehicle.effect import Chosen
 
@@ -27,7 +26,7 @@ _SUSPECT = 0.1
 
 def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    lines = [*removed_words(found.removed, found.band), *rough_file_words(found)]
+    lines = [*removed_words(found.removed, found.band)]
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
@@ -157,7 +156,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
-        **rough_file_json(found), "coloured_noise": found.coloured,
+        "tolerance": found.tolerance, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},

@@ -12,7 +12,6 @@ from logger.lab.selection.add_effect import AddedEffects
 from logger.report.diagnosis_text import JUDGED_ON, looks_like
 from logger.report.quantities import finite, measured, numbers_of, unit_of
 from logger.report.removed_text import removed_json, removed_words
-from logger.report.rough_file_text import rough_file_words
 from logger.report.text_layout import paragraphs
 from logger.vehicle.effect import Chosen
 
@@ -75,7 +74,7 @@ def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
 def sentences(law: Law, addition: AddedEffects) -> list[str]:
     """The law, what it brings, and what it may be instead: paragraphs."""
     said = words(law, addition)
-    lines = [*removed_words(addition.removed, addition.band), *rough_file_words(addition), f"Learned: {said}.",
+    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.",
              _errors(addition)]
     if law.effects:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]

@@ -24,6 +24,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import product
+from math import ceil, log, log1p
 from types import SimpleNamespace
 from typing import Any
 
@@ -156,6 +157,14 @@ class Misalignment:
     delay_s: float
     low_pass: tuple[float, int] | None = None
     rate_hz: float = 0.0
+
+
+def resonances_hz(low_hz: float, high_hz: float, damping_ratio: float) -> tuple[float, ...]:
+    """Natural frequencies from one to at least another, each the half-power bandwidth of a resonance of that damping,
+    2 z f, above the one before [Hz]: a resonance between two of them shares four fifths of its power with the nearer
+    one (two Lorentz curves of half width z f, that far apart)."""
+    steps = ceil(log(high_hz / low_hz) / log1p(2 * damping_ratio))
+    return tuple(low_hz * (1 + 2 * damping_ratio) ** step for step in range(steps + 1))
 
 
 class Effect(ABC):

@@ -98,7 +98,7 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
     runs ask, as it ends in: a search holds the car's numbers at two deviations, and gains more where an effect would
     bend them farther."""
     bench = bench_with(CompareQuestion(VEHICLE, runs, tolerance=USUAL_TOLERANCE))
-    posterior = bench.posterior(searches=True).without_soft_bounds()
+    posterior = bench.posterior(searches=True)
     one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
     gain = one.gain + len(free_parameters_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
     return float(np.sqrt(max(gain, 0.0)))

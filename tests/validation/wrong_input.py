@@ -24,6 +24,7 @@ from logger.api.model_checks import check_model
 from logger.api.run_checks import checked_runs
 from logger.errors import BadInput
 from logger.lab.another_car import POOR_ERROR
+from logger.lab.likelihood.priors import Tolerance
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -108,7 +109,8 @@ def made(kind: str, seed: int) -> tuple[list[Run], Model]:
 def refusal(runs: list[Run], model: Model) -> str | None:
     """Why a model and runs are refused; None: they are not."""
     try:
-        check_model("vehicle.yaml", model, SimulatedRuns(runs), silent, known_effects(model, ())[0])
+        check_model("vehicle.yaml", model, SimulatedRuns(runs), silent, known_effects(model, ())[0],
+                    Tolerance.numbers)
     except BadInput as error:
         return str(error)
     return None

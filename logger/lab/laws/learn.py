@@ -27,6 +27,7 @@ from logger.lab.laws.screening import free_count, screen_law
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine, refine_to_the_end
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, screen
@@ -173,8 +174,9 @@ def is_above_noise(model: Baseline) -> bool:
 
 
 def exceeds_noise(model: Baseline) -> bool:
-    """Whether the residual of a model is above the sensor's noise, or a number of the car is beyond its soft bounds."""
-    return is_above_noise(model) or model.posterior.prior.at_soft_bounds(model.state.logs)
+    """Whether the residual of a model is above the sensor's noise, or a number of the car is beyond its tolerance."""
+    errors = standard_errors(model.linear).logs
+    return is_above_noise(model) or bool(model.posterior.prior.beyond(model.state.logs, errors))
 
 
 @dataclass(frozen=True, eq=False)

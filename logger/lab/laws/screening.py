@@ -41,7 +41,7 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
                  if one.name in draft.strengths]
     slopes = effect_slopes(linear, effects, state.logs, strengths, state.record, base.rough)
     white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
-    gradient, information = linear.gradient(residuals, state.logs, white), linear.information(state.logs, white)
+    gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
     p = linear.count
     # A point of a curve beyond all motions has no derivative, and stays at 0.
     size = np.sqrt(np.maximum(np.diag(information), 0.0))

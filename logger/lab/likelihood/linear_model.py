@@ -162,12 +162,6 @@ class LinearModel:
             number[away], white[away], absorbed[:, away] = 0.0, 0.0, 0.0
         return found
 
-    def without_soft_bounds(self) -> LinearModel:
-        """The model with a normal prior of the car's numbers, however far they move."""
-        found = copy(self)
-        found.prior = self.prior.without_soft_bounds()
-        return found
-
     def _most_likely_size(self, size: ErrorSize) -> ErrorSize:
         """The size with the most evidence, searched for from a size and from one whose start and scale error are ten
         times as large as usual: what these explain, a walk explains as well, and there may be an optimum at either."""
@@ -197,15 +191,6 @@ class LinearModel:
         """Occam factor of the record's errors, in minus twice the log of the evidence."""
         return sum(_log_determinant(root) - one.error.log_determinant(self.size)
                    for root, one in zip(self._roots, self._records, strict=True))
-
-    @property
-    def numbers_occam_factor(self) -> float:
-        """Occam factor of the car's numbers, in minus twice the log of the evidence: what a prior pays for being wider
-        than what the runs leave of it. ``score`` is without it, because it is alike where priors are."""
-        if not self.count:
-            return 0.0
-        information = self.information(self.state.logs)
-        return float(np.linalg.slogdet(information)[1]) + 2 * float(np.log(self.prior.deviations).sum())
 
     def with_size(self, size: ErrorSize) -> LinearModel:
         """The model with distance errors of another size."""
@@ -261,12 +246,12 @@ class LinearModel:
         """Sum of squares of the whitened residuals and cost of the priors, with the most likely record errors."""
         return self.fit_record_errors(predictions).squares + self.prior.cost(logs)
 
-    def information(self, logs: Array, own: Sequence[Array] | None = None) -> Array:
+    def information(self, own: Sequence[Array] | None = None) -> Array:
         """Information on the car's numbers and on those of whitened columns (m, kept) per run: (p + m, p + m)."""
         p = self.count
         found = sum(white @ white.T - absorbed.T @ absorbed
                     for white, absorbed in zip(self.white, self._record_projections, strict=True))
-        found = np.asarray(found) + (np.diag(self.prior.curvature(logs)) if p else 0.0)
+        found = np.asarray(found) + (np.diag(self.prior.precision) if p else 0.0)
         if own is None:
             return found
         own_projections = self.record_projections(own)

@@ -237,7 +237,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
         if free_parameters and fresh:
             slopes = effect_slopes(linear, at.effects, at.logs, free_parameters, at.record, at.predictions)
             own, known = linear.whitened(slopes), (x.copy(), at, slopes)
-        information = linear.information(at.logs, own)
+        information = linear.information(own)
         information[p:, p:] += unseen
         return linear.gradient(at.fit.residuals, at.logs, own), information
 
@@ -279,5 +279,5 @@ def own_slopes(linear: LinearModel) -> list[Array] | None:
 
 def _fine_steps(linear: LinearModel) -> Array:
     """Difference steps of the logarithms of the car's numbers (p,): at most five posterior standard deviations."""
-    sizes = np.sqrt(np.diag(linear.information(linear.state.logs)))
+    sizes = np.sqrt(np.diag(linear.information()))
     return np.minimum(linear.posterior.prior.steps, 5.0 / sizes)

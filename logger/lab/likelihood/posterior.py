@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -69,23 +69,10 @@ class Posterior:
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
 
-    def without_soft_bounds(self, fine: bool = False) -> Posterior:
-        """The posterior with a normal prior of the car's numbers, however far the runs move them; ``fine``: simulated
-        as finely as what is reported."""
-        runs = SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)) if fine else self.runs
-        return Posterior(runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior.without_soft_bounds(),
-                         self.readings)
-
-    def with_rough_file(self) -> Posterior:
-        """The posterior of a vehicle whose file is a rough one (``Tolerance.rough``)."""
-        tolerance = replace(self.tolerance, numbers=self.tolerance.rough)
-        prior = replace(VehiclePrior.of(self.vehicle, tolerance), soft_bounds=self.prior.soft_bounds)
-        return Posterior(self.runs, self.vehicle, tolerance, self.start_vehicle, prior, self.readings)
-
-    @property
-    def may_be_rough(self) -> bool:
-        """Whether a rough file's numbers would be more uncertain than these are taken to be."""
-        return self.tolerance.numbers < self.tolerance.rough
+    def simulated_finely(self) -> Posterior:
+        """The posterior with runs simulated as finely as what is reported."""
+        return Posterior(SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)), self.vehicle, self.tolerance,
+                         self.start_vehicle, self.prior, self.readings)
 
     def with_rounding_at(self, state: State) -> Posterior:
         """The posterior with rounded readings taken for bounds, given the predictions of a state; itself where rounding

@@ -40,7 +40,7 @@ class StandardErrors:
 def standard_errors(found: LinearModel) -> StandardErrors:
     """Standard errors of a fitted model, with the priors: a number of the car that the runs say nothing of is as
     uncertain as before."""
-    linear, state = found.without_soft_bounds(), found.state
+    linear, state = found, found.state
     covariance = _covariance(linear)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     own, free_parameters = deviations[linear.count:], free_parameters_of(state.effects)
@@ -77,9 +77,8 @@ def _number_errors(linear: LinearModel, covariance: Array) -> NumberErrors:
 def _covariance(linear: LinearModel) -> Array:
     """Covariance of the logarithms of the car's numbers, then of the effects' numbers on their scales; infinite where
     nothing is known."""
-    state = linear.state
     linear, slopes = _without_common_scale(linear, own_slopes(linear))
-    information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
+    information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0
     scale = np.where(known, size, 1.0)

@@ -122,7 +122,7 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
     settings = EffectGrid.of([one for name, one in effects.items() if name not in obstacles])
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
-        analysis = _Analysis(settings, posteriors[0].prior.without_soft_bounds().curvature(there.logs), pool)
+        analysis = _Analysis(settings, posteriors[0].prior.precision, pool)
         parts: list[_DriveSet] = []
         if fitted is not None:
             progress("what the runs show")
@@ -175,7 +175,7 @@ class _Analysis:
         linear, changes = drive.model(), self.changes(drive)
         levels = [np.concatenate(drive.levels(run, bands)) for run, bands in zip(
             linear.posterior.runs.runs, linear.posterior.bands, strict=True)]
-        return _DriveSet(LinearisedDrives(linear.without_soft_bounds(), levels, linear.state.predictions), [changes],
+        return _DriveSet(LinearisedDrives(linear, levels, linear.state.predictions), [changes],
                          information(linear, [changes]))
 
     def of_runs(self, fitted: LinearModel) -> _DriveSet:
@@ -188,7 +188,7 @@ class _Analysis:
             [new - old for new, old in zip(one, here, strict=True)] for one in there), strict=True)]
         levels = [bands.levels(residual) for bands, residual in zip(
             posterior.bands, posterior.residuals(state), strict=True)]
-        drives = LinearisedDrives(fitted.without_soft_bounds(), levels, here)
+        drives = LinearisedDrives(fitted, levels, here)
         return _DriveSet(drives, changes, information(fitted, changes))
 
     def by_refit(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:

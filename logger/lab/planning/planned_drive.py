@@ -193,13 +193,12 @@ class Information:
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
     """Information of the runs of a linear model on effects' changes (m, n) per run."""
-    free = linear.without_soft_bounds()
-    logs, white = free.state.logs, free.whitened(changes)
+    free, white = linear, linear.whitened(changes)
     each, costs = [], []
     for size in SIZES:
         there = free.with_size(with_larger_errors(free.size, size))
-        found = there.information(logs, white)
-        found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
+        found = there.information(white)
+        found[: free.count, : free.count] -= np.diag(free.prior.precision)
         each.append(found)
         costs.append(there.occam_factor)
     return Information(np.array(each), np.array(costs))

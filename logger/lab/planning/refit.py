@@ -50,7 +50,7 @@ class LinearisedDrives:
         predictions = posterior.predict(linear.state.effects, logs, record, rough=True)
         state = replace(linear.state, logs=logs, record=record, predictions=predictions)
         fresh = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps), linear.whiteners)
-        return replace(self, linear=fresh.without_soft_bounds())
+        return replace(self, linear=fresh)
 
     def with_size(self, factors: tuple[float, float, float]) -> LinearisedDrives:
         """The drives with distance errors so many times as large."""
@@ -105,7 +105,7 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
     """The best of some steps with the same derivatives, and whether these hold."""
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
     information = np.diag(precision) + sum(
-        one.information(now.logs) - np.diag(one.prior.curvature(now.logs)) for one in models)
+        one.information() - np.diag(one.prior.precision) for one in models)
     best, predicted = now, np.inf
     for _ in range(_MOST_STEPS):
         squares, gradient = _squares(models, now, precision, start)

@@ -5,30 +5,28 @@ effect biases the car's own numbers, and adding it removes the bias; and a fit a
 more number. Solution: the car is fitted with and without the effect on all of the runs, each number comes with its
 standard error from the information matrix, and the gain in evidence bounds how probably noise would do as much.
 Evidence weighs frequencies by their noise: where it gains and the hold-out error rises, the effect does not help. The
-numbers that are written are held near those that were given; the numbers that are compared are free in both fits, so
-that the effect alone makes the difference.
+numbers are free in both fits, so that the effect alone makes the difference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit, fit_model, fit_to_the_end, own_slopes
+from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end, own_slopes
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import HoldOut, cross_validate
-from logger.lab.selection.rough_file import is_file_rough
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -42,11 +40,8 @@ BIAS_SIGMA = 2.0
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the car: nominal, refitted without the added effects, and with them, both with a normal prior; with
-    standard errors, which include the prior.
-
-    written    with the effects and soft bounds, as it is written to the vehicle's file
-    """
+    """A number of the car: nominal, refitted without the added effects, and with them; with standard errors, which
+    include the prior."""
 
     name: str
     nominal: float
@@ -54,7 +49,6 @@ class Number:
     without_standard_error: float
     found: float
     standard_error: float
-    written: float
 
     @property
     def shift(self) -> float:
@@ -87,7 +81,6 @@ class AddedEffects:
     errors                         of the numbers of vehicle and effects together
     signals                        errors of other signals than the sensor's acceleration, without and with the effects
     tolerance                      share by which the car's masses, springs and dampers may well be off
-    rough_file                     whether they turned out to be off by more, on the whole, than was thought at first
     """
 
     vehicle: Vehicle
@@ -106,8 +99,7 @@ class AddedEffects:
     unseen_before: HoldOut | None = None
     unseen_after: HoldOut | None = None
     band: ComparedBand | None = None
-    tolerance: float = 0.04
-    rough_file: bool = False
+    tolerance: float = Tolerance().share
 
     @property
     def gains(self) -> bool:
@@ -142,8 +134,7 @@ class AddedEffects:
 def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
     """The car's numbers without the effects that ``first`` added, and with all that ``last`` has; those that moved most
     first."""
-    found = [Number(one.name, one.nominal, one.without, one.without_standard_error, now.found, now.standard_error,
-                    now.written)
+    found = [Number(one.name, one.nominal, one.without, one.without_standard_error, now.found, now.standard_error)
              for one, now in zip(first.numbers, last.numbers, strict=True)]
     return sorted(found, key=lambda one: -abs(one.shift))
 
@@ -151,39 +142,28 @@ def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
 def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen], candidates: int = 1,
         near: State | None = None) -> AddedEffects:
     """Fit the vehicle, with the effects that are present, without and with those that are added; the values that these
-    have are where the fit begins, and were chosen among so many candidates. A vehicle's file that turns out to be a
-    rough one (``priors``) is taken for one.
+    have are where the fit begins, and were chosen among so many candidates.
 
     near    car and distances of a search that found the effects; the fit begins there, where that is better
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    given = posterior
     before = fit_model(posterior, posterior.start(present))
     posterior = before.posterior
     after = _fit_with_effects(posterior, before, (*before.state.effects, *added), (*present, *added), near)
-    unbounded = posterior.without_soft_bounds()
-    (base_fit, errors_before), (effect_fit, errors_after) = (
-        _fit_without_soft_bounds(unbounded, one, fitted) for one, fitted in ((before, fit), (after, fit_to_the_end)))
+    errors = standard_errors(after)
     prior, nominal = posterior.prior, posterior.vehicle
     p_value = chance_of(after.state.effects[len(before.state.effects):], before.score - after.score, posterior.freedom,
                         candidates)
-    if is_file_rough(base_fit, effect_fit, p_value < FALSE_ALARM):
-        wider = given.with_rough_file()
-        rough = add(wider, present, added, candidates, near)
-        if not wider.prior.any_beyond(np.log([one.found / one.nominal for one in rough.numbers]), UNUSUAL_SIGMA):
-            return replace(rough, rough_file=True)
-    vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
-        after.state.logs, base_fit.state.logs, effect_fit.state.logs))
+    without, found = (prior.vehicle(nominal, one.state.logs) for one in (before, after))
     numbers = tuple(
         Number(name, read(nominal, name), read(without, name), read(without, name) * float(was), read(found, name),
-               read(found, name) * float(now), read(vehicle, name))
-        for name, was, now in zip(prior.names, errors_before, errors_after, strict=True)
+               read(found, name) * float(now))
+        for name, was, now in zip(prior.names, standard_errors(before).logs, errors.logs, strict=True)
     )
-    errors = standard_errors(after)
     start, state = posterior.start(present), after.state
     return AddedEffects(
-        vehicle, errors.effects, tuple(one.effect.name for one in added), numbers,
+        found, errors.effects, tuple(one.effect.name for one in added), numbers,
         error_before=posterior.error(start), error_refitted=posterior.error(before.state),
         error_after=posterior.error(state),
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
@@ -204,10 +184,3 @@ def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple
     starts = [align(posterior, one) for one in (*places, posterior.start(nominal))]
     return fit_to_the_end(min(starts, key=lambda one: one.score))
 
-
-def _fit_without_soft_bounds(unbounded: Posterior, found: LinearModel, fitted: Callable[..., LinearModel]
-                             ) -> tuple[LinearModel, Array]:
-    """The model fitted with a normal prior of the car's numbers, and standard errors of their logarithms (p,)."""
-    if found.posterior.prior.at_soft_bounds(found.state.logs):
-        found = fitted(LinearModel(unbounded, found.state), found.numbers)
-    return found, standard_errors(found).logs

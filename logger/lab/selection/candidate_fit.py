@@ -94,7 +94,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         linear, state = LinearModel(posterior, trial.start, numbers), trial.start
     else:
         linear = base.linear.hold_fixed(trial.one.effect.replaces)
-        state = State((*base.state.effects, trial.one), posterior.prior.clip_to_soft_bounds(trial.logs),
+        state = State((*base.state.effects, trial.one), trial.logs,
                       linear.state.record, linear.size, [])
     state = optimise_numbers(linear, state, free_parameters_of(state.effects))
     return CandidateFit.of(score, relinearise(posterior, state, linear.numbers, score))

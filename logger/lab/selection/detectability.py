@@ -55,8 +55,8 @@ class _Sensitivity:
     """Expected significance of effects added to a fitted model."""
 
     def __init__(self, found: LinearModel) -> None:
-        self._linear, self._state = found.without_soft_bounds(), found.state
-        self._covariance = np.linalg.inv(self._linear.information(self._state.logs))
+        self._linear, self._state = found, found.state
+        self._covariance = np.linalg.inv(self._linear.information())
         self._here = self._predictions(self._state.effects)
 
     def judge(self, effect: Effect) -> Undetectable:

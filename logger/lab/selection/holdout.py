@@ -60,7 +60,7 @@ def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> H
                    for some in (columns, residuals))
     sets = [folds(run) for run in posterior.runs.runs]
     own_count = len(columns[0]) - linear.count
-    prior = np.concatenate([posterior.prior.curvature(state.logs)[: linear.count], np.zeros(own_count)])
+    prior = np.concatenate([posterior.prior.precision[: linear.count], np.zeros(own_count)])
     prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
     unseen = [one.copy() for one in residuals]
     for fold in range(_FOLDS):

@@ -56,7 +56,7 @@ class _Quadratic:
         """The quadratic of a linearised model."""
         state = linear.state
         here = linear.fit_record_errors(state.predictions)
-        covariance = np.asarray(np.linalg.inv(linear.information(state.logs)), float)
+        covariance = np.asarray(np.linalg.inv(linear.information()), float)
         gradient = linear.gradient(here.residuals, state.logs)
         step = covariance @ gradient
         return _Quadratic(linear, here.residuals, covariance, step,
@@ -70,26 +70,22 @@ class Baseline:
     score            minus twice the log of its evidence
     explanation      gain of a full explanation of the residuals
     rough            predictions of a rough simulation, for comparison with others
-    quadratics       with the soft bounds of the prior and, where a number is beyond them, also without: a car that is
-                     held there hides what effects do
+    quadratic        of its objective
     trend_removed    whether start and scale errors of the distances are taken to be 0
     """
 
     score: float
     explanation: float
     rough: list[Array]
-    quadratics: tuple[_Quadratic, ...]
+    quadratic: _Quadratic
     trend_removed: bool = False
 
     @staticmethod
     def of(linear: LinearModel, trend_removed: bool = False) -> Baseline:
         """The baseline of a linearised model."""
         state = linear.state
-        quadratics = [_Quadratic.of(linear)]
-        if linear.prior.at_soft_bounds(state.logs):
-            quadratics.append(_Quadratic.of(linear.without_soft_bounds()))
         return Baseline(linear.score, gain_of_full_explanation(linear.posterior, state),
-                        _rough_predictions(linear, state.effects, state.logs), tuple(quadratics), trend_removed)
+                        _rough_predictions(linear, state.effects, state.logs), _Quadratic.of(linear), trend_removed)
 
     @property
     def posterior(self) -> Posterior:
@@ -99,7 +95,7 @@ class Baseline:
     @property
     def linear(self) -> LinearModel:
         """The model linearised at its state."""
-        return self.quadratics[0].linear
+        return self.quadratic.linear
 
     @property
     def state(self) -> State:
@@ -110,12 +106,6 @@ class Baseline:
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
         return cross_validate(self.linear, own_slopes(self.linear))
-
-    def gain(self, objective: float, logs: Array, linear: LinearModel) -> float:
-        """This model's objective minus another, which was found under the prior of ``linear`` at these numbers of the
-        car (p,), in terms of this model's prior."""
-        bounds_cost = self.posterior.prior.cost(logs) - linear.prior.cost(logs)
-        return self.quadratics[0].objective - objective - bounds_cost
 
 
 def without_distance_trend(base: Baseline) -> Baseline:
@@ -197,16 +187,12 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     if known:  # the fitted values of the car's own numbers are a trial as well
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
-    nominal = np.zeros_like(base.state.logs)
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
     shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.is_free)
         one = chosen(effect, values)
-        ways = ([_trial_at_values(base, one, base.state.logs)] if effect.replaces else
-                _trials_at_best_strength(base, one))
-        if len(base.quadratics) > 1:  # numbers that already imitate an effect say little of it
-            ways.append(_trial_at_values(base, one, nominal))
+        ways = [_trial_at_values(base, one) if effect.replaces else _trial_at_best_strength(base, one)]
         if realigns and values is not trials[0]:
             ways.append(_realigned_trial(base, one, ways[0]))
         trial = max(ways, key=lambda trial: trial.gain)
@@ -237,7 +223,7 @@ def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment, falls: i
             one = chosen(effect, values)
             delay_s = 0.0 if timed else _delay_s(one)
             earlier = (chosen(TIME_OFFSET, {"delay_s": -delay_s}),) if delay_s else ()
-            tried.append((_trial_at_values(base, one, base.state.logs, earlier), delay_s))
+            tried.append((_trial_at_values(base, one, earlier), delay_s))
             last = [trial.gain for trial, _ in tried[-falls - 1 :]]
             if len(last) > falls and all(later < before for before, later in pairwise(last)):
                 break
@@ -261,8 +247,7 @@ def _begun_earlier(base: Baseline, trial: Trial, farther: Sequence[Array]) -> Tr
     run more."""
     posterior, state = base.posterior, base.state
     record = [k + more for k, more in zip(state.record, farther, strict=True)]
-    logs = posterior.prior.clip_to_soft_bounds(trial.logs)
-    return replace(trial, start=posterior.state_at((*state.effects, trial.one), logs, record, state.size))
+    return replace(trial, start=posterior.state_at((*state.effects, trial.one), trial.logs, record, state.size))
 
 
 def _optima(trials: Sequence[Trial]) -> list[Trial]:
@@ -278,16 +263,11 @@ def _rough_predictions(linear: LinearModel, effects: Sequence[Chosen], logs: Arr
     return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
 
 
-def _trials_at_best_strength(base: Baseline, one: Chosen) -> list[Trial]:
-    """The trial at its best strength, by each quadratic of the baseline."""
-    there = _rough_predictions(base.linear, (*base.state.effects, one), base.state.logs)
+def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
+    """The trial at its best strength."""
+    linear, quadratic = base.linear, base.quadratic
+    there = _rough_predictions(linear, (*base.state.effects, one), base.state.logs)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
-    return [_trial(base, quadratic, one, change) for quadratic in base.quadratics]
-
-
-def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Array]) -> Trial:
-    """The trial at its best strength, by a quadratic."""
-    linear = quadratic.linear
     white = linear.whitened(change)
     here = base.state.logs + quadratic.newton_step
     mixed, own = linear.cross_products(white)
@@ -299,46 +279,53 @@ def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Arra
     def at(share: float, values: Chosen) -> Trial:
         logs = here - share * absorbed
         objective = quadratic.objective - 2 * share * along + share**2 * own
-        return Trial(values, base.gain(objective, logs, linear), logs, change)
+        return Trial(values, quadratic.objective - objective, logs, change)
 
     if not own > 0:
         return Trial(one, 0.0, here, change)
     strongest = _STRONGEST_SHIFT if one.effect.realigns else _STRONGEST
-    strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
+    weakest = -strongest if one.effect.realigns or _goes_both_ways(one.effect) else _WEAKEST
+    strength = float(np.clip(along / own, weakest, strongest))
     scaled = scale_strength(one, strength)
     if scaled is None:
         return at(1.0, one)
     if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
         return at(strength, scaled)
     # A resonance half as strong has another frequency, and its change may be of another shape.
-    return max((_with_predicted_gain(base, linear, trial) for trial in (at(strength, scaled), at(1.0, one))),
+    return max((_with_predicted_gain(base, trial) for trial in (at(strength, scaled), at(1.0, one))),
                key=lambda trial: trial.gain)
 
 
-def _with_predicted_gain(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
+def _goes_both_ways(effect: Effect) -> bool:
+    """Whether an effect's first strength may have either sign."""
+    first = next((one for one in effect.parameters if one.null is not None and one.is_free), None)
+    return first is not None and first.scale is Scale.LINEAR and first.low < 0 == first.null
+
+
+def _with_predicted_gain(base: Baseline, trial: Trial) -> Trial:
     """The trial with the gain of a full prediction, the car's numbers to first order."""
-    state = base.state
+    state, linear = base.state, base.linear
     there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
     step = trial.logs - state.logs
     moved_there = [one + step @ columns for one, columns in zip(there, linear.numbers or (), strict=True)]
-    return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
+    return replace(trial, gain=base.quadratic.objective - linear.objective(moved_there, trial.logs))
 
 
-def _trial_at_values(base: Baseline, one: Chosen, logs: Array, besides: tuple[Chosen, ...] = ()) -> Trial:
-    """The trial at its own values, in a car with these numbers (p,), which then take one Newton step; those that the
-    effect sets are held at their nominal values.
+def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = ()) -> Trial:
+    """The trial at its own values; the car's numbers take one Newton step, and those that the effect sets are held at
+    their nominal values.
 
     besides    what else differs
     """
-    linear = base.quadratics[-1].linear.hold_fixed(one.effect.replaces)
-    logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
+    linear = base.linear.hold_fixed(one.effect.replaces)
+    logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, base.state.logs)
     there = _rough_predictions(linear, (*base.state.effects, one, *besides), logs)
     found = linear.fit_record_errors(there)
     gradient = linear.gradient(found.residuals, logs)
-    step = np.linalg.solve(linear.information(logs), gradient)
+    step = np.linalg.solve(linear.information(), gradient)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
     objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)
-    return Trial(one, base.gain(objective, logs + step, linear), logs + step, change)
+    return Trial(one, base.quadratic.objective - objective, logs + step, change)
 
 
 def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:

@@ -92,7 +92,7 @@ class SameRoad:
         known = VehiclePrior.of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
         self.prior = VehiclePrior(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
-                                  known.steps[kept], soft_bounds=False)
+                                  known.steps[kept])
         self.start_vehicle = self.prior.logs(self.vehicle, start_vehicle)
         structure = compose(start_vehicle).structure
         self._behind_m = np.unique(structure.behind_m)

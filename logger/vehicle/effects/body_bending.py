@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale
+from logger.vehicle.effect import BodyEffect, Parameter, Scale, resonances_hz
 from logger.vehicle.structure import Structure, hung
 
 # What the ends of the suspensions move by, over the sensor, where the axles are near the nodes: nothing to speak of.
@@ -24,10 +24,9 @@ class BodyBending(BodyEffect):
     name = "body_bending"
     title = "first bending mode of the body"
     parameters = (
-        Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, (12.0, 16.0, 21.0, 27.0, 33.0, 40.0),
-                  "of the mode"),
-        Parameter("damping_ratio", 0.04, 0.003, 0.5, None, Scale.LOG, (0.04,), "of the mode"),
-        Parameter("participation", 0.5, -10.0, 10.0, 0.0, Scale.LINEAR, (-0.5, 0.5),
+        Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, resonances_hz(11.0, 42.0, 0.05), "of the mode"),
+        Parameter("damping_ratio", 0.04, 0.003, 0.5, None, Scale.LOG, (0.05,), "of the mode"),
+        Parameter("participation", 0.5, -10.0, 10.0, 0.0, Scale.LINEAR, (0.5,),
                   "how strongly the axles' forces drive the mode at the sensor"),
         Parameter("ends_move", 0.0, 0.0, 1.0, None, Scale.LINEAR, (0.0, 1.0),
                   "whether the ends of the suspensions move with the mode (1), or the sensor alone (0)",

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, resonances_hz
 
 Complex = npt.NDArray[np.complex128]
 
@@ -20,13 +20,19 @@ class SensorMountResonance(SensorEffect):
     title = "the bracket or console under the sensor resonates"
     parameters = (
         Parameter("frequency_hz", 25.0, 2.0, 400.0, float("inf"), Scale.RECIPROCAL,
-                  (12.0, 16.0, 21.0, 27.0, 33.0, 40.0, 60.0), "natural frequency of the sensor on its bracket"),
+                  (11.0, 60.0), "natural frequency of the sensor on its bracket"),
         Parameter("damping_ratio", 0.08, 0.002, 1.5, None, Scale.LOG, (0.05, 0.25), "of the bracket"),
     )
     source = "C. M. Harris, A. G. Piersol, Shock and Vibration Handbook (2002), chapter 2: transmissibility"
     signature = "a peak at a frequency that no part of the car has, at every speed and on every road"
     shown_by = "drive a rough road at two speeds, and knock on the console while the car stands"
     stage = 1
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        """Of each damping, frequencies as near to each other as such a resonance is wide."""
+        frequency, damping = self.parameters
+        return [{"frequency_hz": frequency_hz, "damping_ratio": ratio} for ratio in damping.trials
+                for frequency_hz in resonances_hz(frequency.trials[0], frequency.trials[-1], ratio)]
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         omega = 2 * np.pi * p.frequency_hz

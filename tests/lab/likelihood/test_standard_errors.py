@@ -88,8 +88,8 @@ def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
 def test_errors_are_the_roots_of_the_inverse_information_whatever_the_units() -> None:
     """A cubic stiffness of 1e6 beside a ratio of 1: the plain inverse is right too, where it is well enough scaled."""
     (tires,), deviations = errors_of(found())
-    linear, state = found().without_soft_bounds(), found().state
-    information = linear.information(state.logs)
+    linear = found()
+    information = linear.information()
     alone = np.sqrt(np.diag(np.linalg.inv(information)))
     assert (deviations >= alone * (1 - 1e-9)).all()
     assert (deviations < 1.5 * alone).all()

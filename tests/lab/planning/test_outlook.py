@@ -57,13 +57,13 @@ def planned(noise_mps2: float, speed_mps: float = 12.0) -> PlannedDrive:
     road = Track(0.05, iso8608.generate(256, 150.0, 0.05, seed=2))
     vehicle = read_vehicle(vehicle_file("rav4-2009"))
     count = len(VehiclePrior.of(vehicle, Tolerance()).names)
-    there = PlannedCar(vehicle, vehicle, Tolerance(), (), np.zeros(count))
+    there = PlannedCar(vehicle, vehicle, Tolerance(numbers=0.025), (), np.zeros(count))
     return PlannedDrive(at_speed("planned", road, vehicle, speed_mps), there, SensorNoise(noise_mps2))
 
 
 def of_drive(drive: PlannedDrive, settings: EffectGrid) -> Array:
     changes = np.array([drive.change(one) for one in settings.columns])
-    precision = drive.posterior.prior.without_soft_bounds().curvature(np.zeros(13))
+    precision = drive.posterior.prior.precision
     total = drive.information(changes, ())
     return outlook(settings, total, precision, representatives(settings, total, precision)).detectability
 

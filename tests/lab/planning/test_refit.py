@@ -13,7 +13,7 @@ from .test_outlook import planned
 
 
 def there_of(drive: PlannedDrive) -> LinearisedDrives:
-    linear = drive.model().without_soft_bounds()
+    linear = drive.model()
     levels = [np.concatenate(drive.levels(drive.run, bands)) for bands in linear.posterior.bands]
     return LinearisedDrives(linear, levels, linear.state.predictions)
 
@@ -25,7 +25,7 @@ def change_of(drive: PlannedDrive, logs: Array) -> Array:
 
 
 def precision_of(drive: PlannedDrive) -> Array:
-    return drive.posterior.prior.without_soft_bounds().curvature(np.zeros(13))
+    return drive.posterior.prior.precision
 
 
 @pytest.mark.parametrize("number", ["front.tire_stiffness_n_per_m", "sprung_mass_kg"])
@@ -37,19 +37,19 @@ def test_a_car_with_other_numbers_leaves_no_more_than_what_its_prior_costs(numbe
     gain = refitted_gain([there_of(drive)], [[change]], precision)
     costs = float(precision @ logs**2)
     assert 0 < gain < 1.01 * costs
-    linear = drive.model().without_soft_bounds()
+    linear = drive.model()
     white = linear.whitened([change])
     mixed, own = linear.cross_products(white)
-    first_order = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
+    first_order = own - float(mixed @ np.linalg.solve(linear.information(), mixed))
     assert first_order > 1.3 * gain
 
 
 def test_what_is_small_leaves_what_first_order_says() -> None:
     drive, rng = planned(0.5), np.random.default_rng(4)
     change = 0.01 * rng.standard_normal(drive.run.count)
-    linear = drive.model().without_soft_bounds()
+    linear = drive.model()
     mixed, own = linear.cross_products(linear.whitened([change]))
-    expected = own - float(mixed @ np.linalg.solve(linear.information(np.zeros(13)), mixed))
+    expected = own - float(mixed @ np.linalg.solve(linear.information(), mixed))
     assert refitted_gain([there_of(drive)], [[change]], precision_of(drive)) == pytest.approx(expected, rel=0.05)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from logger.api.bench import tolerance_of
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, add, moved_between
 from logger.lab.selection.candidate_fit import chance_of
@@ -55,7 +56,7 @@ def test_where_a_search_ended_changes_nothing_of_where_the_fit_ends(runs: Simula
 def test_each_error_is_less_than_the_one_before_and_the_last_is_hardly_more_than_noise(added: AddedEffects) -> None:
     assert added.error_before > added.error_refitted > added.error_as_written >= added.error_after
     assert added.error_after == pytest.approx(added.noise_floor_error, rel=0.05)
-    assert not added.rough_file and added.tolerance == pytest.approx(0.04)
+    assert added.tolerance == pytest.approx(0.04)
 
 
 def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedRuns, added: AddedEffects) -> None:
@@ -87,18 +88,17 @@ def test_numbers_that_the_missing_effect_had_biased_are_right_with_it(added: Add
     assert shifts == sorted(shifts, reverse=True) and {*added.moved} == {*added.numbers}
 
 
-def test_what_is_written_is_the_vehicle_that_holds_on_to_what_was_given(added: AddedEffects) -> None:
+def test_the_vehicle_that_is_written_has_the_numbers_that_were_found(added: AddedEffects) -> None:
     for one in added.numbers:
-        assert one.nominal == read(CAR, one.name) and one.written == read(added.vehicle, one.name)
-        assert abs(one.written / one.nominal - 1) < 0.08
+        assert one.nominal == read(CAR, one.name) and one.found == read(added.vehicle, one.name)
+        assert abs(one.found / one.nominal - 1) < 0.08
 
 
 @pytest.mark.slow
 def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends(runs: SimulatedRuns) -> None:
     found = add(posterior_of(runs), [], [chosen(EFFECTS["wheel_lift"], {})])
-    assert any(abs(one.written - one.found) > 2 * one.standard_error for one in found.numbers)  # it was held
     assert not found.helps and not any(one.biased for one in found.moved)
-    assert found.error_after == pytest.approx(found.error_refitted, rel=0.005)
+    assert found.error_after == pytest.approx(found.error_refitted, rel=0.03)
 
 
 @pytest.mark.slow
@@ -121,29 +121,29 @@ def test_distances_are_reported_only_where_they_are_off_by_more_than_usual(runs:
 
 
 def test_a_shift_counts_standard_errors() -> None:
-    number = Number("sprung_mass_kg", 875.0, 900.0, 9.0, 880.0, 8.0, 878.0)
+    number = Number("sprung_mass_kg", 875.0, 900.0, 9.0, 880.0, 8.0)
     assert number.shift == -2.5 and number.biased
     assert not replace(number, without=880.0 + 8.0 * BIAS_SIGMA).biased
     assert replace(number, standard_error=0.0).shift == 0
 
 
 def test_between_first_and_last_numbers_move_from_without_any_to_with_all(added: AddedEffects) -> None:
-    later = replace(added, numbers=tuple(replace(one, found=1.1 * one.found, written=0.0, without=0.0)
+    later = replace(added, numbers=tuple(replace(one, found=1.1 * one.found, without=0.0)
                                          for one in added.numbers))
     between = {one.name: one for one in moved_between(added, later)}
     for one, now in zip(added.numbers, later.numbers, strict=True):
         found = between[one.name]
-        assert (found.without, found.found, found.written) == (one.without, now.found, now.written)
+        assert (found.without, found.found) == (one.without, now.found)
 
 
 @pytest.mark.slow
-def test_what_numbers_of_a_rough_file_do_as_well_is_no_effect() -> None:
-    """With this file, tires that damp explain so much that the numbers left to them are not off on the whole."""
+def test_what_numbers_of_a_file_known_to_a_fifth_do_as_well_is_no_effect() -> None:
+    """With this file, tires that damp do what its numbers do: an effect only for whom says that they are right."""
     runs, tires = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0), [hidden("tire_damping")]
-    found = add(posterior_of(runs), [], tires)
-    assert found.rough_file and found.tolerance == pytest.approx(0.1) and not found.helps
+    found = add(posterior_of(runs, tolerance=Tolerance()), [], tires)
+    assert found.tolerance == pytest.approx(0.2) and not found.helps
     held = add(posterior_of(runs, tolerance=tolerance_of(0.04)), [], tires)
-    assert not held.rough_file and held.tolerance == pytest.approx(0.04) and held.helps
+    assert held.tolerance == pytest.approx(0.04) and held.helps
 
 
 @pytest.mark.slow
@@ -151,15 +151,13 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     friction, offset = hidden("dry_friction", friction_force_n=90.0), hidden("sensor_offset", offset_m=OFFSET_M)
     runs = secret_runs([friction, offset], lasts_s=20.0)
     first = add(posterior_of(runs), [], [friction])
-    bent = max(abs(one.written / one.nominal - 1) for one in first.numbers)
-    assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to its prior
-    assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
+    bent = max(abs(one.found / one.nominal - 1) for one in first.numbers)  # the missing offset pulls at the car
     second = add(posterior_of(runs, start_vehicle=first.vehicle), first.effects, [offset])
     assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)
     found = {one.effect.name: one for one in second.effects}
     assert found["sensor_offset"].values["offset_m"] == pytest.approx(OFFSET_M, rel=0.08)
     assert found["dry_friction"].values["friction_force_n"] == pytest.approx(90.0, rel=0.08)
-    assert max(abs(one.written / one.nominal - 1) for one in second.numbers) < bent
+    assert max(abs(one.found / one.nominal - 1) for one in second.numbers) < bent
 
 
 @pytest.mark.slow

@@ -36,10 +36,8 @@ def fitted(posterior: Posterior) -> Baseline:
 
 @pytest.fixture(scope="module")
 def slight() -> Baseline:
-    """A plain car beside loud runs with a sensor that sits ahead, which do not bend it to the wall."""
-    found = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], noise_mps2=0.5)))
-    assert not found.posterior.prior.at_soft_bounds(found.state.logs)
-    return found
+    """A plain car beside loud runs with a sensor that sits ahead."""
+    return fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], noise_mps2=0.5)))
 
 
 @pytest.mark.parametrize("name", ["sensor_offset", "tire_damping", "payload"])
@@ -74,9 +72,8 @@ def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight
 
 
 @pytest.mark.slow
-def test_a_car_that_is_bent_to_the_wall_does_not_hide_what_bends_it() -> None:
+def test_a_car_that_was_bent_does_not_hide_what_bends_it() -> None:
     base = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)])))
-    assert base.posterior.prior.at_soft_bounds(base.state.logs)
     found = screen(base, EFFECTS["sensor_offset"], [STILL])
     assert found.gain > 500
     fine = refine(base.score, fit_roughly(base.score, base, found)[0])
@@ -171,14 +168,15 @@ def test_an_effect_that_is_there_or_not_has_no_half() -> None:
     assert scale_strength(hidden("tire_enveloping", contact_patch_m=0.2), 0.5) is None
 
 
-def test_a_sharp_resonance_promises_something_only_where_it_is() -> None:
-    """Between two of the places at which it is tried; an effect with the same numbers has found the place."""
-    sharp = hidden("sensor_mount_resonance", frequency_hz=18.2, damping_ratio=0.03)
-    base = fitted(posterior_of(secret_runs([sharp])))
+@pytest.mark.parametrize(("frequency_hz", "damping_ratio"), [(14.2, 0.057), (18.2, 0.03), (29.0, 0.05)])
+def test_a_sharp_resonance_promises_most_of_its_gain_wherever_it_is(frequency_hz: float, damping_ratio: float) -> None:
+    """Between two of the frequencies at which it is tried, too."""
+    sharp = hidden("sensor_mount_resonance", frequency_hz=frequency_hz, damping_ratio=damping_ratio)
+    base = fitted(posterior_of(secret_runs([sharp], noise_mps2=0.2)))
     alone = screen(base, sharp.effect, [STILL])
-    near = screen(base, sharp.effect, [STILL], {"frequency_hz": 18.2, "damping_ratio": 0.03, "participation": -1.0})
-    assert near.gain > 1.5 * alone.gain
-    assert near.trials[0].one.values == pytest.approx({"frequency_hz": 18.2, "damping_ratio": 0.03}, rel=0.05)
+    near = screen(base, sharp.effect, [STILL], sharp.values)
+    assert alone.gain > 0.5 * near.gain > 50
+    assert near.trials[0].one.values == pytest.approx(dict(sharp.values), rel=0.05)
 
 
 def test_numbers_that_are_shared_stay_inside_the_range_of_the_effect_that_takes_them() -> None:

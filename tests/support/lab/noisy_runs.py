@@ -29,7 +29,7 @@ def tire_damping(value: float) -> Chosen:
 
 def posterior_of(runs: Sequence[Run]) -> Posterior:
     """With the usual tolerance."""
-    return Posterior(SimulatedRuns(runs, FINE_HZ), CAR, Tolerance())
+    return Posterior(SimulatedRuns(runs, FINE_HZ), CAR, Tolerance(numbers=0.025))
 
 
 def still_runs(lasts_s: float = 16.0, speeds_mps: Sequence[float] = (8.0, 14.0)) -> list[Run]:
