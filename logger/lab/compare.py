@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.map_fit import fit_model
+from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_with_rounding
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
@@ -26,6 +27,8 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
+from logger.lab.selection.holdout import cross_validate
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
@@ -62,6 +65,8 @@ class Comparison:
     refitted    with its numbers and the distances refitted under their priors
     moves       relative change of each number of the car, and of its effects, by the refit
     far         numbers of the car whose change is unusual under their prior, the largest first
+    steps       the model as it stands and refitted, with their errors on what no fit saw
+    floor       the error that the sensor's noise alone makes
     removed     sensor drift, distance error and filtering, which are removed from the error before it is judged
     tests       of the residuals of the refitted model, without the drift of its sensors
     """
@@ -72,6 +77,8 @@ class Comparison:
     refitted: Standing
     moves: Mapping[str, float]
     far: tuple[str, ...]
+    steps: tuple[Step, ...]
+    floor: float
     removed: Removed
     tests: ResidualTestResults
 
@@ -104,8 +111,7 @@ class Comparison:
 
 def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
             tolerance: Tolerance | None = None) -> Comparison:
-    """Compare a vehicle and its effects, with the values they have, with runs of one sample rate. Where the refitted
-    model is no better than the plain one, that is the refitted one as well.
+    """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
 
     given        the vehicle before any fit, if it has been refitted: the mean of the prior
     tolerance    standard deviations of the priors; None: the usual ones
@@ -118,12 +124,6 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     names = posterior.prior.names
     linear = fit_model(posterior, posterior.start(effects))
     state = linear.state
-    if posterior.error(state) > plain.error:
-        # The fit weights frequencies by their noise: a gain at high ones may outweigh a loss at body bounce.
-        state = posterior.start(effects)
-        removed = removed_from(posterior, state.predictions, state)
-        return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), removed,
-                          _tests(plain, removed, plain))
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
     removed = removed_from(posterior, plain.residuals.predictions, state)
@@ -133,6 +133,8 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
                       tuple(posterior.prior.beyond(state.logs, standard_errors(linear).logs)),
+                      (Step(AS_FILED, plain.error), Step(REFITTED, cross_validate(linear).error)),
+                      floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
                       removed, _tests(refitted, removed, plain))
 
 

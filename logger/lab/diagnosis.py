@@ -36,6 +36,7 @@ from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
@@ -56,7 +57,7 @@ LAID_BY_THE_ROAD = ("it only shifts the record, and these runs were laid where t
 class Candidate:
     """An effect that was tried.
 
-    error                  hold-out error of the model with it
+    error                  on stretches that no fit saw, of the refitted model with it alone
     p_value                probability, at most, that noise alone gains as much with any of the candidates
     gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on held-out stretches
     confused_with          effects that explain the same as well
@@ -72,14 +73,6 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """A model of the search: what was done, and its hold-out error."""
-
-    words: str
-    error: float
-
-
-@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result of a diagnosis.
 
@@ -88,8 +81,8 @@ class Diagnosis:
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
     noise                of the sensors, their rounding in it
-    candidates           missing effects first, with their final values; then the others of the first round, the
-                         largest gain first
+    candidates           missing effects first, with their final values; then the others of the first round that are
+                         better than the refitted model, the least probable by chance first
     obstacles            effects that could not be tried, and why
     verdict              names of the effects that the model lacks, the most certain first
     excess               share by which the residual is above the noise in the run where it is largest
@@ -103,6 +96,7 @@ class Diagnosis:
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
     tolerance            share by which the car's masses, springs and dampers may well be off
+    no_better            names of the other effects that were tried
     """
 
     runs: tuple[str, ...]
@@ -126,6 +120,7 @@ class Diagnosis:
     car: FittedCar | None = None
     coloured: bool = False
     tolerance: float = Tolerance().share
+    no_better: tuple[str, ...] = ()
 
     @property
     def exceeds_noise(self) -> bool:
@@ -210,7 +205,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         # A colour is known in the bands that are compared: what all of the noise makes is no more than what is left.
         noise_floor_error=floor_error(fine, noise) if colour is None else min(floor_error(fine, noise),
                                                                                fine.error(state)),
-        candidates=_candidates(selection, state, len(tried)),
+        candidates=(found := _candidates(selection, state, len(tried)))[0], no_better=found[1],
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         conflicts=fine.prior.beyond(state.logs, errors.logs), steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
@@ -242,9 +237,9 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 
 
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
-    """The model that was found, fitted by fine simulations with a normal prior, so that conflicts with it show. Effects
-    that are at an end of their range then are dropped, and those that are not unusually far from doing nothing: they
-    gained because numbers of the car were held at their soft bounds, and do what these numbers may do as well."""
+    """The model that was found, fitted by fine simulations. Effects that are at an end of their range then are dropped,
+    and those that are not unusually far from doing nothing: they made up for the roughness of the search's simulations
+    (a delay beside dry friction, whose force comes part of a step late)."""
     search.progress("fitting it finely")
     fine = selection.before.posterior.simulated_finely()
     while True:
@@ -263,8 +258,7 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
     """The models of the search in order."""
-    steps = [Step("the vehicle as its file says", nominal_error),
-             Step("its numbers refitted", selection.before.hold_out.error)]
+    steps = [Step(AS_FILED, nominal_error), Step(REFITTED, selection.before.hold_out.error)]
     steps += [Step(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
     if selection.now.hold_out is not last:
@@ -272,15 +266,17 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def _candidates(selection: Selection, after: State, count: int) -> tuple[Candidate, ...]:
-    """All candidates: the missing effects, then the others, the least likely by chance first."""
+def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+    """The missing effects, then the others that are better than the refitted model, the least likely by chance first,
+    each with its error on top of that model; and the names of those that are no better."""
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
     before = selection.before.hold_out
     stages, freedom = dict(selection.steps), selection.before.posterior.freedom
+    alone = {one.effect.name: one.hold_out for one in selection.first.fits}
     found = []
     for name, gain in selection.gains.items():
-        there = stages.get(name) or selection.now.hold_out
+        there = alone.get(name) or stages.get(name) or selection.now.hold_out
         by_chance = chance_of([Chosen(effects[name], values[name])], gain, freedom, count)
         found.append(Candidate(effects[name], values[name], there.error, by_chance, gain,
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
@@ -288,7 +284,9 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
     others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
                if one.effect.name not in selection.gains]
-    return (*found, *sorted(others, key=lambda one: (one.p_value, -one.gain)))
+    better = [one for one in others if one.gain > 0 and one.error < before.error]
+    return ((*found, *sorted(better, key=lambda one: (one.p_value, -one.gain))),
+            tuple(one.effect.name for one in others if one not in better))
 
 
 def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:

@@ -22,6 +22,7 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
+_PERFECT = 1 - 1e-9  # of a run that the model repeats to roundings
 _MOST_LAG_S = 1.0
 """The right road correlates within this lag: a late clock, or a place that is metres off. A judgement."""
 
@@ -47,9 +48,10 @@ class RoadMatch:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the road is another one: its correlation would have been significant, and the run's is not, with
-        either sign."""
-        return max(self.correlation, self.turned) < self.chance < self.expected
+        """Whether the road is another one: the run correlates less than with the right road, which stands out from what
+        comes by chance in the mean, and no more than by chance, with either sign."""
+        return (max(self.correlation, self.turned) < min(self.chance, self.expected)
+                and self.mean_chance < self.expected)
 
     @property
     def is_clear(self) -> bool:
@@ -59,8 +61,11 @@ class RoadMatch:
     @property
     def is_upside_down(self) -> bool:
         """Whether the run clearly correlates with reversed sign, by much more than as it is: a bounce half a period
-        later correlates with reversed sign as well."""
-        return self.is_clear and self.turned - self.correlation > self.chance - self.mean_chance
+        later correlates with reversed sign as well. On the scale on which correlations scatter alike, however large
+        they are (R. A. Fisher, Metron 1, 1921)."""
+        turned, correlation, chance, mean_chance = np.arctanh(np.clip(
+            [self.turned, self.correlation, self.chance, self.mean_chance], -_PERFECT, _PERFECT))
+        return bool(self.is_clear and turned - correlation > chance - mean_chance)
 
 
 def pool(matches: Sequence[RoadMatch]) -> RoadMatch:

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
+from logger.lab.selection.error_scale import JUDGED_ON
 from logger.report.band_text import band_json
+from logger.report.error_scale_text import error_words, errors_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
 
@@ -18,8 +20,8 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
     """The error before, after and of the noise: which of them, the error, and what it is of."""
     return [
         ("before", found.error_before, "as the file says, distances as recorded: where ridelog compare begins"),
-        ("", found.error_refitted, "the car's numbers and distances refitted within their tolerance"),
-        ("after", found.error_after, f"with {' and '.join(found.names)}, all refitted in the same way"),
+        ("", found.error_refitted, f"its numbers and the distances refitted within their tolerance, on {JUDGED_ON}"),
+        ("after", found.error_after, f"with {' and '.join(found.names)}, all refitted and judged in the same way"),
         ("", found.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
         ("of noise", found.noise_floor_error, "about, from the sensor's noise alone"),
     ]
@@ -39,10 +41,11 @@ def judgement(found: AddedEffects) -> list[str]:
             lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
     if found.helps:
         lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
-    elif found.gains and found.unseen_before is not None and found.unseen_after is not None:
+        lines += error_words(found.steps, found.noise_floor_error)[1:]
+    elif found.gains:
         lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but on stretches "
-                     f"that no fit saw the error rises from {found.unseen_before.error:.4f} to "
-                     f"{found.unseen_after.error:.4f}: it imitates something else.")
+                     f"that no fit saw the error rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and "
+                     "so does what is weighed by its noise: it imitates something else.")
     else:
         lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
                      f"{chance(found.p_value)}; these runs are no reason to keep it.")
@@ -91,8 +94,8 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
-        **({} if found.unseen_before is None or found.unseen_after is None else {
-            "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error}),
+        "error_unseen_before": found.error_refitted, "error_unseen_after": found.error_after,
+        **errors_json(found.steps, found.noise_floor_error),
         **band_json(found.band), **removed_json(found.removed), "tolerance": found.tolerance,
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from logger.lab.compare import Comparison, Standing
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.residual_tests.tests import ResidualTestResult
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.left_out import left_out_json
 from logger.report.band_text import band_json
+from logger.report.error_scale_text import error_words, errors_json
 from logger.report.quantities import signal_errors
 from logger.report.removed_text import removed_json, removed_words
 from logger.runs import normalised_rms_error, runs_left_out
@@ -30,12 +30,13 @@ def headline(found: Comparison) -> list[str]:
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += " (and the numbers of its effects)"
-    if refitted.error < _HELPS * plain.error:
-        share = 1 - (refitted.error / plain.error) ** 2
-        lines.append(f"{refit.capitalize()}, the error is {refitted.error:.3f}: the refit removes {share:.0%} of the "
-                     "residual's power.")
+    before, after = (one.error for one in found.steps)
+    if after < _HELPS * before:
+        lines.append(f"{refit.capitalize()}, the error is {after:.3f}: the refit removes {1 - (after / before)**2:.0%} "
+                     "of the residual's power.")
     else:
-        lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
+        lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {after:.3f}.")
+    lines += error_words(found.steps, found.floor)
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
     lines += removed_words(found.removed, found.band)
@@ -45,8 +46,8 @@ def headline(found: Comparison) -> list[str]:
                      f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
-        lines.append(f"The refit moved {named}, more than {UNUSUAL_SIGMA:g} standard deviations of their tolerance. An "
-                     "effect that the model lacks biases them: do not trust these values.")
+        lines.append(f"The refit moved {named}, which is beyond their tolerance. Measure them: the vehicle's file is "
+                     "wrong there, or an effect that the model lacks biases them.")
     return lines
 
 
@@ -88,7 +89,9 @@ def as_json(found: Comparison) -> dict[str, Any]:
         **_standing_json(found.plain), **left_out_json(runs_left_out(found.plain.residuals.runs)),
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
         "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
-        "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
+        **errors_json(found.steps, found.floor),
+        "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
+                     "moves": dict(found.moves), "moved_far": list(found.far)},
         "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
         "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],

@@ -8,8 +8,9 @@ from logger.chart_data import Bars, Curves, Line
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
+from logger.lab.selection.error_scale import JUDGED_ON
 from logger.report.charts import Steps, chart, steps_figure
-from logger.report.diagnosis_text import JUDGED_ON, looks_like, summary, table, untested
+from logger.report.diagnosis_text import looks_like, summary, table, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
 from logger.report.lab_page import forces_section, spectra_section
@@ -87,7 +88,7 @@ def _candidates(found: Diagnosis) -> Html:
         (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
         (found.baseline_error, "as it stands"))
     return (chart(bars) + grid(("Effect", "Error", "p-value", "Numbers"), table(found), words=(0, 3))
-            + hint("One effect at a time on the model of its round, those that are missing first, then by p-value: how "
+            + hint("One effect at a time on the refitted model, those that are missing first, then by p-value: how "
                    "probable it is that noise looks like any of the candidates. The error is on "
                    f"{JUDGED_ON}."))
 

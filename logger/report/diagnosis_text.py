@@ -8,17 +8,17 @@ from typing import Any
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
+from logger.lab.selection.error_scale import JUDGED_ON
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.printable import percent
 from logger.report import residual_text
 from logger.report.band_text import band_json
+from logger.report.error_scale_text import error_words, errors_json
 from logger.report.quantities import chance, finite, numbers_of, signal_errors
 from logger.report.removed_text import removed_json, removed_words
 from logger.report.text_layout import enumerated
 from logger.vehicle.effect import Chosen
 
-JUDGED_ON = "stretches that no fit saw"
-"""What the errors of steps and candidates are errors of."""
 _MOST_HIDDEN = 6
 _SUSPECT = 0.1
 """An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
@@ -44,15 +44,16 @@ def summary(found: Diagnosis) -> list[str]:
                          "would are not named: they may only imitate what is missing.")
     if found.conflicts:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
-        lines.append(f"The fit needs numbers outside their tolerance: {off}. Either the vehicle's file is wrong "
-                     "there, or an effect is missing that no candidate explains.")
-    lines.append(_errors(found))
+        lines.append(f"These numbers of the vehicle's file are beyond their tolerance: {off}. Measure them: the file "
+                     "is wrong there, or an effect is missing that no candidate explains.")
+    lines += error_words(found.steps, found.noise_floor_error)
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
     lines += _faint(found)
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
-        lines.append(f"Added during the search and dropped again, because the others explain it: {', '.join(dropped)}.")
+        why = "because the others explain it" if found.verdict else "at an end of its range, or where it does nothing"
+        lines.append(f"Added during the search and dropped again, {why}: {', '.join(dropped)}.")
     return lines
 
 
@@ -106,18 +107,6 @@ def _faint(found: Diagnosis) -> list[str]:
             f"know: {nearest.effect.shown_by}."]
 
 
-def _errors(found: Diagnosis) -> str:
-    by_step = [f"{step.error:.3f} {_STEP_WORDS.get(step.words, step.words)}" for step in found.steps]
-    return (f"Error on {JUDGED_ON}: {', '.join(by_step)}. The sensor's noise alone makes about "
-            f"{found.noise_floor_error:.3f}.")
-
-
-_STEP_WORDS = {
-    "the vehicle as its file says": "as the vehicle's file says",
-    "its numbers refitted": "with its numbers refitted",
-}
-
-
 def _confusion(names: list[str], found: Diagnosis) -> str:
     """Which drive would separate effects that explain alike."""
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
@@ -158,6 +147,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
                     for name, one in found.signals.items()},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        **errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),

@@ -48,7 +48,7 @@ def page(found: Comparison) -> Html:
 def _tiles(found: Comparison) -> Html:
     residuals = found.plain.residuals
     return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
-                  ("Error after the refit", f"{found.refitted.error:.3f}", ""),
+                  ("Error after the refit", f"{found.steps[-1].error:.3f}", ""),
                   *drift_tile(found.removed),
                   ("Tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
                   ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])

@@ -6,6 +6,7 @@ from logger.lab.compare import Comparison
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.breakdown import Part
 from logger.lab.selection.add_effect import AddedEffects
+from logger.lab.selection.error_scale import fit_percent
 from logger.left_out import left_out_paragraph
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 from logger.report.comparison_text import conclusion, evidence, headline
@@ -62,10 +63,12 @@ def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:
         shown += ["", "What it looks like:", paragraphs(described, "- ")]
     rows = [("Effect", "Error", "p-value", "Numbers"), *table(found, most)]
     more = len(found.candidates) - len(rows) + 1
-    shown += ["", "One effect at a time, those of the verdict first; p-values are for all candidates together:",
-              *columns(rows)]
+    shown += ["", "One effect at a time on the refitted model, those of the verdict first; p-values are for all",
+              "candidates together:", *columns(rows)]
     if more > 0:
         shown.append(f"and {more} more (ridelog diagnose --all)")
+    if found.no_better:
+        shown.append(paragraphs([f"No better than the numbers refitted: {', '.join(found.no_better)}."]))
     if hidden := untested(found):
         shown += ["", "What these runs cannot tell:", paragraphs(hidden, "- ")]
     return shown
@@ -73,7 +76,9 @@ def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:
 
 def addition_lines(found: AddedEffects) -> list[str]:
     """What a person reads of an effect that was added."""
-    rows = [(f"Error {which}:" if which else "", f"{error:.4f}", what) for which, error, what in errors(found)]
+    rows = [("", "Error", "Fit", "")]
+    rows += [(f"Error {which}:" if which else "", f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
+             for which, error, what in errors(found)]
     return [
         paragraphs(judgement(found)), "", *columns(rows), "",
         paragraphs([bias(found.names, found.moved)]), "",

@@ -9,7 +9,9 @@ from logger.lab.diagnosis import Diagnosis
 from logger.lab.laws.learn import Law, Learning
 from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects
-from logger.report.diagnosis_text import JUDGED_ON, looks_like
+from logger.lab.selection.error_scale import Step
+from logger.report.diagnosis_text import looks_like
+from logger.report.error_scale_text import error_words, errors_json
 from logger.report.quantities import finite, measured, numbers_of, unit_of
 from logger.report.removed_text import removed_json, removed_words
 from logger.report.text_layout import paragraphs
@@ -106,18 +108,12 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
 
 
 def _errors(addition: AddedEffects) -> str:
-    before, after = addition.unseen_before, addition.unseen_after
-    unseen = "" if before is None or after is None else (
-        f"; on {JUDGED_ON} from {before.error:.3f} to {after.error:.3f}")
-    return (f"Error {addition.error_before:.3f} as the model stands, {addition.error_refitted:.3f} with its numbers "
-            f"refitted, {addition.error_after:.3f} with the law{unseen}. The sensor's noise alone makes about "
-            f"{addition.noise_floor_error:.3f}.")
+    steps = (*addition.steps[:-1], Step("with the law", addition.error_after))
+    return " ".join(error_words(steps, addition.noise_floor_error))
 
 
 def _without(diagnosis: Diagnosis) -> str:
-    return (f"Error {diagnosis.baseline_error:.3f} as the model stands, {diagnosis.final_error:.3f} with "
-            f"{' and '.join(diagnosis.verdict) or 'its numbers refitted'}. The sensor's noise alone makes about "
-            f"{diagnosis.noise_floor_error:.3f}.")
+    return " ".join(error_words(diagnosis.steps, diagnosis.noise_floor_error))
 
 
 def source_of(found: Learning, addition: AddedEffects | None) -> str:
@@ -153,14 +149,13 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             **removed_json(diagnosis.removed),
         }
     one = learned(law, addition)
-    unseen = addition.unseen_after
     return {
         "law": path, "family": law.family.name, "words": words(law, addition), "effect": law.draft.name,
         "axle": law.draft.axle or None, "parameters": dict(one.values),
         "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
         "error_refitted": addition.error_refitted, "error_after": addition.error_after,
-        "error_after_unseen": None if unseen is None else unseen.error,
-        "error_before_unseen": None if addition.unseen_before is None else addition.unseen_before.error,
+        "error_after_unseen": addition.error_after, "error_before_unseen": addition.error_refitted,
+        **errors_json(addition.steps, addition.noise_floor_error),
         "noise_floor_error": addition.noise_floor_error,
         "verdict": [other.effect.name for other in law.effects], "unexplained": found.unexplained,
         "log_likelihood_gain": law.gain / 2,

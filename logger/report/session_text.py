@@ -9,10 +9,10 @@ from logger.report.add_effect_text import bias
 
 
 def steps(story: Story) -> list[tuple[str, float]]:
-    """Models on the way, each with its error on all samples."""
+    """Models on the way, each with its error on what no fit saw."""
     start = story.rounds[0].addition if story.rounds else None
     return [("as its file says", start.error_before if start else story.first.plain.error),
-            ("numbers refitted", start.error_refitted if start else story.first.refitted.error),
+            ("numbers refitted", start.error_refitted if start else story.first.steps[-1].error),
             *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
 
 

@@ -116,16 +116,18 @@ def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
     before, refitted, after = (step.error for step in offset.steps)
     assert before == pytest.approx(offset.baseline_error, rel=1e-4)  # which is simulated finely
     assert before > refitted > 2 * after
-    assert offset.final_error <= after == offset.candidate("sensor_offset").error
+    assert offset.final_error <= after == pytest.approx(offset.candidate("sensor_offset").error, rel=0.02)
     assert after == pytest.approx(offset.noise_floor_error, rel=0.06)
 
 
-def test_all_others_are_named_the_least_probable_by_chance_first(offset: Diagnosis) -> None:
-    _, *others = offset.candidates
-    assert {one.effect.name for one in others} == {*FEW} - {"sensor_offset"}
+def test_others_are_candidates_where_they_are_better_than_the_refit_the_least_probable_by_chance_first(
+        offset: Diagnosis) -> None:
+    best, *others = offset.candidates
+    assert {*(one.effect.name for one in others), *offset.no_better} == {*FEW} - {"sensor_offset"}
     assert [one.p_value for one in others] == sorted(one.p_value for one in others)
-    best = offset.candidate("sensor_offset")
-    assert all(one.error > 2 * best.error and one.held_out_gain < best.held_out_gain for one in others)
+    refitted = offset.steps[1].error
+    assert best.error < 0.5 * refitted
+    assert all(best.error < one.error < refitted and one.held_out_gain < best.held_out_gain for one in others)
 
 
 def test_an_effect_that_is_there_is_refitted_and_not_tried() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis, Step
+from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis
 from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence
@@ -16,7 +16,8 @@ from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
-from logger.report.diagnosis_text import JUDGED_ON, as_json, looks_like, summary, table, untested
+from logger.lab.selection.error_scale import JUDGED_ON, Step
+from logger.report.diagnosis_text import as_json, looks_like, summary, table, untested
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -62,8 +63,8 @@ def shape() -> Shape:
 def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
     nothing, errors = summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
-    assert errors == ("Error on stretches that no fit saw: 0.310 as the vehicle's file says, 0.152 with its numbers "
-                      "refitted. The sensor's noise alone makes about 0.150.")
+    assert errors == ("Error on stretches that no fit saw: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit "
+                      "84.8 %) with its numbers refitted. The sensor's noise alone makes about 0.150 (fit 85.0 %).")
     assert looks_like(NOTHING) == untested(NOTHING) == []
 
 
@@ -72,7 +73,8 @@ def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() ->
     assert missing == (f"dry_friction is missing ({EFFECTS['dry_friction'].title}): friction_force_n 85 ± 4 N, "
                        "transition_velocity_m_per_s 0 m/s. The probability that noise alone looks like this, all "
                        "candidates together: below 1e-9.")
-    assert errors.endswith("0.153 with dry_friction. The sensor's noise alone makes about 0.150.")
+    assert errors.endswith("0.153 (fit 84.7 %) with dry_friction. The sensor's noise alone makes about 0.150 (fit "
+                           "85.0 %).")
 
 
 def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
@@ -96,8 +98,8 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
     found = replace(NOTHING, conflicts={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13})
     conflict, _ = summary(found)
     assert found.unexplained and not found.exceeds_noise
-    assert conflict.startswith("The fit needs numbers outside their tolerance: front.suspension_stiffness_n_per_m by "
-                               "+24%, sprung_mass_kg by -13%.")
+    assert conflict.startswith("These numbers of the vehicle's file are beyond their tolerance: "
+                               "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
 
 
 def test_distances_that_are_off_are_reported() -> None:

@@ -17,9 +17,11 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.growing_power import growing_power
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import Bands
-from logger.lab.residuals.unexplained import Shape
+from logger.lab.residuals.removed import removed_from
+from logger.lab.residuals.unexplained import Shape, shape_of
 
 Array = npt.NDArray[np.float64]
 
@@ -27,18 +29,41 @@ COLOUR = frozenset({"whiteness", "frequency"})
 """Tests of a residual that only say that it has a colour."""
 
 
-def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape, sigma: float = 2.0) -> Noise | None:
+def is_coloured_noise(posterior: Posterior, state: State) -> bool:
+    """Whether what a fitted state leaves is noise of a colour, as ``coloured_noise`` finds it."""
+    bands = posterior.bands
+    if any(not isinstance(one, Bands) for one in bands):
+        return False
+    # That hardly any of it may grow with the motion is computed at once; tests of it take longer.
+    if _steady_noise(bands, posterior.residuals(state), state.predictions) is None:
+        return False
+    shape = shape_of(posterior, state, removed_from(posterior, state.predictions, state))
+    return coloured_noise(bands, shape) is not None
+
+
+def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise | None:
     """The noise of a residual that has a colour; None where it may be more than that, or the runs do not show it.
 
     every    the bands of each run; those of one signal, the same in all runs, are asked for
+    """
+    bands = [one for one in every if isinstance(one, Bands)]
+    if len(bands) < len(every) or _is_related(shape):
+        return None
+    residuals = shape.residuals
+    return _steady_noise(bands, _whole(residuals.residual, bands), _whole(residuals.model, bands))
+
+
+def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array], model: Sequence[Array],
+                  sigma: float = 2.0) -> Noise | None:
+    """The noise of residuals (n,) per run that fall or rise with frequency and do not grow with a model's motion (n,).
+
     sigma    what grows with the motion is taken to be so many standard errors more than it is found to be
     """
     bands = [one for one in every if isinstance(one, Bands)]
-    if len(bands) < len(every) or len({one.edges_hz.tobytes() for one in bands}) > 1 or _is_related(shape):
+    if len({one.edges_hz.tobytes() for one in bands}) > 1:
         return None
-    residuals = shape.residuals
     power, motion = (np.concatenate([one.block_powers(samples) for one, samples in zip(bands, some, strict=True)])
-                     for some in (_whole(residuals.residual, bands), _whole(residuals.model, bands)))
+                     for some in (residual, model))
     grows, error = growing_power(power, motion)
     freedom = np.sum([one.freedom for one in bands], axis=0)
     if not is_monotonic(power.mean(axis=0), freedom):

@@ -4,7 +4,7 @@ Problem: whoever adds an effect wants its numbers with their errors, and wants t
 effect biases the car's own numbers, and adding it removes the bias; and a fit always gains a little when it gets one
 more number. Solution: the car is fitted with and without the effect on all of the runs, each number comes with its
 standard error from the information matrix, and the gain in evidence bounds how probably noise would do as much.
-Evidence weighs frequencies by their noise: where it gains and the hold-out error rises, the effect does not help. The
+Where error and likelihood on stretches that no fit saw are both worse, the effect does not help. The
 numbers are free in both fits, so that the effect alone makes the difference.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end, own_slopes
+from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
@@ -25,8 +25,9 @@ from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step, rising
 from logger.lab.selection.evidence import FALSE_ALARM
-from logger.lab.selection.holdout import HoldOut, cross_validate
+from logger.lab.selection.holdout import cross_validate
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -70,12 +71,12 @@ class AddedEffects:
     names                          of those that were added
     numbers                        of the car
     error_before                   of the vehicle and effects as they were
-    error_refitted                 of those with their numbers refitted and the distance errors taken out
-    error_after                    of the model with the effects, fitted in the same way
+    error_refitted                 of those with their numbers refitted, on stretches that no fit saw
+    error_after                    of the model with the effects, likewise
     error_as_written               of that model at the recorded distances: the error of a comparison with it
     noise_floor_error              the error that the sensor's noise makes
     p_value                        probability, at most, that noise alone gains as much
-    unseen_before, unseen_after    cross-validation without and with the effects; None: not known
+    held_out_gain                  of minus twice the log-likelihood on those stretches, by the effects
     band                           in which the runs were compared; None: all
     removed                        sensor drift, distance error and filtering, removed from the errors
     errors                         of the numbers of vehicle and effects together
@@ -96,8 +97,7 @@ class AddedEffects:
     removed: Removed
     errors: NumberErrors
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
-    unseen_before: HoldOut | None = None
-    unseen_after: HoldOut | None = None
+    held_out_gain: float = 0.0
     band: ComparedBand | None = None
     tolerance: float = Tolerance().share
 
@@ -107,17 +107,21 @@ class AddedEffects:
         return self.p_value < FALSE_ALARM
 
     @property
+    def steps(self) -> tuple[Step, ...]:
+        """The model as it was, refitted, and with the effects, on one scale."""
+        return (Step(AS_FILED, self.error_before), Step(REFITTED, self.error_refitted),
+                Step(f"with {' and '.join(self.names)}", self.error_after))
+
+    @property
     def worsens_hold_out(self) -> bool:
-        """Whether the hold-out error is larger with them. Not asked of effects that only shift runs: without them the
-        distance errors do the same, and these are fitted to all of a run."""
-        before, after = self.unseen_before, self.unseen_after
-        if before is None or after is None or not any(one.effect.reshapes for one in self.new):
-            return False
-        return after.is_worse_than(before)
+        """Whether both the error and the likelihood of what no fit saw are worse with them. Not asked of effects that
+        only shift runs: without them the distance errors do the same, and these are fitted to all of a run."""
+        return (bool(rising(self.steps[1:])) and self.held_out_gain < 0
+                and any(one.effect.reshapes for one in self.new))
 
     @property
     def helps(self) -> bool:
-        """Whether the effects gain more than noise would, and do not raise the hold-out error."""
+        """Whether the effects gain more than noise would, and are not worse on what no fit saw."""
         return self.gains and not self.worsens_hold_out
 
     @property
@@ -162,14 +166,14 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         for name, was, now in zip(prior.names, standard_errors(before).logs, errors.logs, strict=True)
     )
     start, state = posterior.start(present), after.state
+    unseen_before, unseen_after = cross_validate(before), cross_validate(after)
     return AddedEffects(
         found, errors.effects, tuple(one.effect.name for one in added), numbers,
-        error_before=posterior.error(start), error_refitted=posterior.error(before.state),
-        error_after=posterior.error(state),
+        error_before=posterior.error(start), error_refitted=unseen_before.error, error_after=unseen_after.error,
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
         p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=errors.numbers,
-        unseen_before=cross_validate(before, own_slopes(before)), unseen_after=cross_validate(after, own_slopes(after)),
+        held_out_gain=unseen_before.deviance - unseen_after.deviance,
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
         tolerance=posterior.tolerance.share)
 

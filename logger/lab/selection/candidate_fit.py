@@ -10,7 +10,7 @@ from math import prod
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, own_slopes, relinearise
+from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, relinearise
 from logger.lab.likelihood.posterior import State
 from logger.lab.selection.evidence import probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
@@ -48,8 +48,7 @@ class CandidateFit:
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
-        linear = self.found.linearise(keep_size=True)
-        return cross_validate(linear, own_slopes(linear))
+        return cross_validate(self.found.linearise(keep_size=True))
 
 
 def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates: int) -> float:

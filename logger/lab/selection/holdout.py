@@ -3,7 +3,8 @@
 Problem: an error is honest on data that the fit did not see, and twenty models cannot be fitted three times over.
 Solution: three sets of stretches are held out in turn, and one Gauss-Newton step from the fit of all data gives the fit
 without them (A. Beirami et al., Advances in Neural Information Processing Systems 30, 2017). Where the car was is not
-judged: distance errors stay as fitted to all data.
+judged: distance errors stay as fitted to all data. Nor is a number of an effect that acts once, as a stop that is hit
+by one pothole: without the stretch that holds the event nothing tells it, and it stays as fitted too.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import own_slopes
 from logger.lab.likelihood.readings import error_with_rounding_noise
 from logger.lab.likelihood.signals import deviance
 from logger.runs import Run
@@ -22,10 +24,13 @@ from logger.runs import Run
 Array = npt.NDArray[np.float64]
 
 # A relative difference below it is a rounding: errors are printed to two digits or three.
-_ROUNDING = 0.005
+ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
 """Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
 set."""
+_ONCE = 0.1
+"""An effect's number of which the other stretches hold a smaller share of the information acts once: of one that acts
+throughout they hold two thirds."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class HoldOut:
 
     def is_worse_than(self, without: HoldOut) -> bool:
         """Whether the error is larger than that of a smaller model by more than a rounding."""
-        return self.error > (1 + _ROUNDING) * without.error
+        return self.error > (1 + ROUNDING) * without.error
 
 
 def folds(run: Run) -> npt.NDArray[np.intp]:
@@ -49,8 +54,10 @@ def folds(run: Run) -> npt.NDArray[np.intp]:
 
 
 def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut:
-    """Cross-validate a linearised model, with more columns (m, n) per run whose coefficients are fitted too."""
+    """Cross-validate a linearised model, with columns (m, n) per run whose coefficients are fitted too; None: those of
+    its effects' numbers."""
     posterior, state = linear.posterior, linear.state
+    own = own_slopes(linear) if own is None else own
     residuals = posterior.residuals(state)
     columns = linear.numbers or [np.empty((0, len(one))) for one in residuals]
     if own is not None:
@@ -63,12 +70,16 @@ def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> H
     prior = np.concatenate([posterior.prior.precision[: linear.count], np.zeros(own_count)])
     prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
     unseen = [one.copy() for one in residuals]
+    of_effects = np.arange(len(prior)) >= linear.count
+    everything = sum(np.einsum("ij,ij->i", part, part) for part in white)
     for fold in range(_FOLDS):
         information, gradient = np.diag(prior), -prior_gradient
         for part, residual, which in zip(white, ones, sets, strict=True):
             seen = which != fold
             information = information + part[:, seen] @ part[:, seen].T
             gradient = gradient + part[:, seen] @ residual[seen]
+        once = of_effects & (np.diag(information) < _ONCE * everything)
+        information[once], information[:, once], gradient[once] = 0.0, 0.0, 0.0
         step = _solve_scaled(information, gradient)
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
             held = np.flatnonzero(run.counted)[which == fold]

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, own_slopes
+from logger.lab.likelihood.map_fit import align
 from logger.lab.likelihood.noise_floor import gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, cross_validate
@@ -105,7 +105,7 @@ class Baseline:
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
-        return cross_validate(self.linear, own_slopes(self.linear))
+        return cross_validate(self.linear)
 
 
 def without_distance_trend(base: Baseline) -> Baseline:

@@ -18,7 +18,8 @@ import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residuals.noise_colour import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
@@ -208,13 +209,15 @@ class Search:
 
     def is_accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect gains enough, and its values are within its range and within what the record shows."""
-        return self._is_evident(now, one.chosen, one.gain) and not is_outside_data(now.posterior, one.chosen)
+        there = one.found.posterior, one.found.state
+        return self._is_evident(now, one.chosen, one.gain, there) and not is_outside_data(now.posterior, one.chosen)
 
-    def _is_evident(self, without: Baseline, one: Chosen, gain: float) -> bool:
+    def _is_evident(self, without: Baseline, one: Chosen, gain: float, there: tuple[Posterior, State]) -> bool:
         """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
-        explain, nothing is imitated."""
-        imitates = without.explanation > 0 and not gain > IMITATION * without.explanation
-        return self._chance_of(without, one, gain) < FALSE_ALARM and not imitates
+        explain, or what is left with it (``there``) is noise of a colour, nothing is imitated."""
+        if not self._chance_of(without, one, gain) < FALSE_ALARM:
+            return False
+        return gain > IMITATION * without.explanation or without.explanation == 0 or is_coloured_noise(*there)
 
     def _chance_of(self, without: Baseline, one: Chosen, gain: float) -> float:
         """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are
@@ -309,12 +312,10 @@ class Search:
                      and not is_outside_data(without.posterior, one.chosen))
 
     def eliminate_backward(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
-        """The model without effects that gain too little with the others present, or that raise the hold-out error; and
-        the gain of each of those that stay."""
+        """The model without effects that gain too little with the others present, and the gain of each of those that
+        stay."""
         names = list(now.state.names[self.present:])
         if len(names) == 1:
-            if _worsens_hold_out(now, before, names[0]):
-                return before, {}
             return now, {names[0]: before.score - now.score}
         gains: dict[str, float] = {}
         while names:
@@ -325,10 +326,8 @@ class Search:
             by_name = {one.effect.name: one for one in now.state.effects}
             chances = {name: self._chance_of(without[name], by_name[name], gain) for name, gain in gains.items()}
             least = min(gains, key=lambda name: (-chances[name], gains[name]))
-            raising = [name for name in names if _worsens_hold_out(now, without[name], name)]
-            if raising:
-                least = min(raising, key=lambda name: gains[name])
-            elif len(names) == 1 or self._is_evident(without[least], by_name[least], gains[least]):
+            if len(names) == 1 or self._is_evident(without[least], by_name[least], gains[least],
+                                                   (now.posterior, now.state)):
                 break
             now = without[least]
             names.remove(least)
@@ -342,13 +341,6 @@ class Search:
             return gains
         return {name: gain for name, gain in gains.items()
                 if not by_name[name].effect.is_trifle(by_name[name].values, self.misalignment)}
-
-
-def _worsens_hold_out(now: Baseline, without: Baseline, name: str) -> bool:
-    """Whether the hold-out error is larger with one of a model's effects. Not asked of an effect that only shifts runs:
-    without it the distance errors do the same, and these are fitted to all of a run."""
-    effect = next(one.effect for one in now.state.effects if one.effect.name == name)
-    return effect.reshapes and now.hold_out.is_worse_than(without.hold_out)
 
 
 def is_outside_data(posterior: Posterior, one: Chosen) -> bool:

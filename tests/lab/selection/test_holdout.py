@@ -118,6 +118,15 @@ def test_columns_that_do_nothing_change_nothing(plain: LinearModel) -> None:
     assert (there.error, there.deviance) == pytest.approx((here.error, here.deviance), rel=1e-9)
 
 
+def test_a_number_that_acts_once_stays_as_fitted_where_its_event_is_held_out(plain: LinearModel) -> None:
+    """A quarter of a second in one stretch of one run, and next to nothing elsewhere that could tell its number."""
+    rng = np.random.default_rng(4)
+    once = [1e-6 * rng.normal(size=(1, run.count)) for run in plain.posterior.runs.runs]
+    once[0][0, 420:445] = 1.0
+    there, here = cross_validate(plain, once), cross_validate(plain)
+    assert there.error == pytest.approx(here.error, rel=0.01)
+
+
 def test_a_model_without_numbers_is_judged_as_it_is(plain: LinearModel) -> None:
     posterior, state = plain.posterior, plain.state
     found = cross_validate(LinearModel(posterior, state))

@@ -125,7 +125,8 @@ def test_of_two_that_explain_alike_the_one_with_fewer_numbers_is_taken() -> None
 # --- what is taken ---
 
 
-def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Baseline) -> None:
+def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Baseline,
+                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
     sought = search(FEW)
     one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     freedom = offset_base.posterior.freedom
@@ -134,6 +135,8 @@ def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Ba
     assert sought.is_accepted(nearly_all, replace(one, gain=enough + 0.1))
     assert not sought.is_accepted(nearly_all, replace(one, gain=enough - 0.1))
     more_is_left = replace(offset_base, explanation=2 * enough / IMITATION)
+    assert sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))  # what is left is noise
+    monkeypatch.setattr("logger.lab.selection.stepwise.is_coloured_noise", lambda posterior, state: False)
     assert not sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))
     assert sought.is_accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
 
