@@ -22,7 +22,6 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
-_PERFECT = 1 - 1e-9  # of a run that the model repeats to roundings
 _MOST_LAG_S = 1.0
 """The right road correlates within this lag: a late clock, or a place that is metres off. A judgement."""
 
@@ -64,7 +63,7 @@ class RoadMatch:
         later correlates with reversed sign as well. On the scale on which correlations scatter alike, however large
         they are (R. A. Fisher, Metron 1, 1921)."""
         turned, correlation, chance, mean_chance = np.arctanh(np.clip(
-            [self.turned, self.correlation, self.chance, self.mean_chance], -_PERFECT, _PERFECT))
+            [self.turned, self.correlation, self.chance, self.mean_chance], -1 + 1e-9, 1 - 1e-9))
         return bool(self.is_clear and turned - correlation > chance - mean_chance)
 
 
