@@ -86,7 +86,7 @@ def comparison_of(found: compare_results.Comparison) -> Comparison:
     from logger.report.lab_text import comparison_lines
 
     summary = as_json(found)
-    return Comparison("\n".join(comparison_lines(found)), summary, found, found.plain.error, found.refitted.error,
+    return Comparison("\n".join(comparison_lines(found)), summary, found, found.plain.error, found.steps[-1].error,
                       {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
 
 
