@@ -36,17 +36,14 @@ from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
-from logger.service import wiring
 from logger.service.signal_chain import GRID_STEP_US
-from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_model
-from logger.units import MPH_MPS, US_PER_S, WINDOW_M
+from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.structure import body_point
 
-from ..support.drives.measured import GRID_HZ, Drive, Receiver, block_of, iso_road, steady_drive
-from .estimator import LEAD_S, altered, config_for, rav4
+from ..support.drives.measured import GRID_HZ, Drive, Receiver, iso_road, steady_drive
+from .estimator import LEAD_S, START_US, altered, config_for, logged_records, rav4
 from .figures import Figures
 from .noise import ASSUMED_MPS2, OFFSETS, Chip, step_of
 
@@ -54,7 +51,6 @@ Array = npt.NDArray[np.float64]
 
 FIRST_SEED = 940_000
 LATENCY_S = 0.15
-START_US = 50_000_000
 FIGURES = {"a_w": "a_w_{}mps2", "VDV": "vdv_{}mps175", "MTVV": "mtvv_{}mps2"}
 ENGINE_HZ = 25.3
 BIAS_GOAL_PERCENT, COVERAGE_GOAL = 3.0, 0.04
@@ -114,22 +110,10 @@ def true_figures(weighted: Array, low: int, high: int) -> dict[str, float]:
 
 def driven(drive: Drive, chip: Chip, believed: Sensor, before: NoiseBelief | None, seed: int) -> Rows:
     """A drive through the pipeline, which takes the chip for ``believed``, or learns its noise from ``before``."""
-    rng = np.random.default_rng([FIRST_SEED, seed])
-    config = config_for(chip, WINDOW_M, LATENCY_S)
-    instrument = replace(wiring.instrument(config.accelerometer), sensor=believed, noise=before)
-    pipeline = wiring.pipeline(config, instrument, read_model(vehicle_file("rav4-2009")))
-    readings, clipped = chip.read(drive.accel_mps2, rng)
-    t_us = START_US + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US
-    fixes = Receiver().fixes(drive, START_US, rng)
-    records: list[WindowRecord] = []
-    sent = 0
     begun_s = time.process_time()
-    for now_us in range(START_US, int(t_us[-1]) + 5 * US_PER_S, US_PER_S // 2):
-        part = slice(*np.searchsorted(t_us, [now_us - US_PER_S // 2, now_us]))
-        begin, sent = sent, sum(fix.t_us < now_us for fix in fixes)
-        records += pipeline.step(now_us, block_of(t_us[part], readings[part], clipped[part]), fixes[begin:sent])
-    records += pipeline.finish()
-    cost = (time.process_time() - begun_s) / (len(readings) / GRID_HZ)
+    records, _ = logged_records(drive, chip, Receiver(), config_for(chip, WINDOW_M, LATENCY_S), FIRST_SEED + seed,
+                                believed, before)
+    cost = (time.process_time() - begun_s) / (len(drive.accel_mps2) / GRID_HZ)
     return _compared(records, weighted_by_scipy(drive.accel_mps2), cost)
 
 
