@@ -45,6 +45,7 @@ def fitted(speeds_mps: tuple[float, ...], roads: tuple[int, ...]) -> tuple[Vehic
     return model, with_common_roughness(model, found), found.standard_errors[MASS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speeds_mps", "least", "most"), [
     ((4.5, 4.5, 4.5), 1.4, 1.75),  # the root of three at most
     ((3.6, 4.5, 5.4), 1.15, 1.6),
@@ -57,6 +58,7 @@ def test_three_passes_over_one_bump(speeds_mps: tuple[float, ...], least: float,
     assert "are over one road" in " ".join(common_words(model, common))
 
 
+@pytest.mark.slow
 def test_three_bumps_alike() -> None:
     model, common, alone = fitted((4.5, 4.5, 4.5), (7, 8, 9))
     assert (common.share, common.growth, common.fit.standard_errors[MASS]) == (0.0, 1.0, alone)

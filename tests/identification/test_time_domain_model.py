@@ -119,6 +119,7 @@ def test_a_road_that_differs_from_its_profile_does_so_under_a_bump_too() -> None
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bump_of_which_only_the_kind_is_known_beside_friction() -> None:
     truth = {MASS: 875.0, FRICTION: 100.0, "bump.height_m": 0.08, "bump.start_m": 12.0}
     run = recorded(bump_record(CAR, 8.0, height_m=0.08, start_m=12.0), [rubbing(100.0)])
@@ -136,6 +137,7 @@ def test_a_speed_that_is_recorded_too_large() -> None:
     assert np.abs(off(result, {"sensor_gain.gain": 1.1, "speed_scale": 1.004})).max() < 3.5
 
 
+@pytest.mark.slow
 def test_several_effects_at_once() -> None:
     there = [effect("sensor_bandwidth", cutoff_hz=20.0), effect("time_offset", delay_s=0.012), rubbing(70.0)]
     run = recorded(road_record(CAR, 15.0, 12.0, 2, gd_n0_cm3=16.0), there)

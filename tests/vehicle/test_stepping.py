@@ -191,6 +191,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_each_law_leaves_what_newton_says(case: str) -> None:
     effects, change, allowed = CASES[case]
