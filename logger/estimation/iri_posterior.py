@@ -9,7 +9,7 @@ left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import pi, sqrt
 
@@ -32,8 +32,10 @@ from logger.roads.iri import PER_KM
 Array = npt.NDArray[np.float64]
 
 _SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
-LEVEL_TRIAL = 0.3
+_NODES = np.array([-sqrt(3), 0.0, sqrt(3)])  # Gauss-Hermite, in standard errors of the log level
+_NODE_WEIGHTS = np.array([1, 4, 1]) / 6
 _FORGOTTEN_M = 40.0
+_RISES = np.linspace(-12.0, 12.0, 33)
 
 
 def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> float:
@@ -83,20 +85,25 @@ class SlopeKnowledge:
     """What the readings leave open of the Golden Car's slope at a steady speed.
 
     variance         before anything is read [m2/m2]
-    left             of it, once the readings are known [m2/m2]
+    log_left         (r,) logarithm of what is left of it, once the readings are known [m2/m2], where the road's level
+                     is higher by each of ``_RISES``
     correlation      (l,) of what is left, at lags of whole steps of the distance grid
     vehicle_std      share by which the vehicle's numbers, by their standard errors, may make the slope wrong
     """
 
     variance: float
-    left: float
+    log_left: Array
     correlation: Array
     vehicle_std: float = 0.0
+
+    def left(self, rise: Array) -> Array:
+        """Variance that is left where the road's log level is higher by ``rise`` (any shape)."""
+        return np.exp(np.interp(rise, _RISES, self.log_left))
 
     @property
     def resolved(self) -> float:
         """Share of the variance that the readings resolve."""
-        return 1 - self.left / self.variance
+        return 1 - float(self.left(np.zeros(1))[0]) / self.variance
 
 
 class SlopeErrors:
@@ -112,7 +119,10 @@ class SlopeErrors:
         prior = _SLOPE_POWER * spectrum.psd_of(LOG_WAVES)
         resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
         left = (prior * (1 - resolved)) @ self._waves
-        return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0],
+        # of a rise e^l the share resolved goes from s to s e^l / (1 - s + s e^l)
+        rise = np.exp(_RISES)[:, None]
+        by_rise = (rise / (1 - resolved + resolved * rise)) @ (prior * (1 - resolved))
+        return SlopeKnowledge(float(prior.sum()), np.log(by_rise), left / left[0],
                               self._vehicle_std(speed_mps, prior * resolved**2))
 
     def _vehicle_std(self, speed_mps: float, weight: Array) -> float:
@@ -151,8 +161,8 @@ class WindowIri:
 def window_iri(
     slope: Array,
     unseen: Array,
+    rise: Array,
     knowledge: SlopeKnowledge,
-    louder: SlopeKnowledge,
     log_level_std: float,
     length_m: float,
     misplaced_m: float = 0.0,
@@ -161,37 +171,37 @@ def window_iri(
 
     slope            (p,) at the points of the distance grid [m/m]
     unseen           (p,) share of the slope's variance, 0 to 1, that comes from road that was not read at all
+    rise             (p,) of the road's log level there over that of ``knowledge``
     knowledge        at the window's speed
-    louder           the same for the ``raised`` spectrum
-    log_level_std    standard error of the road's log level
+    log_level_std    standard error of the road's log level, over which the mean is taken
     length_m         of the window [m]
     misplaced_m      standard error of its place [m]
     """
     weight = np.full(len(slope), 1 / (len(slope) - 1))
     weight[[0, -1]] *= 0.5
-    deviation = _deviation(knowledge, unseen)
+    rises = rise + log_level_std * _NODES[:, None]
+    variances = knowledge.variance * np.exp(rises)
+    left = knowledge.left(rises)
+    resolved = 1 - left / variances
     # Were the level higher, more of the readings would be taken for road, and more be left open.
-    stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
-    absolute, more_absolute = mean_absolute(np.stack([slope, stretched]),
-                                            np.stack([deviation, _deviation(louder, unseen)]))
-    mean, more = float(weight @ absolute), float(weight @ more_absolute)
-    own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
-    level, common = abs(more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std
+    slopes = slope * (resolved / np.maximum(resolved[1], 1e-3))
+    deviations = np.sqrt(left + (variances - left) * unseen)
+    by_level = mean_absolute(slopes, deviations)
+    absolute, means = _NODE_WEIGHTS @ by_level, by_level @ weight
+    mean = float(_NODE_WEIGHTS @ means)
+    own = variance_of_mean_absolute(slope, deviations[1], knowledge.correlation, weight)
+    level, common = sqrt(float(_NODE_WEIGHTS @ (means - mean) ** 2)), mean * knowledge.vehicle_std
     points = min(1 + round(misplaced_m / length_m * (len(slope) - 1)), len(slope) // 2)
     begins, ends = float(absolute[:points].mean()), float(absolute[-points:].mean())
     parts = absolute[: len(absolute) // points * points].reshape(-1, points).mean(axis=1)
-    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * level, PER_KM * common, PER_KM * begins, PER_KM * ends,
-                     PER_KM**2 * float(parts.var(ddof=1)))
+    return WindowIri(PER_KM * mean, PER_KM * sqrt(own), PER_KM * level, PER_KM * common, PER_KM * begins,
+                     PER_KM * ends, PER_KM**2 * float(parts.var(ddof=1)))
 
 
-def raised(spectrum: RoadSpectrum) -> RoadSpectrum:
-    """A somewhat rougher road, to see what the road's level does to an estimate."""
-    return replace(spectrum, log_level=spectrum.log_level + LEVEL_TRIAL)
-
-
-def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:
-    deviation: Array = np.sqrt(knowledge.left + (knowledge.variance - knowledge.left) * unseen)
-    return deviation
+def by_slope(row: Array, spacing_m: float) -> Array:
+    """Mean (n,) of a row (n,) along the road, with the shares that the variance of the Golden Car's slope at each point
+    has from there, on a closed grid."""
+    return np.fft.irfft(np.fft.rfft(row) * _memory_waves(spacing_m, len(row)), len(row))
 
 
 def unseen_share(seen: Array, spacing_m: float) -> Array:

@@ -64,9 +64,10 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
-def cavity(motion: SteadyMotion, variance: Array) -> Array:
+def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     """Variance (t,) that all other readings leave of each acceleration, where some say much and some little
-    [(m/s2)2]; ``variance`` (t,) is that of the readings.
+    [(m/s2)2], and the variance (t,) of even readings that say as much about it; ``variance`` (t,) is that of the
+    readings.
 
     The mean of their precisions would make too much of the precise ones: two of them side by side say little more than
     one. Even readings that stand for those about a place have the variance e for which a reading put among the others
@@ -95,16 +96,7 @@ def cavity(motion: SteadyMotion, variance: Array) -> Array:
         others = np.exp(_between_even(log_even, log_trials, log_others))
         if np.abs(others - before).max() < _NEARLY_EVEN * others.min():
             break
-    return others
-
-
-def even_variance(motion: SteadyMotion, others: Array, variance: Array) -> float:
-    """Variance of even readings that take as many degrees of freedom as these (n,), whose ``cavity`` is ``others``: of
-    each, the share that it has in what is known of its own acceleration."""
-    taken = float((others / (others + variance)).mean())
-    trials, log_trials = _trials(variance)
-    by_trial = motion.resolved_per_reading(trials)
-    return float(np.exp(np.interp(-taken, -by_trial, log_trials)))
+    return others, np.exp(log_even)
 
 
 def _trials(variance: Array) -> tuple[Array, Array]:

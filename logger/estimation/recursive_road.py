@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from math import log, pi, sqrt
+from math import exp, log, pi
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
-from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
 from logger.estimation.other_motion import OtherMotion
@@ -25,7 +24,6 @@ from logger.estimation.quantisation import (
     GaussianReadings,
     bounds,
     cavity,
-    even_variance,
     first_guess,
     improved,
     unexplained,
@@ -33,6 +31,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.roughness import Roughness, mean_resolved
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
@@ -46,6 +45,8 @@ _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 _MOST_DEVIATIONS = 3.0
+_LEAST_SHOWN = 1e-3
+_SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
 _SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
 _MOST_STEPS_PARKED = 8  # more is no stand: somebody works at the car, or the sensor is loose
 # Solved with no less where the noise is learnt: below, a few rounds do not settle, and what they say of a smaller noise
@@ -64,15 +65,17 @@ _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 class SolvedBlock:
     """road      (k,) rfft of the elevations on the block's grid [m]
     accel_mps2   (t,) what the car does on it, and what else moves it
-    variance     of a reading, noise, rounding and the car's own error, while it moved [(m/s2)2]
+    variance     (n,) of a reading, noise, rounding and the car's own error, as the place was felt [(m/s2)2]
     seen         (n,) 1 at the points of the grid that were driven over while there were readings, else 0
+    relative_variance    (n,) of the road's innovations there, over that of a common road
     other_psd    (f,) spectrum of what else moves it, one-sided, at the block's frequencies [(m/s2)2/Hz]; None: nothing
     """
 
     road: ComplexArray
     accel_mps2: Array
-    variance: float
+    variance: Array
     seen: Array
+    relative_variance: Array
     other_psd: Array | None = None
 
 
@@ -110,7 +113,7 @@ class FollowedRoad:
         self._like_noise = 0.0
         self._other.restart()
         self._solved_last: tuple[Block, ComplexArray] | None = None
-        self._local = LocalRoughness(self._spacing_m)
+        self._roughness = Roughness(self._spacing_m)
         self._unscored = 0
         self._parked: Counter[int] = Counter()
         self._parked_at_mps2 = 0.0
@@ -232,7 +235,9 @@ class FollowedRoad:
         readings, reads = self._as_gaussian(samples), samples.reading_mps2.shape[1]
         each = np.repeat(read, reads) & samples.usable.ravel()
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
-        local = self._local.at(first, block.count).variance
+        above_common = spectrum.log_level - COMMON_ROAD.log_level
+        log_variance = self._roughness.solved_with(first, block.count)
+        local = np.exp(np.maximum(log_variance, _SMOOTHEST_SOLVED) - above_common)
         there = _levelled(spectrum, local)
         variance = readings.variance + vehicle_error_variance(
             block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads
@@ -244,32 +249,38 @@ class FollowedRoad:
 
         moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
-        gain, taken = solution.gain, np.ones(block.count)
+        gain, ratio = solution.gain, np.ones(block.count)
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(samples), reads)
             solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
             motion = self._other.beside(motion)
-            others, drift_variance = cavity(motion, variance), solution.drift_variance
-            self._centre_mps2, self._accel_variance = float(solution.drift_mps2[-1]), motion.variance
+            relative = np.repeat(block.felt(local), reads)  # motion as strong as where it was felt
+            others, even = (relative * row for row in cavity(motion, variance / relative))
+            drift_variance = solution.drift_variance
+            self._centre_mps2 = float(solution.drift_mps2[-1])
+            self._accel_variance = motion.variance * float(relative[-1])
             if moving.any():
-                even = even_variance(motion, others[moving], variance[moving])
-                gain = gain * (mean_variance / even)
-                drift_variance = solution.drift_variance * (even / mean_variance)
+                # Where nothing was read it is as where it was.
+                shown = np.maximum(block.about(moving.astype(np.float64)), _LEAST_SHOWN)
+                ratio = block.about(np.where(moving, mean_variance / even, 0.0)) / shown
+                ratio = np.where(shown > _LEAST_SHOWN, np.maximum(ratio, _LEAST_SHOWN), 1.0)
+                drift_variance = solution.drift_variance / float(ratio[seen > 0].mean())
                 as_read = samples.reading_mps2.ravel() + _at_each(beyond_mps2, reads)
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
-                # Sharp readings come where the road shook the car: what they show must be judged by what they can.
-                taken = block.about(np.where(moving, others / (others + variance), 0.0))
-                taken = taken / float(taken[seen > 0].mean())
 
-        resolved = mean_resolved(gain, local[seen > 0])
+        resolved = mean_resolved(gain, (local * ratio)[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
-        most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count * taken)
+        most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count)
         white = np.clip(solution.innovations / np.sqrt(local), -most, most)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
-        self._belief = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
-        settled = self._is_coarse and learns and is_last and before is not None
-        self._local.learn(first, solution.innovations, local, gain, seen, taken, settled)
+        # The level goes with the roughness along the block: two that follow the same slope would overshoot.
+        now = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
+        self._roughness.learn(first, exp(0.5 * above_common) * solution.innovations, log_variance,
+                              exp(-above_common) * gain, seen, ratio, learns and is_last and before is not None)
+        found = self._roughness.at(first, block.count)
+        level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
+        self._belief = replace(now, spectrum=replace(now.spectrum, log_level=level))
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
@@ -282,7 +293,7 @@ class FollowedRoad:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
         other_psd = None if self._other.psd is None else self._other.psd[:len(samples) // 2 + 1]
         return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
-                           mean_variance / reads, seen, other_psd)
+                           mean_variance / reads / ratio, seen, np.exp(found), other_psd)
 
     def _with_other_motion(
         self, solution: Solution, readings: GaussianReadings, weight: Array, motion: SteadyMotion, learns: bool
@@ -347,9 +358,9 @@ class FollowedRoad:
     def level_at(self, first: int, count: int) -> tuple[RoadSpectrum, float]:
         """The spectrum at points ``first`` ... ``first + count - 1`` of the distance grid, and the standard error of
         its log level."""
-        local = self._local.at(first, count)
-        there = _levelled(self._belief.spectrum, local.variance)
-        return there, sqrt(self._belief.log_level_std**2 + float(local.log_error.mean()))
+        variance = np.exp(self._roughness.at(first, count))
+        there = replace(self._belief.spectrum, log_level=COMMON_ROAD.log_level)
+        return _levelled(there, variance), self._roughness.log_std(first, count)
 
 
 def _at_each(row: Array | float, reads: int) -> Array | float:

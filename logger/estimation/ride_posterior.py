@@ -25,7 +25,6 @@ from logger.comfort.uncertain_ride import (
     square_sum,
 )
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
-from logger.estimation.iri_posterior import LEVEL_TRIAL
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 
@@ -38,6 +37,7 @@ _LAGS_S = 1.0
 _RUNNING_S = 1.0  # ISO 2631-1 clause 6.3.1
 _RUNNING_PARTS = 2  # of that time: places of its end that are so near together go together
 _LEAST_RESOLVED = 1e-3
+_LEVEL_TRIAL = 0.3  # of the log level, to see what it does to a ride
 # As found on drives of known ride, with gravity anywhere within a step (tests/benchmarks/comfort_noise.py): the share
 # by which a ride is off beyond its error, times the noise and what blurs the steps, both in steps. Median of ten rows
 # whose noise is 0.03 to 0.08 steps and whose blur 0.13 to 0.86, each within a factor of 2.3; at 0.16 steps nothing is.
@@ -119,13 +119,13 @@ class RidePosterior:
         return np.fft.irfft(np.fft.rfft(accel_mps2) * self._response, self._count)
 
     def knowledge(self, place: RidePlace) -> tuple[RideKnowledge, RideKnowledge]:
-        """At a place, and were the road there rougher by ``LEVEL_TRIAL``."""
+        """At a place, and were the road there rougher by ``_LEVEL_TRIAL``."""
         per_cpm = self._car.power(place.speed_mps) * place.spectrum.psd_of(LOG_WAVES)
         road = np.interp(self._f_hz / place.speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / place.speed_mps
         other: Array | float = 0.0
         if place.other_psd is not None:
             other = np.interp(self._f_hz, _frequencies_hz(self._count, self._rate_hz), _thinned(place.other_psd))
-        return self._known(road + other, place.variance), self._known(exp(LEVEL_TRIAL) * road + other, place.variance)
+        return self._known(road + other, place.variance), self._known(exp(_LEVEL_TRIAL) * road + other, place.variance)
 
     def _known(self, ride: Array, variance: float) -> RideKnowledge:
         """Of a ride of this spectrum (f,) [(m/s2)2/Hz], for readings of this variance [(m/s2)2]."""
@@ -160,7 +160,7 @@ class RidePosterior:
         stretched = mean * (louder.resolved / max(knows.resolved, _LEAST_RESOLVED))
         louder_std = _deviation(louder, unread[span])
         noise_off = 2 * place.noise_log_std * place.sensor.noise_rms_mps2**2 * knows.noise_share
-        per_log_level = place.log_level_std / LEVEL_TRIAL
+        per_log_level = place.log_level_std / _LEVEL_TRIAL
 
         def squares_of(chosen: Bools | slice) -> PowerSum:
             squares = square_sum(mean[chosen], std[chosen], knows.correlation)

@@ -42,6 +42,8 @@ _FAST_SHARE = 0.98
 _SPEED_CLASSES_PER_E = 10
 _DRIFT_BELOW_HZ = 0.1
 _DRIFT_MPS2 = 0.05
+_WORTH_A_STEP = 5.0  # of log probability; a lone bump on a smooth road needs more steps than roads do
+_MOST_TIMES = 4
 _LOG_WAVE_NUMBERS = np.log(WAVE_NUMBERS_CPM)
 
 
@@ -184,7 +186,7 @@ class Block:
         pull, held = brought_back(weigh(reading_mps2 - explained), white / relative_variance)
         residual = pull - held
         direction, before = np.zeros_like(waves), np.inf
-        for left in reversed(range(steps)):
+        for done in range(1, _MOST_TIMES * steps + 1):
             preconditioned = residual / (1 + gain)
             size = _product(residual, preconditioned)
             if size <= 0.0:
@@ -196,7 +198,10 @@ class Block:
             waves = waves + step * direction
             white = white + step * along
             explained = explained + step * image
-            if left:
+            is_enough = step * size < 2 * self.count * _WORTH_A_STEP
+            if done >= steps and is_enough:
+                break
+            if done < _MOST_TIMES * steps:
                 pull, held = brought_back(weighed, unlikely)
                 residual = residual - step * (pull + held)
             before = size
@@ -265,6 +270,12 @@ class Block:
         total = np.bincount(points, (self._shares * back).ravel(), self.count)
         passed = np.flatnonzero(weight)
         return np.interp(np.arange(self.count), passed, total[passed] / weight[passed])
+
+    def felt(self, row: Array) -> Array:
+        """Mean (t,) of a row (count,) over the places whose steps of the road each sample shows, as much as it does."""
+        low, high = row.take(self._points) * self._shares
+        under = np.fft.rfft(low + high) * self._grid.step_power
+        return np.maximum(np.fft.irfft(under, len(self._front)).mean(axis=0), row.min())
 
     def _per_sample(self, row: Array) -> Array:
         """Sum (t,) of a row (y,) over the readings of each sample."""

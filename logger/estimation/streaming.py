@@ -23,7 +23,7 @@ from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
-    raised,
+    by_slope,
     reading_noise_psd,
     resolved_share,
     unseen_share,
@@ -316,6 +316,9 @@ class RoadEstimator:
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(solved.seen, self._spacing_m)
+        # The slope remembers the road shortly before a place.
+        log_relative = np.log(np.maximum(by_slope(solved.relative_variance, self._spacing_m),
+                                         solved.relative_variance.min()))
         ride = self._answers.ride
         weighted = ride.weighted(solved.accel_mps2) if ride is not None else None
         estimates: list[WindowEstimate] = []
@@ -326,17 +329,18 @@ class RoadEstimator:
             if low < 0 or speed_mps is None:
                 piece = _nothing(self._why_none(samples, number))
             else:
-                # The slope remembers the road shortly before a piece.
+                variance = 1 / float(np.mean(1 / solved.variance[inside]))
                 back = round(_REMEMBERED_M / self._spacing_m)
                 level = self._road.level_at(number * self._points - back, back + self._points + 1)
-                piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
+                rise = log_relative[inside] + (COMMON_ROAD.log_level - level[0].log_level)
+                piece = self._piece(slope[inside], unseen[inside], rise, speed_mps, variance, *level)
                 if weighted is not None:
                     # Of a sample, which has that share of a reading's noise.
                     log_std = self.noise.log_std / self._reads if self.noise is not None else 0.0
-                    place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std,
+                    place = RidePlace(speed_mps, variance, *level, self._road.sensor, log_std,
                                       self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
-                self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
+                self._give_road(number, elevation[inside], speed_mps, variance, level[0])
             estimates += self._window(number, piece)
         return estimates
 
@@ -356,7 +360,7 @@ class RoadEstimator:
             solved = self._road.solved(block, linear, read, self._beyond, self._beyond_variance, _TURNS,
                                        turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
-            noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
+            noise_psd = reading_noise_psd(1 / float(np.mean(1 / solved.variance)), RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
             assert self._answers.bent is not None
             psd = there.psd_of(LOG_WAVES)
@@ -389,16 +393,16 @@ class RoadEstimator:
         self,
         slope: Array,
         unseen: Array,
+        rise: Array,
         speed_mps: float,
         variance: float,
         spectrum: RoadSpectrum,
         log_level_std: float,
     ) -> _Piece:
         knowledge = self._answers.errors.at(speed_mps, spectrum, variance)
-        louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
-        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m, self._misplaced_m(speed_mps))
+        iri = window_iri(slope, unseen, rise, knowledge, log_level_std, self._piece_m, self._misplaced_m(speed_mps))
         like_noise = iri.iri_m_per_km * self._road.scale_log_std
         iri = replace(iri, common_std_m_per_km=hypot(iri.common_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)

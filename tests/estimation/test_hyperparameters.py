@@ -8,9 +8,9 @@ import pytest
 
 from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
-from logger.estimation.local_variance import mean_resolved
 from logger.estimation.road_solver import Block, Solution, TimeGrid
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum, log_waves
+from logger.estimation.roughness import mean_resolved
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle

@@ -1,5 +1,7 @@
 """From an estimated road to its IRI, against many simulated roads and the Golden Car's own memory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import sosfilt
@@ -7,7 +9,6 @@ from scipy.signal import sosfilt
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
 from logger.estimation.iri_posterior import (
     SlopeErrors,
-    raised,
     resolved_share,
     steady_motion,
     unseen_share,
@@ -63,7 +64,8 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     true, found, accel, fitted = simulated(speed_mps, spectrum, deviation**2)
     knowledge = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1).at(speed_mps, spectrum, deviation**2)
     assert knowledge.variance == pytest.approx(true.var(), rel=0.03)
-    assert knowledge.left == pytest.approx((true - found).var(), rel=0.06)  # the cut at 42 Hz falls between two waves
+    # the cut at 42 Hz falls between two waves
+    assert float(knowledge.left(np.zeros(1))[0]) == pytest.approx((true - found).var(), rel=0.06)
     assert knowledge.resolved == pytest.approx(1 - (true - found).var() / true.var(), abs=0.01)
     off = true - found
     by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
@@ -72,11 +74,10 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     left = steady_motion(CAR, speed_mps, spectrum, RATE_HZ, 8192).remaining_variance(deviation**2)
     assert left == pytest.approx((accel - fitted).var(), rel=0.05)
 
-    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
-    louder = errors.at(speed_mps, raised(spectrum), deviation**2)
     numbers = range(COUNT // POINTS - 1)
     windows = [slice(number * POINTS, (number + 1) * POINTS + 1) for number in numbers]
-    estimates = [window_iri(found[w], np.zeros(POINTS + 1), knowledge, louder, 0.0, WINDOW_M) for w in windows]
+    nothing = np.zeros(POINTS + 1)
+    estimates = [window_iri(found[w], nothing, nothing, knowledge, 0.0, WINDOW_M) for w in windows]
     exact = np.array([1000 * np.trapezoid(np.abs(true[w])) / POINTS for w in windows])
     estimate = np.array([one.iri_m_per_km for one in estimates])
     std = np.array([one.own_std_m_per_km for one in estimates])
@@ -87,25 +88,32 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     assert np.mean(np.abs(score) < 2) == pytest.approx(0.954, abs=0.02)
 
 
-def test_the_levels_error_moves_all_windows_alike() -> None:
-    """The shared part is the change of the estimate when level and the reported share change, times the level's
-    error."""
-    spectrum = RoadSpectrum.of_iri(1.0)
+@pytest.mark.parametrize("rise", [0.0, -1.3])
+def test_the_levels_error_moves_all_windows_alike(rise: float) -> None:
+    """The mean over a normally distributed level, and the deviation over it, by sums over many levels."""
+    spectrum, level_std = RoadSpectrum.of_iri(1.0), 0.4
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
-    dull, louder = errors.at(5.0, spectrum, 0.3**2), errors.at(5.0, raised(spectrum), 0.3**2)
     flat, unseen = np.zeros(POINTS + 1), np.zeros(POINTS + 1)
-    found = window_iri(flat, unseen, dull, louder, 0.2, WINDOW_M)
-    more = window_iri(flat, unseen, louder, louder, 0.2, WINDOW_M)
-    rise = (more.iri_m_per_km - found.iri_m_per_km) / (raised(spectrum).log_level - spectrum.log_level)
-    assert found.level_std_m_per_km == pytest.approx(0.2 * rise, rel=1e-9)
-    assert found.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * dull.left), rel=1e-6)
+    found = window_iri(flat, unseen, flat + rise, errors.at(5.0, spectrum, 0.3**2), level_std, WINDOW_M)
+    off = np.linspace(-5, 5, 201)
+    chance = np.exp(-0.5 * off**2) / np.exp(-0.5 * off**2).sum()
+    left = [errors.at(5.0, rougher(spectrum, rise + level_std * one), 0.3**2).left(np.zeros(1))[0]
+            for one in off.tolist()]
+    each = 1000 * np.sqrt(2 / np.pi * np.array(left))
+    assert found.iri_m_per_km == pytest.approx(chance @ each, rel=2e-3)
+    assert found.level_std_m_per_km == pytest.approx(np.sqrt(chance @ (each - chance @ each) ** 2), rel=0.02)
+
+
+def rougher(spectrum: RoadSpectrum, rise: float) -> RoadSpectrum:
+    """By the logarithm of how much."""
+    return replace(spectrum, log_level=spectrum.log_level + rise)
 
 
 def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
     spectrum = RoadSpectrum.of_iri(3.0)
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
     known = errors.at(20.0, spectrum, 0.05**2)
-    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), known, known, 0.0, WINDOW_M)
+    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), np.zeros(POINTS + 1), known, 0.0, WINDOW_M)
     assert blind.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * known.variance), rel=1e-6)
     assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre
 

@@ -1,0 +1,270 @@
+"""Roughness as a process along the road, learnt on the way: how rough each place is.
+
+Problem. A road has holes and joints of a metre, patches of ten and sections of a hundred and more, and its level may
+change in a step. One level for a block of 20 s leaks a rough section into the smooth one behind it; a variance that
+each point learns by itself sees little where the readings say little.
+
+Solution. The white innovations v of the road have at each point the variance d = exp(L) w. The level L is a Gaussian
+process along the road, a sum of one for each of ``LENGTHS_M`` whose correlation exp(-distance / length) allows for
+steps. The scale w of some ``_REACH_M`` about a point is heavy-tailed: as if ``common`` more points said that it is 1
+(an inverse gamma distribution), so that a pothole is a large w and raises no level.
+
+From an estimate of v, made with d, and the share r of it that the readings resolve, the slope of the log evidence in
+log d is (v^2 / d - r) / 2 (MacKay 1992), and its expected curvature r^2 / 2, mean over all waves: it is that of a sum
+of squares v^2 - (r - r^2) d with r^2 degrees of freedom. With w integrated over, that of L is that of a Student t. A
+Newton step per round finds the most probable L (Laplace's approximation); w follows from it as (common + v^2 / exp(L))
+/ (common + r), sums over neighbours. What was found of cells that no block shows any more is carried by a Kalman
+filter, for such processes are Markov's. Their variances are learnt by scoring in the evidence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
+# Of the log variance, before a road is known: half of all roads between 1.1 and 5.7 m/km make the last.
+_COMMON_VARIANCES = np.array([0.05, 0.15, 1.8**2])
+_LEARNT = slice(2)
+_VARIANCE_LOG_STD = 1.5  # by how much roads differ in that
+_LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-3, 4.0
+_BLOCK_SHARE = 0.1  # of a block of 20 s is new
+_SMOOTHEST, _ROUGHEST = -12.0, 8.0  # L of roads that have an IRI of 0.006 and 140 m/km
+_CELL_M = 4.0
+_REACH_M = 1.0
+_COMMON = 4.0  # points, before the scatter is known, and never fewer
+_MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
+_FORGOTTEN = 0.02  # per block, of what was heard of scatter and variances: they are known from the last 100 s
+_LEAST_OF_MEAN = 0.1  # a place that shows less says nothing of the scatter
+_TAKEN_OVER = 0.6  # of a new scale, so that it does not overshoot
+_LARGEST_STEP = 0.7
+_SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
+_LEAST_INFORMATION = 1e-9
+_TABLE_STEP = 0.5
+_CLASSES = 8
+
+
+@dataclass(frozen=True)
+class _Level:
+    """L of cells from number ``first`` on (c,), what readings say of it, ``shown``, with ``information`` about it; of
+    those from ``edge`` on the covariance of its error (e, e). ``state`` (k,) and ``state_covariance`` (k, k) are what
+    cells before the edge say of the processes there."""
+
+    first: int
+    log_level: Array
+    shown: Array
+    information: Array
+    edge: int
+    covariance: Array
+    state: Array
+    state_covariance: Array
+
+    def cells(self, first: int, count: int) -> tuple[Array, Array, Array]:
+        """L, what is shown, and information of other cells: beyond those that are known L goes on as there."""
+        at = first + np.arange(count) - self.first
+        near = np.clip(at, 0, len(self.log_level) - 1)
+        known = at == near
+        return self.log_level[near], self.shown[near] * known, self.information[near] * known
+
+
+class Roughness:
+    """Log variance of innovations by number of the point on an endless grid of ``spacing_m``, over that of a common
+    road, for a spectrum of any level."""
+
+    def __init__(self, spacing_m: float) -> None:
+        self._reach = _REACH_M / spacing_m
+        self._cell = round(_CELL_M / spacing_m)
+        self._cell_m = self._cell * spacing_m
+        self._first = 0
+        self._log_scale, self._scale_error = np.empty(0), np.empty(0)
+        self._level: _Level | None = None
+        self._log_variances = np.log(_COMMON_VARIANCES)
+        self._curvature: Array | float = 0.0
+        self._common = _COMMON
+        self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
+
+    @property
+    def variances(self) -> Array:
+        """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
+        return np.exp(self._log_variances)
+
+    def solved_with(self, first: int, count: int) -> Array:
+        """Log variance (count,) with which points ``first`` ... ``first + count - 1`` are to be solved: their
+        precision's mean."""
+        return self._levels(first, count) + self._kept(self._log_scale, first, count)
+
+    def at(self, first: int, count: int) -> Array:
+        """Mean log variance (count,) of the same points; beyond what is known the level goes on as there."""
+        return self.solved_with(first, count) + 0.5 * self._kept(self._scale_error, first, count)
+
+    def log_std(self, first: int, count: int) -> float:
+        """Standard error of the log variance of these points: of the mean level, and of a scale."""
+        if self._level is None:
+            return 0.0
+        at = (first + np.arange(count)) // self._cell - self._level.edge
+        weight = np.bincount(np.clip(at, 0, len(self._level.covariance) - 1)) / count
+        near = self._level.covariance[:len(weight), :len(weight)]
+        error = float(weight @ near @ weight) + float(self._kept(self._scale_error, first, count).mean())
+        return float(np.sqrt(max(error, 0.0)))
+
+    def _kept(self, row: Array, first: int, count: int) -> Array:
+        """Part of a row by points as they were learnt; 0 elsewhere."""
+        found, ahead = np.zeros(count), first - self._first
+        here = slice(max(-ahead, 0), max(min(len(row) - ahead, count), 0))
+        found[here] = row[max(ahead, 0): max(min(len(row), ahead + count), 0)]
+        return found
+
+    def _levels(self, first: int, count: int) -> Array:
+        if self._level is None:
+            return np.zeros(count)
+        at = (first + np.arange(count)) // self._cell
+        return self._level.cells(int(at[0]), int(at[-1] - at[0]) + 1)[0][at - at[0]]
+
+    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
+              sharper: Array | float = 1.0, learns: bool = False) -> None:
+        """Take what a solved block says.
+
+        innovations    (n,) v at its points; n is even
+        log_before     (n,) the log variance that it was solved with
+        gain           (n // 2 + 1,) information over prior of each wave where that is 0
+        seen           (n,) 1 where the road was read, else 0
+        sharper        (n,) information there over that of ``gain``
+        learns         the variances and the scatter as well: once per block
+        """
+        if not seen.any():
+            return
+        count = len(innovations)
+        strength = log_before + np.log(sharper)
+        table = np.arange(strength.min(), strength.max() + _TABLE_STEP, _TABLE_STEP)
+        share = np.exp(table)[:, None] * gain
+        share /= 1 + share
+        resolved, freedom = (
+            np.exp(np.interp(strength, table, np.log(np.maximum(each.sum(axis=1) * (2 / count), 1e-300))))
+            for each in (share, share**2))
+        squares = innovations**2
+        rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
+                         np.ones(count)]) * seen
+        neighbours = _neighbours(count, self._reach)
+        power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * neighbours, count)
+        power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
+        self._learn_level(first, squares, freedom, seen / float(neighbours[0].real), learns)
+        level = self._levels(first, count)
+        power = power * np.exp(-level)
+        if learns:
+            self._learn_scatter(power, weight, gain * np.exp(float(seen @ strength / seen.sum())), seen > 0)
+        fresh = np.log((self._common + power) / (self._common + weight))
+        fresh = np.clip(_TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level), _SMALLEST_LOG, _LARGEST_LOG)
+        self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
+        self._scale_error = 2 / (self._common + weight)
+
+    def _learn_level(self, first: int, squares: Array, freedom: Array, each: Array, learns: bool) -> None:
+        """One Newton step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a
+        part of a neighbourhood."""
+        cells = (first + np.arange(len(squares))) // self._cell
+        begin, edge, end = int(cells[0]), int(cells[np.flatnonzero(each)[0]]), int(cells[-1]) + 1
+        old = self._level
+        if old is None:
+            nothing = np.zeros(1)
+            state = np.zeros(len(LENGTHS_M))
+            old = _Level(edge, nothing, nothing, nothing, edge, np.zeros((1, 1)), state, np.diag(self.variances))
+        edge = max(edge, old.edge)
+        state, state_covariance = self._carried(old, edge)
+        now, total = old.cells(edge, end - edge)[0], end - edge
+        at, chosen = cells[cells >= edge] - edge, cells >= edge
+        alike = _processes(total, self._cell_m)
+        since = alike[:, 0]
+        mean = state @ since
+        prior = np.tensordot(self.variances, alike, 1) + since.T @ (state_covariance - np.diag(self.variances)) @ since
+
+        relative = squares[chosen] * np.exp(-now[at])
+        freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
+        slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
+        bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)
+        shown, root = now + slope / bend, np.sqrt(bend)
+        spread = root[:, None] * np.linalg.inv(np.eye(total) + root[:, None] * prior * root) * root
+        pull = spread @ (shown - mean)
+        step = np.clip(mean + prior @ pull - now, -_LARGEST_STEP, _LARGEST_STEP)
+        now = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
+        if learns:
+            self._learn_variances(alike[_LEARNT], pull, spread)
+        level, shown, information = (np.concatenate(pair) for pair in zip(
+            old.cells(begin, edge - begin), (now, shown, bend), strict=True))
+        self._level = _Level(begin, level, shown, information, edge, prior - prior @ spread @ prior, state,
+                             state_covariance)
+
+    def _carried(self, old: _Level, edge: int) -> tuple[Array, Array]:
+        """State and its covariance by a Kalman filter over the cells between the old edge and this one."""
+        state, covariance = old.state, old.state_covariance
+        decay = np.exp(-self._cell_m / LENGTHS_M)
+        new = np.diag(self.variances * (1 - decay**2))
+        _, shown, information = old.cells(old.edge, edge - old.edge)
+        for value, precision in zip(shown.tolist(), information.tolist(), strict=True):
+            column = covariance.sum(axis=1)
+            gain = column * (precision / (1 + precision * column.sum()))
+            state = decay * (state + gain * (value - state.sum()))
+            covariance = decay[:, None] * (covariance - np.outer(gain, column)) * decay + new
+        return state, covariance
+
+    def _learn_variances(self, alike: Array, pull: Array, spread: Array) -> None:
+        """One scoring step in the evidence of what was shown, N(mean, inverse of ``spread``)."""
+        parts = self.variances[_LEARNT, None, None] * alike
+        products = parts @ spread
+        slope = 0.5 * (parts @ pull @ pull - np.trace(products, axis1=1, axis2=2))
+        curvature = 0.5 * (products * products.transpose(0, 2, 1)).sum(axis=(1, 2))
+        self._curvature = (1 - _FORGOTTEN) * self._curvature + _BLOCK_SHARE * curvature
+        logs, precision = self._log_variances[_LEARNT], _VARIANCE_LOG_STD**-2
+        pulled_back = _FORGOTTEN * precision * (logs - np.log(_COMMON_VARIANCES[_LEARNT]))
+        step = (_BLOCK_SHARE * slope - pulled_back) / (self._curvature + precision)
+        self._log_variances[_LEARNT] = np.clip(logs + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP),
+                                               np.log(_LEAST_VARIANCE), np.log(_LARGEST_VARIANCE))
+
+    def _learn_scatter(self, power: Array, weight: Array, gain: Array, inside: npt.NDArray[np.bool_]) -> None:
+        """By how much the local means of a block scatter more than chance makes them: their variance less that of a
+        weighted sum of squares of what has the correlation that the resolved shares give it (Isserlis)."""
+        count = len(power)
+        neighbours = _neighbours(count, self._reach).real
+        correlation = np.fft.irfft(gain / (1 + gain), count)
+        if correlation[0] <= 0 or not power.any():
+            return
+        chance = 2 * float(np.fft.irfft(neighbours**2, count) @ correlation**2) / (correlation[0] * neighbours[0]) ** 2
+        mean = float(weight[inside].mean())
+        relative = power[inside] / np.maximum(weight[inside], _LEAST_OF_MEAN * mean)
+        found = float(np.var(relative) / np.mean(relative) ** 2) - chance
+        usual = 2 / _COMMON
+        self._scattered += mean * min(max(found, -usual), usual) - _FORGOTTEN * self._scattered
+        self._heard += mean - _FORGOTTEN * self._heard
+        scatter = (self._scattered + _COMMON * usual) / (self._heard + _COMMON)
+        self._common = 2 / max(scatter, 2 / _MOST_COMMON)
+
+
+@lru_cache(maxsize=32)
+def _neighbours(count: int, reach: float) -> npt.NDArray[np.complex128]:
+    """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
+    lag = np.minimum(np.arange(count), count - np.arange(count))
+    return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))
+
+
+@lru_cache(maxsize=16)
+def _processes(count: int, cell_m: float) -> Array:
+    """Covariances (lengths, count, count) over cells of processes of variance 1; kept, for there are few counts."""
+    lag_m = cell_m * np.abs(np.arange(count)[:, None] - np.arange(count))
+    return np.exp(-lag_m / LENGTHS_M[:, None, None])
+
+
+def mean_resolved(gain: Array, variance: Array) -> Array:
+    """Share of each wave that the readings resolve, mean over points of relative variance d (n,)."""
+    if not len(variance):
+        return gain / (1 + gain)
+    logs = np.log(variance)
+    lowest, width = logs.min(), (logs.max() - logs.min()) / _CLASSES
+    classes = np.minimum((logs - lowest) / width, _CLASSES - 1).astype(np.int64) if width else np.zeros(len(logs), int)
+    counts, sums = np.bincount(classes), np.bincount(classes, logs)
+    counts, sums = counts[counts > 0], sums[counts > 0]
+    strength = np.exp(sums / counts)[:, None] * gain
+    mean: Array = (counts / counts.sum()) @ (strength / (1 + strength))
+    return mean

@@ -1,0 +1,318 @@
+"""Roughness that differs from place to place, against exact posteriors and evidence of dense algebra."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from logger.estimation.car_response import CarResponse
+from logger.estimation.road_solver import Block, TimeGrid
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.roughness import LENGTHS_M, Roughness, mean_resolved
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_point
+
+SPACING_M, COUNT, SPEED_MPS, NOISE_MPS2 = 0.1524, 1024, 18.0, 0.06
+ROAD = RoadSpectrum.of_iri(2.5)  # as rough as the common road
+RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+
+
+@cache
+def a_grid() -> TimeGrid:
+    return TimeGrid(CarResponse(LinearCar(RAV4, body_point(RAV4))), COUNT, 100.0)
+
+
+@cache
+def a_block() -> tuple[Block, np.ndarray, np.ndarray]:
+    """A drive of ten seconds, its matrix B (t, count) column by column, and where the road was read."""
+    block = Block(a_grid(), SPEED_MPS / 100 * np.arange(COUNT), SPACING_M, 7.62)
+    unit = np.fft.rfft(np.eye(block.count), axis=1)
+    matrix = np.array([block.driven(row * block.wave_factors(ROAD)) for row in unit]).T
+    return block, matrix, block.seen(weights() > 0) > 0
+
+
+def weights() -> np.ndarray:
+    weight = np.full(COUNT, NOISE_MPS2**-2)
+    weight[:250] = 0.0
+    return weight
+
+
+def read(variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Readings (t,) of a road whose innovations have these variances."""
+    block, matrix, _ = a_block()
+    return matrix @ (np.sqrt(variance) * rng.standard_normal(block.count)) + rng.normal(0, NOISE_MPS2, COUNT)
+
+
+def settled(reading: np.ndarray, rounds: int = 16) -> Roughness:
+    """What is learnt of a block from nothing, round by round."""
+    block, _, seen = a_block()
+    found, start = Roughness(SPACING_M), None
+    for _ in range(rounds):
+        log_variance = found.solved_with(0, block.count)
+        solution = block.solve(reading, weights(), ROAD, np.exp(log_variance), 12, start)
+        start = solution.waves
+        found.learn(0, np.fft.irfft(start, block.count), log_variance, solution.gain, seen.astype(float))
+    return found
+
+
+def log_evidence(reading: np.ndarray, variance: np.ndarray) -> float:
+    """log N(y; 0, B D B' + drift + noise) of what was read."""
+    _, matrix, _ = a_block()
+    drift = a_grid().drift.T
+    covariance = (matrix * variance) @ matrix.T + (drift / a_grid().drift_precision) @ drift.T
+    used = weights() > 0
+    covariance = (covariance + NOISE_MPS2**2 * np.eye(COUNT))[np.ix_(used, used)]
+    y = reading[used]
+    return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * y @ np.linalg.solve(covariance, y))
+
+
+def stretches() -> np.ndarray:
+    """Smooth and rough stretches of 25 m: deviations a factor of four apart."""
+    place = SPACING_M * np.arange(a_block()[0].count)
+    return np.where(place // 25 % 2 == 0, 0.25, 4.0)
+
+
+def pothole() -> np.ndarray:
+    variance = np.ones(a_block()[0].count)
+    variance[700:706] = 400.0
+    return variance
+
+
+def test_nothing_known_is_a_common_road() -> None:
+    found = Roughness(SPACING_M)
+    assert found.at(-500, 40).tolist() == [0.0] * 40 and found.solved_with(7, 3).tolist() == [0.0] * 3
+
+
+def near(count: int) -> np.ndarray:
+    """(count, count) weights of neighbours, a Gaussian of 1 m on a closed grid."""
+    apart = np.abs(np.arange(count)[:, None] - np.arange(count))
+    weight: np.ndarray = np.exp(-0.5 * (np.minimum(apart, count - apart) * SPACING_M) ** 2)
+    return weight
+
+
+@pytest.mark.parametrize("variance_of", [stretches, pothole])
+def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[], np.ndarray]) -> None:
+    """From the posterior covariance S of dense algebra, r = 1 - S_ii / d_i: the level by one step of the evidence of a
+    Student t on the posterior of a Gaussian process, then the scale by MacKay's fixed point with four points that say
+    1, of whose logarithm 0.6 is taken over."""
+    block, matrix, seen = a_block()
+    before = variance_of()
+    reading = read(before, np.random.default_rng(1))
+    precision = matrix.T @ (weights()[:, None] * matrix)
+    posterior = np.linalg.inv(precision + np.diag(1 / before))
+    innovations = posterior @ (matrix.T @ (weights() * reading))
+    resolved = 1 - np.diag(posterior) / before
+    share = posterior @ precision  # of what is true at each point, in what is found
+    freedom = np.einsum("ij,ji->i", share, share)
+    around = near(block.count)
+    power, taken, own, squares = (around @ (row * seen) for row in (
+        innovations**2, resolved, freedom, innovations**2 - (resolved - freedom) * before))
+
+    size = round(4.0 / SPACING_M)
+    cells = np.arange(block.count) // size
+    cells = cells - cells[np.flatnonzero(seen)[0]]
+    inside = cells >= 0
+    each = seen / around[0].sum()
+    slope = np.bincount(cells[inside], (2 * (squares - own) / (4 + squares) * each)[inside])
+    bend = np.bincount(cells[inside], (2 * own / (4 + own) * each)[inside])
+    apart_m = size * SPACING_M * np.abs(np.subtract.outer(np.arange(len(bend)), np.arange(len(bend))))
+    prior = np.tensordot([0.05, 0.15, 1.8**2], np.exp(-apart_m / LENGTHS_M[:, None, None]), 1)
+    level = np.clip(np.linalg.solve(np.linalg.inv(prior) + np.diag(bend), slope), -0.7, 0.7)
+    scale = (4 + power[inside] * np.exp(-level[cells[inside]])) / (4 + taken[inside])
+    expected = level[cells[inside]] + 0.6 * np.log(scale) + 0.4 * (np.log(before[inside]) - level[cells[inside]])
+
+    found, gain = Roughness(SPACING_M), block.solve(reading, weights(), ROAD, before, 1).gain
+    found.learn(0, innovations, np.log(before), gain, seen.astype(float))
+    chosen = np.flatnonzero(seen)[40:-40]
+    expected = expected[chosen - np.flatnonzero(inside)[0]]
+    assert np.std(expected - np.log(before[chosen])) > 0.3  # there is something to learn
+    assert found.solved_with(0, block.count)[chosen] == pytest.approx(expected, abs=0.08)
+
+
+@pytest.mark.parametrize("variance_of", [stretches, pothole])
+@pytest.mark.parametrize("seed", [10, 11])
+def test_what_is_settled_on_explains_the_readings(variance_of: Callable[[], np.ndarray], seed: int) -> None:
+    """Of the evidence that the true variances gain over a road as rough everywhere, most is gained."""
+    reading = read(variance_of(), np.random.default_rng(seed))
+    found = np.exp(settled(reading).solved_with(0, a_block()[0].count))
+    even, found, true = (
+        log_evidence(reading, variance) for variance in (np.ones(a_block()[0].count), found, variance_of()))
+    assert true - even > 100
+    assert found - even > 0.75 * (true - even)
+
+
+def test_a_gaussian_road_stays_as_rough_everywhere() -> None:
+    block, _, seen = a_block()
+    scatter = []
+    for seed in range(8):
+        found = settled(read(np.ones(block.count), np.random.default_rng(100 + seed))).solved_with(0, block.count)
+        assert np.abs(found[seen]).max() < 1.4
+        scatter.append(found[seen])
+    assert abs(np.mean(scatter)) < 0.15 and np.std(scatter) < 0.35
+
+
+def scores_of(log_variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Errors of the mean log variance over stretches of 8 m, in standard errors."""
+    _, _, seen = a_block()
+    found = settled(read(np.exp(log_variance), rng))
+    off = found.at(0, len(log_variance)) - log_variance
+    inside = np.flatnonzero(seen)
+    firsts = range(inside[0], inside[-1] - 52, 52)
+    return np.array([off[first:first + 52].mean() / found.log_std(first, 52) for first in firsts])
+
+
+def test_the_error_of_a_road_whose_processes_are_as_believed() -> None:
+    """Log variance drawn from the prior: the processes, and a scale every 2.5 m as four points give it."""
+    count, scores = a_block()[0].count, []
+    apart_m = SPACING_M * np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    by_length = np.exp(-apart_m / LENGTHS_M[:, None, None])
+    root = np.linalg.cholesky(np.tensordot(Roughness(SPACING_M).variances, by_length, 1))
+    for seed in range(16):
+        rng = np.random.default_rng(200 + seed)
+        scale = np.repeat(np.log(4 / rng.chisquare(4, count // 16 + 1)), 16)[:count]
+        scores.append(scores_of(np.clip(root @ rng.standard_normal(count), -3, 3) + scale, rng))
+    score = np.concatenate(scores)
+    assert abs(np.mean(score)) < 0.5  # a mean of variances is above that of their logarithms
+    assert 0.7 < np.sqrt(np.mean(score**2)) < 1.3
+
+
+def test_a_step_of_the_level_is_followed_within_some_metres() -> None:
+    """Eight times smoother behind a joint of two surfaces: no roughness leaks into what comes 10 m after it."""
+    block, _, seen = a_block()
+    step = np.where(np.arange(block.count) < 600, 4.0, 0.5)
+    behind = slice(600 + 66, np.flatnonzero(seen)[-1] - 66)
+    found = [float(settled(read(step, np.random.default_rng(20 + seed))).at(0, block.count)[behind].mean())
+             for seed in range(6)]
+    assert np.mean(found) == pytest.approx(np.log(0.5), abs=0.35)
+
+
+def test_a_pothole_raises_no_level() -> None:
+    """A hundred times the variance over 0.8 m: 15 m from it the road is as rough as without it."""
+    block, _, _ = a_block()
+    beside = [slice(700 - 200, 700 - 100), slice(700 + 106, 700 + 206)]
+    with_hole, without = (
+        np.mean([settled(read(variance, np.random.default_rng(30 + seed))).at(0, block.count)[part]
+                 for seed in range(4) for part in beside])
+        for variance in (pothole(), np.ones(block.count)))
+    assert with_hole == pytest.approx(without, abs=0.15)
+
+
+def learnt_from(first: int, innovations: np.ndarray, found: Roughness) -> None:
+    """A block that shows its innovations exactly, until it settles."""
+    count = len(innovations)
+    for _ in range(16):
+        found.learn(first, innovations, found.solved_with(first, count), np.full(count // 2 + 1, 1e6), np.ones(count))
+
+
+def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None:
+    """The filter that carries it is exact: the same levels and errors as from one long block."""
+    size = round(4.0 / SPACING_M)
+    innovations = np.random.default_rng(3).standard_normal(60 * size) * np.repeat([1.0, 3.0, 0.5], 20 * size)
+    whole, parts = Roughness(SPACING_M), Roughness(SPACING_M)
+    learnt_from(0, innovations, whole)
+    learnt_from(0, innovations[:40 * size], parts)
+    learnt_from(24 * size, innovations[24 * size:], parts)
+    inner = 42 * size, 16 * size
+    assert parts.at(*inner) == pytest.approx(whole.at(*inner), abs=0.02)
+    assert parts.log_std(*inner) == pytest.approx(whole.log_std(*inner), rel=0.02)
+    alone = Roughness(SPACING_M)
+    learnt_from(24 * size, innovations[24 * size:], alone)
+    assert abs(alone.at(24 * size, size) - whole.at(24 * size, size)).max() > 0.02  # it has no road behind it
+
+
+def test_what_is_learnt_is_kept_by_place() -> None:
+    """Points have their numbers whatever block they lie in; what no block has seen yet goes on as the last one."""
+    rng = np.random.default_rng(3)
+    found = Roughness(SPACING_M)
+    learnt_from(-40, rng.standard_normal(512) * np.repeat([1.0, 5.0], 256), found)
+    whole = found.solved_with(-40, 512)
+    assert whole[300:480].mean() > whole[40:220].mean() + 2.5
+    part = found.solved_with(60, 600)
+    assert part[:412].tolist() == whole[100:].tolist() and part[460:].std() < 1e-9
+
+
+def test_readings_that_tell_nothing_teach_nothing() -> None:
+    found = Roughness(SPACING_M)
+    found.learn(0, np.zeros(256), np.zeros(256), np.full(129, 1e-9), np.ones(256))
+    assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
+    assert found.log_std(0, 100) == pytest.approx(np.sqrt(1.8**2 + 0.2 + 0.5), rel=0.05)
+    found.learn(0, np.zeros(256), np.full(256, 2.0), np.full(129, 1e3), np.zeros(256))
+    assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
+
+
+def test_less_power_than_expected_makes_a_road_as_much_smoother_as_more_makes_it_rougher() -> None:
+    """Readings that resolve little, of a road as rough as believed: the mean over many draws stays where it is."""
+    rng = np.random.default_rng(4)
+    gain, share, found = np.full(513, 0.15), 0.15 / 1.15, []
+    for _ in range(300):
+        one = Roughness(SPACING_M)
+        one.learn(0, np.sqrt(share) * rng.standard_normal(1024), np.zeros(1024), gain, np.ones(1024))
+        found.append(one.solved_with(0, 1024).mean())
+    assert np.mean(found) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("variance", [
+    np.ones(300), np.full(300, 3.7), 4.0 ** np.sin(np.arange(300) / 20), np.where(np.arange(300) == 150, 900.0, 0.3),
+])
+def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
+    gain = np.geomspace(1e-4, 1e4, 41)
+    direct = (variance[:, None] * gain / (1 + variance[:, None] * gain)).mean(axis=0)
+    tolerance = 1e-12 if np.ptp(variance) == 0 else 2e-3
+    assert mean_resolved(gain, variance) == pytest.approx(direct, abs=tolerance)
+    assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
+
+
+def learnt_over_drives(variance: np.ndarray) -> tuple[float, Roughness]:
+    """Scatter of the log variance over the road that was read, over the last of twelve drives; and what is believed."""
+    block, _, seen = a_block()
+    rng, scatter, found = np.random.default_rng(5), [], Roughness(SPACING_M)
+    for drive in range(12):
+        reading, start = read(variance, rng), None
+        for left in reversed(range(4)):
+            before = found.solved_with(0, block.count)
+            solution = block.solve(reading, weights(), ROAD, np.exp(before), 12, start)
+            start = solution.waves
+            found.learn(0, np.fft.irfft(start, block.count), before, solution.gain, seen.astype(float), 1.0, left == 0)
+        if drive > 8:
+            scatter.append(found.solved_with(0, block.count)[seen].std())
+    return float(np.mean(scatter)), found
+
+
+@pytest.mark.slow
+def test_that_a_road_is_gaussian_is_learnt_and_that_it_is_patchy_is_kept() -> None:
+    even, patchy = np.ones(a_block()[0].count), np.where(np.arange(a_block()[0].count) // 60 % 3 == 0, 6.0, 1.0)
+    scatter, believed = learnt_over_drives(even)
+    of_patches, of_patchy = learnt_over_drives(patchy)
+    assert scatter < 0.2 < 0.5 < of_patches
+    assert believed.variances[:2].sum() < 0.2 < of_patchy.variances[:2].sum()
+
+
+def test_what_readings_are_about_a_point_is_weighed_as_its_innovation_shows_in_them() -> None:
+    block, matrix, seen = a_block()
+    lag = np.arange(COUNT)[:, None] - np.arange(COUNT)
+    row = np.exp(-0.5 * (lag / 30) ** 2) @ np.random.default_rng(6).standard_normal(COUNT)
+    power = matrix**2
+    exact = (row @ power / power.sum(axis=0))[seen]
+    inner = slice(60, -60)
+    assert np.corrcoef(block.about(row)[seen][inner], exact[inner])[0, 1] > 0.97
+    assert block.about(np.full(COUNT, 0.3)) == pytest.approx(np.full(block.count, 0.3))
+
+
+def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it() -> None:
+    """Slow waves alone are resolved, so that chance makes means scatter much; one block shows none at all."""
+    count = 1024
+    rng = np.random.default_rng(7)
+    gain = np.where(np.arange(count // 2 + 1) < 12, 1e4, 1e-9)
+    slow = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * (gain > 1), count)
+    patchy = slow * np.where(np.arange(count) // 100 % 3 == 0, 3.0, 0.3)
+    even = np.full(count, float(slow.std()))
+    found, fresh = Roughness(SPACING_M), Roughness(SPACING_M)
+    for innovations in [even, patchy] * 30:
+        found.learn(0, innovations, np.zeros(count), gain, np.ones(count), learns=True)
+    fresh.learn(0, patchy, np.zeros(count), gain, np.ones(count))
+    scatter, unlearnt = (float(one.solved_with(0, count).std()) for one in (found, fresh))
+    assert scatter > 0.5 * unlearnt
