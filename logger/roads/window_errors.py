@@ -5,9 +5,10 @@ sections of 0.1 mi were out by 1.6 to 3.8 times their standard errors. Solution:
 and each part has its own rule.
 
 own       what the readings leave open of the slope; its memory is a metre or two, so variances add
-level     how rough the road is there is not known better; the error fades along the way as exp(-d / 60 m). Measured
-          over 120 simulated drives (10 to 70 mph, 2 and 4 g, noise 0.147 m/s2): of 15, 30, 60, 120, 240 and 1000 m the
-          likeliest length is 60 or 120 m on roads whose level changes, 15 to 60 m on roads with holes
+level     how rough the road is there is not known better; the error fades along the way as exp(-d / 30 m). Measured
+          over simulated drives of 4.2 km (10 to 70 mph, 2 and 4 g, noise 0.147 m/s2) on roads that change in steps,
+          slowly, not at all, and that have holes: of 8, 15, 30, 45, 60, 120 and 1000 m the likeliest is 30 m; at 2 g
+          its log likelihood is 9 above that of 15 m and 22 above that of 45 m
 common    numbers of the vehicle and of the sensor are wrong; all windows of a car share it
 place     a window lies some way on: what one gains at its end its neighbour loses, so a row of windows is off as much
           as its two ends are
@@ -28,7 +29,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
-ALONG_M = 60.0
+ALONG_M = 30.0
 _FADED = 1e-3
 
 

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.profiles.track import Track
@@ -177,17 +178,22 @@ def test_errors_cover_windows_that_are_misplaced(sensor: Sensor) -> None:
     assert without > (1.2 if sensor is FINE else 1.05)  # the place's error is not small here
 
 
+def changing(seed: int) -> np.ndarray:
+    """A road whose slopes get e times as steep or as flat, every 20 to 300 m or so."""
+    rng = np.random.default_rng(seed)
+    slope = np.diff(an_iso_road(2.0, 1500, 60 + seed))
+    changes = np.append(0, np.cumsum(np.exp(rng.uniform(np.log(20), np.log(300), 30))) / SPACING_M).astype(int)
+    gain = np.exp(rng.choice((-0.5, 0.5), len(changes)))
+    slope *= gain[np.searchsorted(changes, np.arange(len(slope)), side="right") - 1]
+    return np.append(0.0, np.cumsum(slope - slope.mean()))
+
+
 @pytest.mark.slow
 def test_sections_of_roads_that_change_have_right_standard_errors() -> None:
-    """Eight drives over roads whose slopes double or halve every 20 to 300 m: errors over their standard errors."""
+    """Eight drives: errors over their standard errors."""
     whole, alone = [], []
     for seed in range(8):
-        rng = np.random.default_rng(seed)
-        slope = np.diff(an_iso_road(2.0, 1500, 60 + seed))
-        changes = np.append(0, np.cumsum(np.exp(rng.uniform(np.log(20), np.log(300), 30))) / SPACING_M).astype(int)
-        gain = np.exp(rng.choice((-0.5, 0.5), len(changes)))
-        slope *= gain[np.searchsorted(changes, np.arange(len(slope)), side="right") - 1]
-        road = np.append(0.0, np.cumsum(slope - slope.mean()))
+        road = changing(seed)
         accel, distance_m = driven(road, (9.0, 15.0, 22.0, 30.0)[seed % 4])
         found = estimated(COARSE, read(accel, COARSE, seed), distance_m)
         start_m = WINDOW_M * np.array([one.number for one in found])
@@ -204,4 +210,28 @@ def test_sections_of_roads_that_change_have_right_standard_errors() -> None:
     spread, independent = (float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in (whole, alone))
     print(f"errors of 0.1 mi over their standard errors: {spread:.2f} (right: 1); as if windows shared nothing: "
           f"{independent:.2f}")
-    assert 0.7 < spread < 1.4 < independent
+    assert 0.75 < spread < 1.25 < independent
+
+
+@pytest.mark.slow
+def test_the_ride_of_roads_that_change_is_not_taken_for_a_harder_one() -> None:
+    """Mean a_w of eight drives, and how often the true one lies within its errors; the weighting by its formula."""
+    rows = []
+    for seed in range(8):
+        accel, distance_m = driven(changing(seed), (9.0, 15.0, 22.0, 30.0)[seed % 4])
+        estimator = RoadEstimator(LinearCar(RAV4, body_point(RAV4)), COARSE, WINDOW_M, ride_response=WEIGHTING.response)
+        reading, nothing = read(accel, COARSE, seed), np.zeros(len(accel))
+        found = estimator.push(reading, nothing == 0, nothing, distance_m) + estimator.finish()
+        after = np.append(accel, np.zeros(2000))
+        waves = np.fft.rfft(after) * WEIGHTING.response(np.fft.rfftfreq(len(after), 0.01))
+        squares = np.fft.irfft(waves, len(after)) ** 2
+        sums = np.append(0.0, np.cumsum(squares))
+        for one in found:
+            low, high = np.searchsorted(distance_m, WINDOW_M * np.array([one.number, one.number + 1]))
+            rows.append((np.sqrt((sums[high] - sums[low]) / (high - low)), one.ride.a_w.value, one.ride.a_w.std))
+    true, value, std = np.array([row for row in rows if np.isfinite(row).all()]).T
+    off = np.abs(value - true) / std
+    print(f"a_w {value.mean() / true.mean() - 1:+.1%}, in one {np.mean(off < 1):.2f}, in two {np.mean(off < 2):.2f}")
+    assert value.mean() == pytest.approx(true.mean(), rel=0.03)
+    assert 0.6 < np.mean(off < 1) < 0.8
+    assert np.mean(off < 2) > 0.92
