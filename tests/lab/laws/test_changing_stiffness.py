@@ -18,6 +18,7 @@ from ...support.lab.secret_runs import CAR, secret_runs
 LONG_AFTER = slice(600, None)  # ten time constants, and what rings after them
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("of", "number"), [("springs", "suspension_stiffness_n_per_m"),
                                             ("tires", "tire_stiffness_n_per_m")])
 def test_long_after_it_is_a_car_with_that_stiffness(of: str, number: str) -> None:

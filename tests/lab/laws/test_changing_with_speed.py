@@ -57,6 +57,7 @@ def steady_runs() -> list[Run]:
             for run, speed_mps in zip(secret_runs().runs, SPEEDS_MPS, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of", CARS)
 def test_at_one_speed_it_is_a_car_with_another_number(of: str) -> None:
     runs = steady_runs()

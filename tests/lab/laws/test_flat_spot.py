@@ -57,6 +57,7 @@ def test_on_one_wheel_it_is_a_road_that_dips_once_in_each_turn() -> None:
         assert np.std((here - there)[300:]) < 0.05 * np.std((there - before)[300:])
 
 
+@pytest.mark.slow
 def test_it_is_drafted_where_it_is() -> None:
     by_name = {one.name: one.start for one in dented().parameters}
     assert by_name["turn_radius_m"] == pytest.approx(RADIUS_M, rel=0.002)

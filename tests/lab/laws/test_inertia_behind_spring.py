@@ -60,6 +60,7 @@ def check_alike(law: Chosen, other: Chosen) -> None:
         assert np.std((found - expected)[kept]) < 0.01 * np.std((before - expected)[kept])
 
 
+@pytest.mark.slow
 def test_it_is_a_car_with_one_more_coordinate_in_each_suspension() -> None:
     check_alike(chosen(draft_of("sprung").effect, {
         "stiffness_n_per_m": STIFFNESS_N_PER_M, "frequency_hz": HZ, "damping_ratio": RATIO, "square_per_m": 0.0}),

@@ -42,6 +42,7 @@ def test_nothing_is_tried_where_the_residual_is_noise() -> None:
     assert not FAMILY.drafts(LawContext(posterior, posterior.start()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "upwards"), [(0.95, True), (0.995, False)])
 def test_what_holds_it_is_found_closely_whether_blows_or_flights_are_most_of_it(share: float, upwards: bool) -> None:
     """In a long flight the record stays behind, downwards, and the residual is skewed the other way."""

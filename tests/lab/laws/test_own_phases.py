@@ -54,6 +54,7 @@ def test_a_hum_that_begins_elsewhere_in_each_run_is_found_with_a_pair_for_each()
         assert pair == pytest.approx([SIZE_MPS2 * np.cos(phase), -SIZE_MPS2 * np.sin(phase)], abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_wheel_of_each_run_is_as_if_that_run_were_alone() -> None:
     one, other = secret_runs().runs
     each = WHEEL_TURNS._draft(("front", "rear"), ("run_1", "run_2"), 0.31, "each")

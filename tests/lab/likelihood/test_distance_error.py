@@ -181,6 +181,7 @@ def wrong_speed(run: Run, wrong: tuple[float, float, int], number: int) -> Run:
     return with_wrong_speed(run, *wander, seed + number)
 
 
+@pytest.mark.slow
 def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float, int]) -> None:
     true = noisy_runs()
     runs = [wrong_speed(run, wrong, i) for i, run in enumerate(true)]
@@ -327,6 +328,7 @@ def test_places_by_the_road_may_all_be_late_by_as_much_as_is_looked_for(size: Er
     assert np.linalg.slogdet(error.precision(size))[1] == pytest.approx(error.log_determinant(size), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_a_model_of_another_phase_felt_late_is_no_late_clock() -> None:
     """The same 20 ms in all runs, as of a body's bounce by a damper that is off by a third."""
     late = [replace(run, distance_m=run.distance_m + 0.02 * run.speed_mps) for run in noisy_runs(lasts_s=20.0)]

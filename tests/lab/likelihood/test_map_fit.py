@@ -72,6 +72,7 @@ def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
         damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
 
 
+@pytest.mark.slow
 def test_a_fit_to_the_end_goes_on_where_rounds_are_over_and_no_farther_than_it_gains() -> None:
     posterior = damped().posterior
     start = align(posterior, posterior.start([tire_damping(3000.0)]))

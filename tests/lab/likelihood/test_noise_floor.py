@@ -126,6 +126,7 @@ def test_what_is_above_the_noise_is_recognised_by_its_share(share: float, unexpl
     assert (gain_of_full_explanation(posterior, state) > 0) == unexplained
 
 
+@pytest.mark.slow
 def test_noise_alone_is_hardly_ever_unexplained_however_short_a_run_is() -> None:
     """Beside a long one, which tells the noise."""
     times = 0

@@ -71,6 +71,7 @@ def test_noise_alone_was_not_filtered(level: float, by_recorder: bool) -> None:
     assert detect_low_passes(noisy, [0.01 * one for one in predictions]) == [None, None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [
     (), ("dry_friction",), ("tire_enveloping",), ("top_mount_compliance",), ("sensor_mount_resonance",),
     ("damper_blow_off",), ("body_bending",), ("occupant",), ("sensor_offset",), ("sensor_bandwidth",),
