@@ -47,10 +47,11 @@ class RoadMatch:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the road is another one: the run correlates less than with the right road, which stands out from what
-        comes by chance in the mean, and no more than by chance, with either sign."""
-        return (max(self.correlation, self.turned) < min(self.chance, self.expected)
-                and self.mean_chance < self.expected)
+        """Whether the road is another one: its correlation would have been significant, and the run's is not, with
+        either sign; or in a short run, whose chance is large, the run's is below what chance gives in the mean, and
+        that below the right road's."""
+        found = max(self.correlation, self.turned)
+        return found < self.chance < self.expected or found < self.mean_chance < self.expected
 
     @property
     def is_clear(self) -> bool:
