@@ -51,16 +51,20 @@ _CLASSES = 8
 
 @dataclass(frozen=True)
 class _Level:
-    """L of cells from number ``first`` on (c,), what readings say of it, ``shown``, with ``information`` about it; of
-    those from ``edge`` on the covariance of its error (e, e). ``state`` (k,) and ``state_covariance`` (k, k) are what
-    cells before the edge say of the processes there."""
+    """L of cells from number ``first`` on (c,), what readings say of it, ``shown``, with ``information`` about it.
+
+    Of the cells from ``edge`` on: ``prior`` is the covariance of L before them, ``spread`` the inverse of that of what
+    is shown, both (e, e). ``state`` (k,) and ``state_covariance`` (k, k) are what cells before the edge say of the
+    processes there.
+    """
 
     first: int
     log_level: Array
     shown: Array
     information: Array
     edge: int
-    covariance: Array
+    prior: Array
+    spread: Array
     state: Array
     state_covariance: Array
 
@@ -107,9 +111,10 @@ class Roughness:
         if self._level is None:
             return 0.0
         at = (first + np.arange(count)) // self._cell - self._level.edge
-        weight = np.bincount(np.clip(at, 0, len(self._level.covariance) - 1)) / count
-        near = self._level.covariance[:len(weight), :len(weight)]
-        error = float(weight @ near @ weight) + float(self._kept(self._scale_error, first, count).mean())
+        weight = np.bincount(np.clip(at, 0, len(self._level.prior) - 1)) / count
+        alike = weight @ self._level.prior[:len(weight)]
+        of_level = float(alike[:len(weight)] @ weight - alike @ self._level.spread @ alike)
+        error = of_level + float(self._kept(self._scale_error, first, count).mean())
         return float(np.sqrt(max(error, 0.0)))
 
     def _kept(self, row: Array, first: int, count: int) -> Array:
@@ -171,7 +176,8 @@ class Roughness:
         if old is None:
             nothing = np.zeros(1)
             state = np.zeros(len(LENGTHS_M))
-            old = _Level(edge, nothing, nothing, nothing, edge, np.zeros((1, 1)), state, np.diag(self.variances))
+            none = np.zeros((1, 1))
+            old = _Level(edge, nothing, nothing, nothing, edge, none, none, state, np.diag(self.variances))
         edge = max(edge, old.edge)
         state, state_covariance = self._carried(old, edge)
         now, total = old.cells(edge, end - edge)[0], end - edge
@@ -194,7 +200,7 @@ class Roughness:
             self._learn_variances(alike[_LEARNT], pull, spread)
         level, shown, information = (np.concatenate(pair) for pair in zip(
             old.cells(begin, edge - begin), (now, shown, bend), strict=True))
-        self._level = _Level(begin, level, shown, information, edge, prior - prior @ spread @ prior, state,
+        self._level = _Level(begin, level, shown, information, edge, prior, spread, state,
                              state_covariance)
 
     def _carried(self, old: _Level, edge: int) -> tuple[Array, Array]:
