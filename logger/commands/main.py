@@ -84,6 +84,9 @@ class _Help(argparse.RawDescriptionHelpFormatter):
     def _split_lines(self, text: str, width: int) -> list[str]:
         return textwrap.wrap(" ".join(text.split()), width, break_long_words=False, break_on_hyphens=False)
 
+    def _expand_help(self, action: argparse.Action) -> str:
+        return action.help or ""  # as it stands: "2 %" is no place for a value
+
 
 _SAID = (
     (r"argument (\S+): invalid float value: '(.*)'", r"\1 \2: expected a number"),
