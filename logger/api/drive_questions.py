@@ -263,10 +263,10 @@ class ModesQuestion(Question):
 
 @dataclass(frozen=True)
 class ModesCommand(ModesQuestion):
-    """At the terminal a vehicle alone, or an example, can be asked for as well."""
+    __doc__ = ModesQuestion.__doc__    # at the terminal a vehicle alone, or an example, can be asked for as well
 
-    record: Annotated[Union["ChannelRecord", Path, str], Argument(
-        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = Path()
+    record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
+        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
     _: KW_ONLY
     iri_m_per_km: Annotated[float | None, Option(
         f"of a vehicle alone: road for laws that are not linear (default: {COMMON_IRI:g})", IRI, "M_PER_KM")] = None
@@ -277,25 +277,25 @@ class ModesCommand(ModesQuestion):
     def __post_init__(self) -> None:
         super().__post_init__()
         alone = (f"`example` {self.example}" if self.example is not None else
-                 f"`vehicle` {self.vehicle}" if self.vehicle is not None and self.record == Path() else None)
+                 f"`vehicle` {self.vehicle}" if self.vehicle is not None and self.record is None else None)
         if self.example is not None and self.vehicle is not None:
             raise self.complaint(f"`vehicle` {self.vehicle}: expected no `example` with it")
         if alone is not None:
-            if self.record != Path():
+            if self.record is not None:
                 raise self.complaint(f"{alone}: expected no FILE with it, found {self.record}")
             of_files = ("method", "columns", "input_column", "order", "response", "from_s", "to_s")
             if given := [one for one in of_files if getattr(self, one) is not None]:
                 raise self.wrong(given[0], f": expected a FILE with it, not {alone}")
-        if (self.iri_m_per_km is not None and (self.vehicle is None or self.record != Path())) or (
+        if (self.iri_m_per_km is not None and (self.vehicle is None or self.record is not None)) or (
                 self.speed_mps is not None and self.vehicle is None):
             raise self.complaint("`iri_m_per_km` and `speed_mps`: expected `vehicle` with them"
                                  + (", and no FILE with `iri_m_per_km`" if self.vehicle is not None else ""))
-        if alone is None and self.record == Path():
+        if alone is None and self.record is None:
             raise self.complaint("modes: expected a FILE (try 'ridelog modes --help')")
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         """Poles and pictures are of a record alone."""
-        if self.record == Path() and any(files.values()):
+        if self.record is None and any(files.values()):
             flag = next(flag for flag, paths in files.items() if paths)
             raise self.complaint(f"{flag}: expected a FILE with it")
         if files.get("--diagram") and (self.method == "decrement" or self.vehicle is not None):

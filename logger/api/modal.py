@@ -89,7 +89,7 @@ def asked_modes(question: ModesCommand) -> CommandResult:
     if question.example is not None:
         example = five_storey()
         return CommandResult("\n".join(example_lines(example)), example)
-    if question.vehicle is not None and question.record == Path():
+    if question.vehicle is not None and question.record is None:
         return vehicle_modes(model_of(question.vehicle), question.iri_m_per_km or COMMON_IRI,
                              question.speed_mps or COMMON_SPEED_MPS)
     return modes_of(question)

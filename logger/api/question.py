@@ -210,13 +210,19 @@ def askings(question: type[Any]) -> tuple[Asking, ...]:
 
 
 def function(name: str, question: Callable[P, Asked], answer: Callable[[Asked], R]) -> Callable[P, R]:
-    """The verb as a function in Python: it takes the question's fields, and gives the answer."""
+    """The verb as a function in Python: it takes the question's fields, and gives the answer. It stands in the module
+    of ``answer``, by this name."""
     def ask(*values: P.args, **options: P.kwargs) -> R:
-        return answer(question(*values, **options))
+        try:
+            bound = signature.bind(*values, **options)
+        except TypeError as error:
+            raise TypeError(f"{name}() {error}") from None
+        return answer(question(*bound.args, **bound.kwargs))
 
     of = question if isinstance(question, type) else type(question)
+    signature = inspect.Signature(_parameters(of))
     ask.__name__ = ask.__qualname__ = name
-    ask.__module__ = of.__module__
+    ask.__module__ = answer.__module__
     ask.__doc__ = "\n".join([inspect.getdoc(of) or "", "", *_described(of)])
     ask.__dict__["__signature__"] = inspect.Signature([
         one.replace(annotation=_Shown(one.annotation), default=_Shown(one.default) if callable(one.default) and

@@ -50,20 +50,20 @@ class IriQuestion(ProfileQuestion):
 
 @dataclass(frozen=True)
 class IriCommand(IriQuestion):
-    """At the terminal the response of the IRI itself can be asked for as well."""
+    __doc__ = IriQuestion.__doc__    # at the terminal the response of the IRI itself can be asked for as well
 
-    profile: Annotated[Union["Profile", Path, str], Argument(
-        "CSV or ERD file", metavar="PROFILE", read=Path)] = Path()
+    profile: Annotated[Union["Profile", Path, str, None], Argument(
+        "CSV or ERD file", metavar="PROFILE", read=Path)] = None  # type: ignore[assignment]
     _: KW_ONLY
     response: Annotated[bool, Option(
         "without a profile: how strongly the IRI responds to each wavelength, as a table")] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.response and (self.profile != Path() or self.localized_m_per_km is not None):
+        if self.response and (self.profile is not None or self.localized_m_per_km is not None):
             raise self.wrong("response", ": expected no PROFILE and no `localized_m_per_km`, it is the response of the "
                                          "IRI itself")
-        if not self.response and self.profile == Path():
+        if not self.response and self.profile is None:
             raise self.complaint("expected a PROFILE, or `response`")
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import inspect
+import pickle
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -9,8 +10,22 @@ from typing import Annotated, Any
 
 import pytest
 
-from logger.api.question import Argument, Asking, Entries, Option, Question, Switches, Verb, askings, function
+import ridelog
+from logger.api.drive_questions import ModesCommand, ModesQuestion
+from logger.api.question import (
+    Argument,
+    Asking,
+    Entries,
+    Option,
+    Question,
+    Switches,
+    Verb,
+    askings,
+    function,
+    help_of,
+)
 from logger.api.ranges import Range
+from logger.api.road_questions import IriCommand, IriQuestion
 from logger.commands import options
 from logger.commands.main import ASKED
 from logger.errors import BadInput
@@ -109,3 +124,24 @@ def test_each_option_is_explained_and_each_number_has_its_unit() -> None:
     units = {"_hz": "Hz", "_mps": "m/s", "_mps2": "m/s2", "_m": "m"}
     assert not [(verb, one.name) for verb, one in every_option() for end, unit in units.items()
                 if one.name.endswith(end) and one.option.range and one.option.range.unit != unit]
+
+
+def test_a_function_is_found_where_it_stands() -> None:
+    verbs = [one for one in map(ridelog.__getattr__, ridelog.__all__) if hasattr(one, "__signature__")]
+    assert len(verbs) >= 15 and all(pickle.loads(pickle.dumps(one)) is one for one in verbs)
+
+
+@pytest.mark.parametrize(("values", "options", "words"), [
+    ((Path("a.csv"),), {"trys": 3}, r"ride\(\) got an unexpected keyword argument 'trys'"),
+    ((Path("a.csv"), 3), {}, r"ride\(\) too many positional arguments"),
+    ((), {}, r"ride\(\) missing a required argument: 'road'")])
+def test_python_names_the_function(values: tuple[Any, ...], options: dict[str, Any], words: str) -> None:
+    ride: Any = function("ride", Ask, lambda one: one)
+    with pytest.raises(TypeError, match=f"^{words}"):
+        ride(*values, **options)
+
+
+def test_what_the_terminal_adds_takes_no_help_away() -> None:
+    assert help_of(IriCommand) == help_of(IriQuestion) and help_of(IriQuestion).startswith("Exact IRI")
+    assert help_of(ModesCommand) == help_of(ModesQuestion) and "ridelog modes push.csv" in help_of(ModesQuestion)
+    assert "default: ." not in "".join(one.help for _, one in every_option())

@@ -173,3 +173,12 @@ def test_the_response_takes_no_road(more: list[str]) -> None:
 def test_a_window_that_has_no_length_is_refused_by_its_name(road: tuple[Path, np.ndarray], length: str) -> None:
     with pytest.raises(BadInput, match=r"^--window .*: expected a length above 0 m"):
         main(["iri", str(road[0]), "--window", length])
+
+
+def test_the_folder_where_one_is_has_a_profile(
+    road: tuple[Path, np.ndarray], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "profile.csv").write_bytes(road[0].read_bytes())
+    monkeypatch.chdir(tmp_path / "run")
+    assert as_json(capsys, Path())["iri_m_per_km"] == as_json(capsys, road[0])["iri_m_per_km"]

@@ -118,6 +118,7 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
     (["FILE", "--example", "five-storey"], "expected no FILE"),
     (["--example", "five-storey", "--method", "ssi"], "--method: expected a FILE with it, not --example five-storey"),
     (["--example", "five-storey", "--from", "0"], "--from: expected a FILE with it"),
+    ([".", "--vehicle", "rav4-2009", "--iri", "3"], "no FILE with --iri"),
 ])
 def test_wrong_use(decay: Path, arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):
