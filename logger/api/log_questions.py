@@ -106,7 +106,8 @@ class PassesQuestion(LogsQuestion):
     Each drive is matched to those before it as a whole: by its places, its direction, and the receiver's error, which
     changes over minutes. Streets some 15 m apart or more are distinguished, lanes of one direction are not. The
     standard error of a mean includes the errors that all windows of one drive share (the car, its tires, its load),
-    estimated from how drives differ. It cannot include what all drives share, such as a wrong vehicle file.
+    estimated from how drives differ. What all drives share, such as a wrong vehicle file, does not show in that: it
+    counts as far as the vehicle file and the learnt noise give their standard errors.
 
     In Python: raises BadInput for no log, and none with an intact row that counts.
 

@@ -55,8 +55,9 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUni
         return
     mean, error = _mean([one.whole for one in drives if one.whole.known_m[0] > 0])
     label, scale = units.iri
-    yield (f"Mean IRI {mean / scale:.{units.iri_decimals}f} {label}, standard error "
-           f"{error / scale:.{units.iri_decimals + 1}f}, over {total_m / unit_m:.2f} {name}")
+    sure = f"{error / scale:.{units.iri_decimals + 1}f}" if isfinite(error) else "not known"
+    yield (f"Mean IRI {mean / scale:.{units.iri_decimals}f} {label}, standard error {sure}, over "
+           f"{total_m / unit_m:.2f} {name}")
     words = [word for one in drives for word in one.condition]
     shares = {word: float(known_m[[here == word for here in words]].sum()) / total_m for word in FEDERAL_WORDS}
     yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())

@@ -23,6 +23,7 @@ from logger.roads.window_errors import WindowErrors, errors_of_means
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
+_ROUNDING = 1e-9  # of a measure, in cells
 _CELLS = 1 << 20
 _BITS = 24
 
@@ -74,8 +75,8 @@ def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Arra
     """Windows (n,) from and to measures of ways, in cells of a length; a window across a limit counts in each cell by
     its part. NaN in ``iri`` or its error, and negative ways, are left out."""
     known = (way >= 0) & np.isfinite(iri) & np.isfinite(errors.std) & (end_m > start_m)
-    first = np.floor(np.where(known, start_m, 0.0) / length_m).astype(np.int64)
-    count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - 1e-9).astype(np.int64) - first, 0)
+    first = np.floor(np.where(known, start_m, 0.0) / length_m + _ROUNDING).astype(np.int64)
+    count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - _ROUNDING).astype(np.int64) - first, 0)
     window = np.repeat(np.arange(len(way)), count)
     cell = first[window] + np.arange(len(window)) - np.repeat(np.cumsum(count) - count, count)
     piece_m = np.minimum(end_m[window], (cell + 1) * length_m) - np.maximum(start_m[window], cell * length_m)

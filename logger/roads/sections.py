@@ -15,6 +15,8 @@ from logger.roads.window_errors import WindowErrors, errors_of_means
 
 Array = npt.NDArray[np.float64]
 
+_ROUNDING = 1e-9  # of a measure, in windows
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -103,8 +105,10 @@ def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.int
     middle_m = (cuts[1:] + cuts[:-1]) / 2
     window = np.searchsorted(windows.start_m, middle_m, side="right") - 1
     section = np.searchsorted(edges_m, middle_m, side="right") - 1
+    piece_m = np.diff(cuts)
     inside = (window >= 0) & (middle_m < windows.end_m[window]) & (section >= 0) & (section < len(edges_m) - 1)
-    return np.diff(cuts)[inside], window[inside], section[inside]
+    inside &= piece_m > _ROUNDING * (windows.end_m - windows.start_m)[window]
+    return piece_m[inside], window[inside], section[inside]
 
 
 def _worst(windows: Windows, window: npt.NDArray[np.intp], section: npt.NDArray[np.intp], count: int

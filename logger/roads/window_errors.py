@@ -13,15 +13,17 @@ common    numbers of the vehicle and of the sensor are wrong; all windows of a c
 place     a window lies some way on: what one gains at its end its neighbour loses, so a row of windows is off as much
           as its two ends are
 
-A window cut by a limit counts with the mean of all of it, though a part may be rougher than the rest. The excess of a
-mean over small stretches is that of a random walk tied at both ends; how far it walks shows in the differences
-of neighbouring windows.
+A window cut by a limit counts with the mean of all of it, and so with the error of all of it. The road of a part may be
+rougher than the rest. The excess of a mean over small stretches is that of a random walk tied at both ends; how far it
+walks shows in the differences of neighbouring windows. No part differs more than a point does: the magnitude of a
+normal deviate has a variance of pi / 2 - 1 times its squared mean. The variance of a part is half the harmonic mean of
+both limits: its root is within a tenth of that of roads of ISO 8608, for 0.05 to 4 m of windows of 7.6 m.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import log
+from math import log, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -31,14 +33,16 @@ Ints = npt.NDArray[np.intp]
 
 ALONG_M = 30.0
 _FADED = 1e-3
+_POINT_SHARE = pi / 2 - 1
+_ROUNDING = 0.0005 * (1 + 3**0.5)  # of a whole and three parts with three decimals
 
 
 @dataclass(frozen=True, eq=False)
 class WindowErrors:
     """Standard errors of windows (n,) [m/km], whole and by their parts; NaN: not known.
 
-    Logs of older programs tell the whole alone. Then all of it counts as that of the level: their parts were measured
-    to be out so much that this is what makes sections right.
+    Logs of older programs have the whole alone. Then all of it counts as that of the level: this is what was measured
+    to make sections right. So it does where parts are negative, or larger together than the whole.
     """
 
     std: Array
@@ -59,10 +63,12 @@ class WindowErrors:
         return np.maximum(self.std**2 - level_std**2 - common_std**2 - place_std**2, 0.0)
 
     def parts(self) -> tuple[Array, Array, Array]:
-        """Level, common and place, where they are told; else all as level."""
-        told = np.isfinite(self.level_std) & np.isfinite(self.common_std) & np.isfinite(self.place_std)
-        return (np.where(told, self.level_std, self.std), np.where(told, self.common_std, 0.0),
-                np.where(told, self.place_std, 0.0))
+        """Level, common and place, where they are possible; else all as level."""
+        parts = np.stack([self.level_std, self.common_std, self.place_std])
+        with np.errstate(over="ignore"):
+            possible = (parts >= 0).all(axis=0) & (np.sqrt((parts**2).sum(axis=0)) <= self.std + _ROUNDING)
+        return (np.where(possible, self.level_std, self.std), np.where(possible, self.common_std, 0.0),
+                np.where(possible, self.place_std, 0.0))
 
     def of(self, rows: Ints) -> WindowErrors:
         """Those of some windows."""
@@ -75,17 +81,19 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
 
     errors, iri, at_m, length_m    of windows (n,): IRI [m/km], middles and lengths [m]
     window, piece_m, group         of pieces (p,): the window that each is cut from, how long it is [m], and the mean
-                                   that it counts in; those of one mean stand together, in the order driven
+                                   that it counts in; those of one mean stand together, in the order driven, and are of
+                                   different windows
     """
-    told, whole_m = errors.of(window), length_m[window]
-    level_std, common_std, place_std = told.parts()
+    of_windows, whole_m = errors.of(window), length_m[window]
+    level_std, common_std, place_std = of_windows.parts()
     level_std = level_std * piece_m
 
     def total(values: Array, of: Ints = group) -> Array:
         return np.asarray(np.bincount(of, values, count), dtype=np.float64)
 
-    own = total(piece_m * (told.own_variance * whole_m
-                           + _scatter(iri)[window] * np.maximum(whole_m - piece_m, 0.0)))
+    walk, point = _scatter_share(iri) * np.maximum(whole_m - piece_m, 0.0), _POINT_SHARE * piece_m
+    excess = np.divide(walk * point, walk + point, out=np.zeros(len(group)), where=walk + point > 0)
+    own = total(piece_m**2 * of_windows.own_variance + piece_m * excess * np.nan_to_num(iri[window]) ** 2)
     level = total(level_std**2)
     for lag in range(1, len(group)):
         apart_m = np.abs(at_m[window[lag:]] - at_m[window[:-lag]])
@@ -98,16 +106,18 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
     apart = np.abs(np.diff(middle_m)) > 0.75 * (whole_m[1:] + whole_m[:-1])
     ends = (np.diff(group) != 0) | apart
     first, last = np.append(True, ends)[:len(group)], np.append(ends, True)[:len(group)]
-    place = total((place_std * whole_m) ** 2 / 2 * (first.astype(np.float64) + last))
+    share = np.divide(piece_m, whole_m, out=np.ones(len(group)), where=whole_m > 0)
+    moved = (place_std * whole_m) ** 2 / 2
+    place = total(moved * share**2 * (first.astype(np.float64) + last))
+    place += total(np.where(ends, 0.0, np.diff(share) ** 2 * (moved[1:] + moved[:-1]) / 2), group[1:])
     common, known_m = total(common_std * piece_m), total(piece_m)
     return WindowErrors(*(np.divide(one, known_m, out=np.full(count, np.nan), where=known_m > 0) for one in (
         np.sqrt(own + level + common**2 + place), np.sqrt(level), common, np.sqrt(place))))
 
 
-def _scatter(iri: Array) -> Array:
-    """Variance of windows (n,) about the road around them: half the mean square of the steps to neighbours, a share of
-    the mean square."""
+def _scatter_share(iri: Array) -> float:
+    """Variance of windows (n,) about the road around them, half the mean square of the steps to neighbours, as a share
+    of the mean square."""
     steps, known = np.diff(iri), iri[np.isfinite(iri)]
     steps = steps[np.isfinite(steps)]
-    share = float(np.mean(steps**2) / 2 / np.mean(known**2)) if len(steps) and known.any() else 0.0
-    return np.nan_to_num(share * iri**2)
+    return float(np.mean(steps**2) / 2 / np.mean(known**2)) if len(steps) and known.any() else 0.0

@@ -52,6 +52,19 @@ def test_words_for_people_in_both_systems(logs: Path, capsys: pytest.CaptureFixt
     assert "1 section of 1 km" in capsys.readouterr().out
 
 
+def test_an_iri_without_a_standard_error_has_none_in_its_mean(logs: Path, tmp_path: Path,
+                                                              capsys: pytest.CaptureFixture[str]) -> None:
+    rows = drive(eastwards(50.0, 8.0, 30))
+    for row in rows:
+        object.__setattr__(row, "iri_std_m_per_km", None)
+    assert main(["sections", str(write(tmp_path / "without", rows)), "--length", "1km"]) == 0
+    said = capsys.readouterr().out
+    assert "standard error not known, over 0.23 km" in said
+    assert "nan" not in said
+    assert main(["sections", str(tmp_path / "without"), str(logs), "--length", "1km"]) == 0
+    assert "standard error not known" in capsys.readouterr().out
+
+
 def test_files_of_sections_have_their_places(logs: Path, tmp_path: Path) -> None:
     places = {ending: tmp_path / f"sections.{ending}" for ending in ("gpkg", "csv", "html")}
     assert main(["sections", str(logs), "--out", str(places["gpkg"]), "--out", str(places["html"])]) == 0
