@@ -194,7 +194,10 @@ class Block:
             direction = preconditioned + (size / before) * direction
             along, image = seen_as(direction)
             unlikely, weighed = along / relative_variance, weigh(image)
-            step = size / (self.count * float(along @ unlikely + image @ weighed))
+            bend = float(along @ unlikely + image @ weighed)
+            if bend <= 0.0:  # of a road that is as good as flat, in which the smallest numbers end
+                break
+            step = size / (self.count * bend)
             waves = waves + step * direction
             white = white + step * along
             explained = explained + step * image

@@ -36,6 +36,7 @@ _LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-3, 4.0
 _BLOCK_SHARE = 0.1  # of a block of 20 s is new
 _SMOOTHEST, _ROUGHEST = -12.0, 8.0  # L of roads that have an IRI of 0.006 and 140 m/km
 _CELL_M = 4.0
+_MOST_CELLS = 512  # at once: 2 km, and blocks of 20 s are shorter. A place that jumps must cost no memory
 _REACH_M = 1.0
 _COMMON = 4.0  # points, before the scatter is known, and never fewer
 _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
@@ -178,7 +179,7 @@ class Roughness:
             state = np.zeros(len(LENGTHS_M))
             none = np.zeros((1, 1))
             old = _Level(edge, nothing, nothing, nothing, edge, none, none, state, np.diag(self.variances))
-        edge = max(edge, old.edge)
+        edge = max(edge, old.edge, end - _MOST_CELLS)
         state, state_covariance = self._carried(old, edge)
         now, total = old.cells(edge, end - edge)[0], end - edge
         at, chosen = cells[cells >= edge] - edge, cells >= edge

@@ -24,6 +24,8 @@ FILE_NAME = "sensor-noise"
 _WHAT = "the sensor's noise"
 _KEYS = ("noise_mps2", "noise_std_mps2", "noise_drives")
 _OF = "of"
+LEAST_STD_SHARE = 1e-3
+"""No drive tells the noise better; a smaller standard error is no logger's, and its density has no logarithm."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ def from_fields(fields: Mapping[str, Any]) -> KnownNoise | None:
     if _KEYS[1] not in fields:
         return None
     noise, std, drives = value_of(fields, _KEYS, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
-    if std == 0:
-        raise ValueError(f"expected {_KEYS[1]} above 0")
+    if std < LEAST_STD_SHARE * noise:
+        raise ValueError(f"expected {_KEYS[1]} of at least {LEAST_STD_SHARE:g} of {_KEYS[0]}")
     return KnownNoise(NoiseBelief(log(noise), std / noise), drives)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from logger.commands.demo_lab import unpack
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
@@ -94,3 +95,15 @@ def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:
         with pytest.raises(BadInput, match=words):
             add(effect, vehicle, to, *runs)
     assert not out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("absent", ["wheel_lift", "dry_friction"])
+def test_what_the_cars_own_numbers_have_left_to_gain_is_no_merit_of_an_effect(
+    absent: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the demo's drives, whose car lacks another effect, both fits go to their ends."""
+    folders = [str(one) for one in unpack(tmp_path / "lab")]
+    assert add(absent, "rav4-2009", tmp_path / "car.yaml", *folders, "--json") == 0
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["helps"] is False and reported["p_value"] > 0.01

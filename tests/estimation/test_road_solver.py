@@ -370,3 +370,12 @@ def test_innovations_are_the_waves_of_a_solution() -> None:
     first = block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 5)
     for found in (first, block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 3, first.waves)):
         assert found.innovations == pytest.approx(np.fft.irfft(found.waves, block.count), abs=1e-9)
+
+
+def test_readings_that_weigh_next_to_nothing_leave_a_flat_road() -> None:
+    """With noise of 10^6 m/s2, products of the smallest numbers end in 0."""
+    block = a_block()
+    reading = np.random.default_rng(3).normal(0, 0.3, 1024)
+    for noise_mps2 in np.geomspace(1e3, 1e12, 10):
+        solved = block.solve(reading, weights(1024, noise_mps2), ROAD, np.full(block.count, 1e-3), 40)
+        assert np.isfinite(solved.innovations).all() and np.abs(solved.innovations).max() < 1e-3

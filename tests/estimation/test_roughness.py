@@ -1,5 +1,6 @@
 """Roughness that differs from place to place, against exact posteriors and evidence of dense algebra."""
 
+import tracemalloc
 from collections.abc import Callable
 from functools import cache
 
@@ -316,3 +317,16 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
     fresh.learn(0, patchy, np.zeros(count), gain, np.ones(count))
     scatter, unlearnt = (float(one.solved_with(0, count).std()) for one in (found, fresh))
     assert scatter > 0.5 * unlearnt
+
+
+def test_a_place_that_jumps_costs_no_memory() -> None:
+    """By 60 km within a block: what is far behind is carried, and matrices stay as small as of the longest block."""
+    count = 400_000
+    found, gain = Roughness(SPACING_M), np.full(count // 2 + 1, 1.0)
+    innovations = np.random.default_rng(5).standard_normal(count)
+    tracemalloc.start()
+    found.learn(0, innovations, np.zeros(count), gain, np.ones(count))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 150e6
+    assert np.isfinite(found.at(0, count)).all()

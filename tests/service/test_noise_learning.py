@@ -116,7 +116,8 @@ def test_nothing_learnt_writes_nothing(tmp_path: Path, drive: Drive) -> None:
 
 @pytest.mark.parametrize("text", [
     "", "{", "[]", "null", "\xff", '{"noise_mps2": 0.1}', '{"noise_mps2": "x", "noise_std_mps2": 0.1}',
-    '{"noise_mps2": 0.1, "noise_std_mps2": 0, "noise_drives": 1}', '{"noise_mps2": NaN, "noise_std_mps2": 0.1}',
+    '{"noise_mps2": 0.1, "noise_std_mps2": 0, "noise_drives": 1}',
+    '{"noise_mps2": 0.1, "noise_std_mps2": 1e-300, "noise_drives": 1}', '{"noise_mps2": NaN, "noise_std_mps2": 0.1}',
     f'{{"noise_mps2": 1{"0" * 400}, "noise_std_mps2": 0.1}}', '["noise_std_mps2"]',
     '{"noise_mps2": 0.1, "noise_std_mps2": 0.1, "noise_drives": 1.5}', '{"noise_mps2": 0, "noise_std_mps2": 0.1}'])
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
@@ -160,7 +161,8 @@ def test_a_recording_by_a_logger_that_did_not_learn_replays_with_what_it_took() 
 
 
 @pytest.mark.parametrize("noise", ["loud", 3, {"noise_mps2": -1}, {"noise_mps2": True}, {"noise_mps2": [1]},
-                                   {"noise_mps2": 0.1, "noise_std_mps2": -1}])
+                                   {"noise_mps2": 0.1, "noise_std_mps2": -1},
+                                   {"noise_mps2": 0.1, "noise_std_mps2": 1e-160, "noise_drives": 1}])
 def test_a_header_that_cannot_be_is_refused(noise: Any) -> None:
     header = DumpHeader(None, {"driver": "bma220", "noise": noise}, {"baud": 9600}, "rav4-2009")
     with pytest.raises(BadInput, match=r"drive\.dump:1: expected"):
