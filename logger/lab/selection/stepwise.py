@@ -17,7 +17,7 @@ from types import MappingProxyType
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.noise_colour import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine
@@ -255,9 +255,9 @@ class Search:
         removed = next(one for one in now.state.effects if one.effect.name == name)
         posterior = now.posterior
         if removed.effect.realigns:
-            return Baseline.of(fit(align(posterior, posterior.state_at(rest, now.state.logs))))
+            return Baseline.of(fit_to_the_end(align(posterior, posterior.state_at(rest, now.state.logs))))
         start = LinearModel(posterior, posterior.state_at(rest, now.state.logs, now.state.record, now.state.size))
-        return Baseline.of(fit(start, now.linear.numbers, min_gain=self.effort.round_share * now.explanation))
+        return Baseline.of(fit_to_the_end(start, now.linear.numbers))
 
     def refit(self, one: CandidateFit) -> Baseline:
         """A model with one more effect, fitted in full."""
