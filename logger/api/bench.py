@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.model_checks import check_model, check_moves, predicted
-from logger.api.question import Notify, silent
+from logger.api.question import Notify, WrongOption, silent
 from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
 
@@ -307,7 +307,8 @@ def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_
 
     half_hz = runs.runs[0].rate_hz / 2
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
-        raise BadInput(f"--low-pass {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the sample rate")
+        raise WrongOption(f"`low_pass_hz` {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the "
+                          "sample rate")
     try:
         found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)],
                                 low_pass_hz)

@@ -78,7 +78,7 @@ def _noise(text: str) -> float | str:
 
 
 def _check_noise(noise_mps2: float | str) -> None:
-    if noise_mps2 != AUTO and (isinstance(noise_mps2, str) or NOISE.fault(noise_mps2)):
+    if not isinstance(noise_mps2, str) and NOISE.fault(noise_mps2):
         raise ValueError(f"expected {AUTO}, or {NOISE.words}")
 
 
@@ -194,6 +194,13 @@ def _columns(text: str) -> list[str]:
     return [name.strip() for name in text.split(",")]
 
 
+def _check_method(method: str) -> None:
+    if method in MODAL_METHODS_GONE:
+        beside = " with `input_column`" if "x" in method else ""
+        raise ValueError("no longer offered, it missed or made up modes: expected `method` "
+                         f"{MODAL_METHODS_GONE[method]}{beside}")
+
+
 @dataclass(frozen=True)
 class ModesQuestion(Question):
     """Natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
@@ -232,7 +239,7 @@ class ModesQuestion(Question):
     method: Annotated[str | None, Option(
         f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid beside a measured input "
         "(default: as the record is); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; none with a "
-        "vehicle", metavar="NAME", choices=MODAL_METHODS)] = None
+        "vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
     _: KW_ONLY
     columns: Annotated[Sequence[str] | None, Option(
         "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and place)",
@@ -251,14 +258,6 @@ class ModesQuestion(Question):
     speed_mps: Annotated[float | None, Option(
         f"of a vehicle alone: at which laws that are not linear are looked at (default: {COMMON_SPEED_MPS:g}); of a "
         "FILE: at which it was driven, if it does not say so", SPEED, "MPS")] = None
-
-
-    def __post_init__(self) -> None:
-        if self.method in MODAL_METHODS_GONE:
-            beside = " with `input_column`" if "x" in str(self.method) else ""
-            raise self.wrong("method", f" {self.method}: no longer offered, it missed or made up modes: expected "
-                                       f"`method` {MODAL_METHODS_GONE[str(self.method)]}{beside}")
-        super().__post_init__()
 
 
 @dataclass(frozen=True)

@@ -221,7 +221,7 @@ def simulated(question: SimulateQuestion) -> Run:
         track = with_obstacles(drive_file.track_of(road), obstacles)
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
         place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
-        knots = (_knots(*speed, name) if isinstance(speed, tuple) else
+        knots = (_knots(*speed, name) if isinstance(speed, tuple | list) else
                  at_one_speed(track, float(car.structure.behind_m.max()), speed))
         motion = motion_along(*knots, track.start_m, rate_hz)
         columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,

@@ -22,7 +22,7 @@ from logger.api.terms import (
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Profile
 
-PAGE = Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
+PAGE = Out("write a page with pictures; may repeat", others=(".html",), is_drawn=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,7 +210,7 @@ class PlanQuestion(LabQuestion):
         "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
         read=Path)] = None
     speeds_mps: Annotated[Sequence[float], Option(
-        "plan a drive over all of the profile at this speed [m/s]; may repeat", SPEED, "MPS", many=list, read=float,
+        "plan a drive over all of the profile at this speed [m/s]; may repeat", SPEED, "MPS", many=list,
         flag="--speed")] = ()
     noise_mps2: Annotated[float | None, Option(
         "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", NOISE,

@@ -19,6 +19,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, ParamSpec, TypeVar, get_args, get_origin
 
+from logger.api.kinds import fault
 from logger.api.ranges import Range
 from logger.errors import BadInput
 
@@ -107,7 +108,9 @@ class Asking:
             known.append(self.option.range.words)
         if self.default not in (MISSING, None, False, "", 0, ()) and "default" not in said:
             known.append(f"default: {format(self.default, 'g') if isinstance(self.default, Real) else self.default}")
-        return f"{said} ({'; '.join(known)})" if known else said
+        if not known:
+            return said
+        return f"{said[:-1]}; {'; '.join(known)})" if said.endswith(")") else f"{said} ({'; '.join(known)})"
 
 
 def flag_of(name: str) -> str:
@@ -130,14 +133,18 @@ class WrongOption(BadInput):
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
-    """What a verb is asked. WrongOption, when it is made, for a number out of its range or a word out of its choices.
+    """What a verb is asked. WrongOption, when it is made, for a value of another kind than its field's, a number out of
+    its range or a word out of its choices.
     """
 
     def __post_init__(self) -> None:
-        for one in askings(type(self)):
-            value = getattr(self, one.name)
-            if value is not None:
+        asked = {one.name: one for one in askings(type(self))}
+        for field in fields(self):
+            value, one = getattr(self, field.name), asked.get(field.name)
+            if one is not None:
                 _check(one, value)
+            elif words := fault(field.type, value):
+                raise self.wrong(field.name, words)
 
     def wrong(self, name: str, words: str) -> WrongOption:
         """The complaint about an option; as ``complaint``."""
@@ -179,11 +186,15 @@ def _paths(given: Any) -> list[Path]:
 
 
 def _check(one: Asking, value: Any) -> None:
-    within, choices = one.option.range, one.option.choices
-    if within is not None:
-        for number in value if isinstance(value, Sequence) else [value]:
-            if words := within.fault(number) if isinstance(number, Real) else f" {number}: expected a number":
-                raise WrongOption(f"`{one.name}`{words}")
+    within, choices = one.option.range, tuple(one.option.choices)
+    one_of = f"one of {', '.join(choices)}" * bool(choices)
+    if words := fault(one.kind, value, one_of, within.unit if within else ""):
+        raise WrongOption(f"`{one.name}`{words}")
+    if value is None:
+        return
+    for number in value if isinstance(value, Sequence) else [value]:
+        if within is not None and (words := within.fault(number)):
+            raise WrongOption(f"`{one.name}`{words}")
     try:
         if one.option.check is not None:
             one.option.check(value)
@@ -191,7 +202,7 @@ def _check(one: Asking, value: Any) -> None:
         shown = format(value, "g") if isinstance(value, float) else value
         raise WrongOption(f"`{one.name}` {shown}: {error}") from None
     if choices and value not in choices:
-        raise WrongOption(f"`{one.name}` {value}: expected one of {', '.join(choices)}")
+        raise WrongOption(f"`{one.name}` {value}: expected {one_of}")
 
 
 def askings(question: type[Any]) -> tuple[Asking, ...]:

@@ -22,7 +22,8 @@ class Range(NamedTuple):
     @property
     def words(self) -> str:
         """Both ends, with the unit."""
-        return f"{self.low:g} or more" if self.is_half_open else f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
+        low, high = (str(one) if isinstance(one, int) else format(one, ".15g") for one in self[:2])
+        return f"{low} or more" if self.is_half_open else f"{low} to {high} {self.unit}".rstrip()
 
     def fault(self, value: Any) -> str:
         """What follows the name of a number that lies outside; empty: it does not."""

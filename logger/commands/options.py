@@ -102,7 +102,7 @@ def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
 def _reader(flag: str, option: Option, kind: Any) -> Callable[[str], Any]:
     """What makes a value of a text; a complaint names the option and the text."""
     kinds = [one for one in get_args(kind) if one is not NoneType] or [kind]
-    make: Callable[[str], Any] = option.read or _number(kinds[0], option) or str
+    make: Callable[[str], Any] = _number(option.read or kinds[0], option) or option.read or str
     if make in (Path, str):
         return make
 

@@ -106,7 +106,7 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
     reach = DecimatingLowPass(rate_hz, low_pass_hz).reach
     for run, measured in enumerate(model.measured):
         if len(measured) <= reach:
-            raise UnusableRun(run, f"expected more than {reach} samples for --low-pass {low_pass_hz:g}, found "
+            raise UnusableRun(run, f"expected more than {reach} samples for a low pass of {low_pass_hz:g} Hz, found "
                                    f"{len(measured)} after the first {model.records[run].skip_s:g} s")
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     if any(record.timed for record in model.records):

@@ -8,6 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pytest
 
 import ridelog
@@ -16,6 +17,7 @@ from logger.api.question import (
     Argument,
     Asking,
     Entries,
+    Notify,
     Option,
     Question,
     Switches,
@@ -23,9 +25,10 @@ from logger.api.question import (
     askings,
     function,
     help_of,
+    silent,
 )
 from logger.api.ranges import Range
-from logger.api.road_questions import IriCommand, IriQuestion
+from logger.api.road_questions import IriCommand, IriQuestion, RandomRoadQuestion
 from logger.commands import options
 from logger.commands.main import ASKED
 from logger.errors import BadInput
@@ -60,6 +63,7 @@ class Ask(Question):
         "wet": ("wet-road", "it rains"), "icy": ("ice", "it is cold")})] = "dry"
     kind: Annotated[str, Option("of model", choices=("ar", "ma"))] = "ar"
     quick: Annotated[bool, Option("be quick")] = False
+    notify: Annotated[Notify, "called with what is under way"] = silent
 
 
 def asked(*words: str) -> Question:
@@ -110,7 +114,7 @@ def test_of_two_switches_one_would_be_lost() -> None:
 def test_the_function_has_the_questions_fields_and_words() -> None:
     ride = function("ride", Ask, lambda one: one)
     assert ride(Path("a.csv"), tries=2) == Ask(Path("a.csv"), tries=2)
-    assert list(inspect.signature(ride).parameters) == [*(one.name for one in askings(Ask))]
+    assert list(inspect.signature(ride).parameters) == [*(one.name for one in askings(Ask)), "notify"]
     assert ride.__name__ == "ride" and "samples a second (10 to 1000 Hz; default: 100)" in str(ride.__doc__)
 
 
@@ -145,3 +149,50 @@ def test_what_the_terminal_adds_takes_no_help_away() -> None:
     assert help_of(IriCommand) == help_of(IriQuestion) and help_of(IriQuestion).startswith("Exact IRI")
     assert help_of(ModesCommand) == help_of(ModesQuestion) and "ridelog modes push.csv" in help_of(ModesQuestion)
     assert "default: ." not in "".join(one.help for _, one in every_option())
+
+
+@pytest.mark.parametrize(("values", "complaint"), [
+    ({"rate_hz": "50.2"}, "rate_hz '50.2': expected a number in Hz"),
+    ({"rate_hz": [50.0]}, "rate_hz [50.0]: expected a number in Hz"),
+    ({"rate_hz": None}, "rate_hz None: expected a number in Hz"),
+    ({"rate_hz": True}, "rate_hz True: expected a number in Hz"),
+    ({"tries": 1.5}, "tries 1.5: expected a whole number"),
+    ({"speeds_mps": 8.0}, "speeds_mps 8.0: expected a list of numbers in m/s"),
+    ({"speeds_mps": [8.0, "9"]}, "speeds_mps [8.0, '9']: expected a list of numbers in m/s"),
+    ({"speeds_mps": "89"}, "speeds_mps '89': expected a list of numbers in m/s"),
+    ({"start": {"m": "1"}}, "start {'m': '1'}: expected a dict of numbers"),
+    ({"kind": None}, "kind None: expected one of ar, ma"),
+    ({"kind": ["ar"]}, "kind ['ar']: expected one of ar, ma"),
+    ({"quick": 1}, "quick 1: expected True or False"),
+    ({"road": 3}, "road 3: expected a path"),
+    ({"road": Range(0, 1)}, "road of type Range: expected a path"),
+    ({"notify": None}, "notify None: expected a function"),
+])
+def test_a_value_of_another_kind_is_one_sentence(values: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(BadInput) as error:
+        Ask(**{"road": Path("a.csv"), **values})
+    assert str(error.value) == complaint
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    asked = Ask(Path("a.csv"), rate_hz=np.float32(50), tries=np.int64(3), quick=np.True_, speeds_mps=(np.float64(9),))
+    assert (asked.rate_hz, asked.tries) == (50, 3)
+
+
+@pytest.mark.parametrize(("words", "complaint"), [
+    (["--speed", "abc"], "--speed abc: expected a number in m/s"),
+    (["--speed", "10m/s"], "--speed 10m/s: expected a number in m/s, without its unit")])
+def test_one_of_several_numbers_is_read_as_one_alone(words: list[str], complaint: str) -> None:
+    with pytest.raises(BadInput, match=f"^{complaint}$"):
+        asked("a.csv", *words)
+
+
+def test_a_choice_is_a_whole_word() -> None:
+    with pytest.raises(BadInput, match="iso_class AB: expected one of A, B"):
+        RandomRoadQuestion(iso_class="AB")
+
+
+def test_help_has_one_bracket_and_numbers_in_full() -> None:
+    said = [one.help for _, one in every_option()]
+    assert not [words for words in said if ") (" in words or "e+" in words]
+    assert "length of a window [m] (default: 7.62, 25 ft; 1 to 1000 m)" in said

@@ -323,7 +323,7 @@ def test_a_run_too_short_for_the_low_pass_is_the_one_named(runs: list[str], tmp_
     record = bump_record(CAR, 2.6)
     write_drive(tmp_path / "short.csv", {"t_s": record.time_s, "accel_z_mps2": record.measured_mps2,
                                          "speed_mps": record.speed_mps, "distance_m": record.distance_m})
-    with pytest.raises(BadInput, match=r"short.csv: expected more than [0-9]+ samples for --low-pass 2, found 60"):
+    with pytest.raises(BadInput, match=r"short.csv: expected more than [0-9]+ samples for a low pass of 2 Hz"):
         identify([f"{runs[0]}/drive.csv", str(tmp_path / "short.csv")], MASS, "--bump",
                  "start_m=2,height_m=0.1,width_m=2", "--low-pass", "2")
 

@@ -116,7 +116,7 @@ def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--class", "A", "--length", "5"], "--length 5: expected 11 to 1e\\+06 m"),
+    (["--class", "A", "--length", "5"], "--length 5: expected 11 to 1000000 m"),
     (["--class", "A", "--length", "nan"], "--length nan"),
     (["--class", "A", "--spacing", "0"], "--spacing 0: expected 0.001 to 0.3 m"),
     (["--class", "A", "--waviness", "4"], "--waviness 4: expected 1.5 to 3"),

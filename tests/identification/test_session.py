@@ -74,5 +74,5 @@ def test_records_that_cannot_be_meant_are_named_by_their_number() -> None:
     assert off_rate([100.0, 100.00001]) is None
     with pytest.raises(UnusableRun, match="expected 20 to 20000 m of way, found 13"):
         drives_of([record(seconds=2.9)])
-    with pytest.raises(UnusableRun, match="for --low-pass 1, found 100 after the first 2 s"):
+    with pytest.raises(UnusableRun, match="for a low pass of 1 Hz, found 100 after the first 2 s"):
         fit_options(model_of([record(seconds=3.0)]), "auto", 1.0, False, 0)
