@@ -1,7 +1,8 @@
 """How much of some runs one effect explains at most, the car's numbers within what they are usually off by.
 
 Problem: a record of which a model explains next to nothing may be another car's, and may be this one's with a large
-change by one effect, as a sensor far behind the centre of gravity. Solution: one round of the search for effects.
+change by one effect, as a sensor far behind the centre of gravity. Solution: one round of the search for effects, on
+the car as its file has it: numbers that were refitted to such a record are no car's any more.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from logger.lab.diagnosis import obstacles_of, refit
+from logger.lab.diagnosis import obstacles_of
+from logger.lab.likelihood.map_fit import align
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.selection.screening import misalignment
+from logger.lab.selection.screening import Baseline, misalignment
 from logger.lab.selection.stepwise import Search
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
@@ -33,5 +35,6 @@ def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Seque
         return np.inf
     start = posterior.start(present)
     search = Search(tried, len(present), misalignment(posterior, start))
-    fits = search.round(refit(posterior, start), tried).fits
+    nominal = align(posterior, start).with_number_slopes(posterior.number_slopes(start, posterior.prior.steps))
+    fits = search.round(Baseline.of(nominal), tried).fits
     return min((posterior.error(one.found.state) for one in fits), default=np.inf)
