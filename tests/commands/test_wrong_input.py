@@ -74,23 +74,36 @@ def test_an_estimate_beside_another_road_goes_on_only_where_it_is_asked_to(
 def test_another_cars_file_is_refused_but_by_identify(
     runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The record is of a car that the file says is twice as stiff and half as heavy at one end."""
-    own = yaml.safe_load(vehicle_path("rav4-2009").read_text("utf-8"))
-    own["sprung_mass_kg"] *= 0.5
-    for axle, factor in (("front", 2.0), ("rear", 1.4)):
-        own[axle]["suspension_stiffness_n_per_m"] *= factor
-        own[axle]["suspension_damping_n_s_per_m"] *= 0.8
-        own[axle]["unsprung_mass_kg"] *= 0.6
-    other = tmp_path / "other.yaml"
-    other.write_text(yaml.safe_dump(own), "utf-8")
+    """The record is of a car that the file says is half as stiff, twice as heavy and has heavy wheels. Where the file
+    is far off in fewer numbers, they are named."""
+    other = file_that_is_off(tmp_path, 0.5, (2.0, 1.4), 0.6)
+    assert main(["compare", "--vehicle", str(other), *runs]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "beyond their tolerance. Measure them" in words and "front.suspension_stiffness_n_per_m by -" in words
+    other = file_that_is_off(tmp_path, 2.0, (0.5, 0.5), 2.2)
     with pytest.raises(BadInput, match=r"found one of another car: .* ridelog identify fits .*\(--anyway goes on\)"):
         main(["compare", "--vehicle", str(other), *runs])
-    assert main(["identify", "--vehicle", str(other), "--free", "sprung_mass_kg", runs[0]]) == 0
+    free = ("both.suspension_stiffness_n_per_m,both.unsprung_mass_kg,both.suspension_damping_n_s_per_m,"
+            "both.tire_stiffness_n_per_m")
+    assert main(["identify", "--vehicle", str(other), "--free", free, runs[0]]) == 0
     capsys.readouterr()
     few = {name: shipped_effects()[name] for name in FEW}  # no effect explains it: all were tried above
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
-    assert main(["compare", "--vehicle", str(other), runs[0], "--anyway"]) == 0
+    assert main(["compare", "--vehicle", str(other), *runs, "--anyway"]) == 0
     assert "found one of another car" in capsys.readouterr().err
+
+
+def file_that_is_off(folder: Path, mass: float, springs: tuple[float, float], unsprung: float) -> Path:
+    """A file of the RAV4 whose numbers are off by these factors."""
+    own = yaml.safe_load(vehicle_path("rav4-2009").read_text("utf-8"))
+    own["sprung_mass_kg"] *= mass
+    for axle, factor in zip(("front", "rear"), springs, strict=True):
+        own[axle]["suspension_stiffness_n_per_m"] *= factor
+        own[axle]["suspension_damping_n_s_per_m"] *= 0.8
+        own[axle]["unsprung_mass_kg"] *= unsprung
+    other = folder / "other.yaml"
+    other.write_text(yaml.safe_dump(own), "utf-8")
+    return other
 
 
 def with_track(run: str, folder: Path, track: Track) -> str:

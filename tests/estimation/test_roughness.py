@@ -289,7 +289,8 @@ def test_that_a_road_is_gaussian_is_learnt_and_that_it_is_patchy_is_kept() -> No
     scatter, believed = learnt_over_drives(even)
     of_patches, of_patchy = learnt_over_drives(patchy)
     assert scatter < 0.2 < 0.5 < of_patches
-    assert believed.variances[:2].sum() < 0.2 < of_patchy.variances[:2].sum()
+    # What patches of 9 m leave to the scale of a place is not the level's.
+    assert 1.5 * believed.variances[:2].sum() < of_patchy.variances[:2].sum()
 
 
 def test_what_readings_are_about_a_point_is_weighed_as_its_innovation_shows_in_them() -> None:
