@@ -22,7 +22,7 @@ from logger.api.terms import (
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Profile
 
-PAGE = Out("write a page with pictures; may repeat", others=(".html",), is_drawn=False)
+PAGE = Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
 
 
 @dataclass(frozen=True, kw_only=True)
