@@ -215,14 +215,14 @@ def _paths(args: argparse.Namespace, out: Out) -> list[Path]:
 
 def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None:
     """BadInput for a file that cannot be written, is read, or has an ending that is not offered."""
-    if any(asked_for.values()):
-        read = question.files_read()
-        check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], read, read)
+    if not any(asked_for.values()):
+        return
+    read = question.files_read()
+    check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], read, read)
     # Whatever it ends in, a file that is read is named as such first.
     for out, paths in asked_for.items():
         offered = [*(PICTURES if out.is_drawn else ()), *out.others]
         if wrong := [path for path in paths if path.suffix.lower() not in offered and "*" not in offered]:
             one_of = "one of " * (len(offered) > 1)
             raise BadInput(f"{out.flag} {wrong[0]}: expected a file that ends in {one_of}{', '.join(offered)}")
-    if any(asked_for.values()):
-        question.check_written({out.flag: paths for out, paths in asked_for.items()})
+    question.check_written({out.flag: paths for out, paths in asked_for.items()})

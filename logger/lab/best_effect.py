@@ -25,7 +25,7 @@ from logger.vehicle.vehicle import Vehicle
 
 def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Sequence[Chosen],
                            known: Mapping[str, Effect], numbers: float) -> float:
-    """Error of this car with the one effect that explains most, its numbers refitted within their soft bounds; infinite
+    """Error of this car with the one effect that explains most, its numbers refitted under their prior; infinite
     where none can be tried. Without the compiler forces are not, as each would take minutes."""
     posterior = Posterior(runs, vehicle, Tolerance(numbers=numbers))
     obstacles = obstacles_of(posterior, known, present)
