@@ -45,8 +45,13 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
 @pytest.mark.parametrize("module", [
     pytest.param(one, marks=pytest.mark.slow if one.__name__ in SLOW else (), id=one.__name__) for one in MODULES])
 def test_examples(module: ModuleType, names: dict[str, Any]) -> None:
-    found = doctest.testmod(module, extraglobs=names, optionflags=doctest.ELLIPSIS)
-    assert found.failed == 0
+    """Once each: a function that asks a question shows the question's examples."""
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    for one in doctest.DocTestFinder().find(module, extraglobs=names):
+        holder = getattr(module, one.name.removeprefix(f"{module.__name__}."), None)
+        if not hasattr(holder, "__signature__"):
+            runner.run(one)
+    assert runner.summarize().failed == 0
 
 
 def test_each_name_is_documented() -> None:

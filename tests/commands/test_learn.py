@@ -30,8 +30,10 @@ def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, 
 
 def test_a_page_is_not_the_law(plain_run: Path, tmp_path: Path) -> None:
     law = str(tmp_path / "law.py")
-    with pytest.raises(BadInput, match=r"--page .*: expected a file that ends in \.html"):
-        main(["learn", "--vehicle", "rav4-2009", "--out", law, "--page", law, str(plain_run)])
+    other = str(tmp_path / "page.py")
+    for page, complaint in ((law, "every file to be another one"), (other, r"a file that ends in \.html")):
+        with pytest.raises(BadInput, match=f"--page .*: expected {complaint}"):
+            main(["learn", "--vehicle", "rav4-2009", "--out", law, "--page", page, str(plain_run)])
 
 
 @pytest.mark.slow
