@@ -11,7 +11,7 @@ import pytest
 from logger.errors import BadInput
 from logger.report.page import SCRIPTS
 from logger.shipped import vehicle_file, vehicle_path
-from logger.studies.field.lab_examination import COUNTS
+from logger.studies.field.measurements import COUNTS
 
 
 def test_a_name_is_a_vehicle_that_comes_along_whatever_lies_around(

@@ -11,8 +11,7 @@ from logger.report.charts import chart
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
-from logger.studies.checks import Word, word_of
-from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Table
+from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Table, Word, word_of
 
 _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"

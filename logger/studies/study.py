@@ -1,32 +1,146 @@
 """What a study is: a table or a figure that was printed, made again and set beside what is printed there.
 
-Every file of a shelf's folder is one, offered as ``STUDY``. A study holds the printed values, so that what is ours is
+Every file of a shelf's folder offers some as ``STUDIES``. A study holds the printed values, so that what is ours is
 never seen without them, and says of each printed item in a word and a sentence how they agree, and why where they do
-not. The word that it states has to come out of its checks (``logger.studies.checks``). The records that the
+not. The word that it states has to come out of its checks (``Value``, ``Statement``). The records that the
 dissertation measured were never published: where it measured, a study simulates under the conditions that the text
 gives, and says so.
+
+A ``Value`` is a printed number, a ``Statement`` what is printed in words beside the figure of ours that it is about.
+The word of a printed item is computed from its checks: a misprint first, then what cannot be reproduced, then what is
+better, then what agrees. An item without any check is not reproducible.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from importlib import import_module
+from math import inf, isfinite
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from drivers.catalogue import names
 from logger.chart_data import Chart
 from logger.errors import BadInput
-from logger.plugins import catalogue
-from logger.studies.checks import Check, Statement, Value, Word, word_of
+
+
+class Word(StrEnum):
+    """How ours stands beside the print; the first that any check of an item has is the item's."""
+
+    MISPRINT = "misprint"
+    NOT_REPRODUCIBLE = "not reproducible"
+    BETTER = "better"
+    AGREES = "agrees"
+
+
+@dataclass(frozen=True)
+class Value:
+    """A printed value beside ours, and how far apart they may lie.
+
+    name         what it is, with its unit in brackets
+    tolerance    of the difference, in the value's unit
+    word         AGREES, NOT_REPRODUCIBLE: ours lies within the tolerance of the print. MISPRINT: ours lies farther off
+                 than that. BETTER: the value is an error (a scatter, a bias), and ours is smaller than the print by at
+                 least the tolerance
+    of           the printed items that it is about; none: the only one of its study
+    of_print     ours is worked out of other printed figures, so it shows only whether the print agrees with itself: it
+                 counts for an item's word as a misprint alone
+    """
+
+    name: str
+    printed: float
+    ours: float
+    tolerance: float
+    word: Word = Word.AGREES
+    of: tuple[str, ...] = ()
+    of_print: bool = False
+
+    @property
+    def difference(self) -> float:
+        """Ours less the printed; what is below the last bits of the print is nothing."""
+        difference = self.ours - self.printed
+        return 0.0 if abs(difference) < 1e-12 * abs(self.printed) else difference
+
+    @property
+    def holds(self) -> bool:
+        """Whether ours stands beside the print as ``word`` says."""
+        if self.word is Word.BETTER:
+            return abs(self.ours) <= abs(self.printed) - self.tolerance
+        return (abs(self.ours - self.printed) <= self.tolerance) != (self.word is Word.MISPRINT)
+
+    @property
+    def wrong(self) -> str:
+        """The value as it stands where it does not hold."""
+        return (f"{self.name} ({self.ours:.5g}, printed {self.printed:.5g}, tolerance {self.tolerance:.2g}, expected: "
+                f"{self.word})")
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What is printed in words, and the figure of ours that it is about.
+
+    name            what the figure is, with its unit in brackets
+    printed         the statement, in short
+    least, most     between which ours has to lie for the statement to be true of it
+    word            AGREES, NOT_REPRODUCIBLE: it is true of ours. MISPRINT: it is not. BETTER: ours does what the print
+                    could not or asks for
+    of              as of a ``Value``
+    """
+
+    name: str
+    printed: str
+    ours: float
+    least: float = -inf
+    most: float = inf
+    word: Word = Word.AGREES
+    of: tuple[str, ...] = ()
+
+    of_print = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether ours bears out ``word``."""
+        return (self.least <= self.ours <= self.most) != (self.word is Word.MISPRINT)
+
+    @property
+    def bounds(self) -> str:
+        """The ends as words."""
+        if isfinite(self.least) and isfinite(self.most):
+            return f"{self.least:.4g} to {self.most:.4g}"
+        return f"{self.least:.4g} or more" if isfinite(self.least) else f"{self.most:.4g} or less"
+
+    @property
+    def wrong(self) -> str:
+        """The statement as it stands where it does not hold."""
+        return f"{self.name} ({self.ours:.5g}, printed {self.printed!r}, true for {self.bounds}, expected: {self.word})"
+
+
+Check = Value | Statement
+C = TypeVar("C", Value, Statement)
+
+
+def about(items: str | Sequence[str], checks: Iterable[C]) -> tuple[C, ...]:
+    """The checks, as those of one printed item or of several."""
+    names = (items,) if isinstance(items, str) else tuple(items)
+    return tuple(replace(one, of=names) for one in checks)
+
+
+def word_of(checks: Iterable[Check]) -> Word:
+    """The word of an item with these checks."""
+    words = {one.word for one in checks if not one.of_print or one.word is Word.MISPRINT}
+    return next((one for one in Word if one in words), Word.NOT_REPRODUCIBLE)
+
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 Cell = str | float | None
 
-OFFER = "STUDY"
+OFFER = "STUDIES"
 SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studies.field",
            "roads": "logger.api.datasets"}
 """Folders of studies: of the reference dissertation, of other papers that a reader knows, and of public records of
@@ -183,7 +297,7 @@ def alike(names: Iterable[str], word: Word, because: str) -> tuple[Item, ...]:
 class Study:
     """A printed table, figure or statement.
 
-    name       as its file is called; people write it with - for _
+    name       as people write it, with _ for -
     title      what it shows
     where      its place in what was printed
     how        under which conditions it is made again here, and what is simulated that was measured there
@@ -242,9 +356,11 @@ class Study:
 
 def studies(shelf: str | None = None) -> dict[str, Study]:
     """All of a shelf, or of all shelves, by the names that people write; the dissertation's in its order."""
-    shelves = SHELVES.values() if shelf is None else [SHELVES[shelf]]
-    found: Iterable[Study] = (one for package in shelves
-                              for one in sorted(catalogue(package, OFFER).values(), key=lambda one: _order(one.name)))
+    packages = SHELVES.values() if shelf is None else [SHELVES[shelf]]
+    found: list[Study] = []
+    for package in packages:
+        offered = (one for name in names(package, OFFER) for one in getattr(import_module(f"{package}.{name}"), OFFER))
+        found += sorted(offered, key=lambda one: _order(one.name))
     return {one.called: one for one in found}
 
 

@@ -9,8 +9,20 @@ import pytest
 
 from logger.errors import BadInput
 from logger.report.study_page import page
-from logger.studies.checks import Statement, Value, Word, about, word_of
-from logger.studies.study import DISSERTATION, Effort, Item, Result, alike, studies, study_of
+from logger.studies.study import (
+    DISSERTATION,
+    Effort,
+    Item,
+    Result,
+    Statement,
+    Value,
+    Word,
+    about,
+    alike,
+    studies,
+    study_of,
+    word_of,
+)
 
 from ..support.study_results import STUDIES, study_result
 

@@ -11,10 +11,19 @@ import pytest
 from logger.chart_data import Field
 from logger.estimation.rms_relation import rms_relation
 from logger.roads.iri import iri
-from logger.studies.dissertation import fig_5_22, fig_6_23
-from logger.studies.drives import PS_2119, Conditions, drive_over, places_m, random_road, rav4
+from logger.studies.dissertation import chapter_5, chapter_6_roads
+from logger.studies.drives import (
+    PS_2119,
+    Conditions,
+    comfort_shares,
+    drive_over,
+    per_window,
+    places_m,
+    random_road,
+    rav4,
+    whole_road_by_rms,
+)
 from logger.studies.study import Cell
-from logger.studies.windows import comfort_shares, per_window, whole_road_by_rms
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import known_vehicle
 
@@ -66,12 +75,12 @@ def test_shares_of_comfort() -> None:
 
 
 def test_speeds_of_the_segments_are_those_of_table_d_1() -> None:
-    mph = [fig_6_23.PRINTED_MPH[segment] for segment in range(1, 38)]
-    assert len(fig_6_23.PRINTED_MPH) == 37
+    mph = [chapter_6_roads.PRINTED_MPH[segment] for segment in range(1, 38)]
+    assert len(chapter_6_roads.PRINTED_MPH) == 37
     assert mph[:10] == [30, 30, 30, 30, 25, 20, 20, 25, 25, 20]
     assert mph[20:24] == [20, 15, 20, 20]
     assert [mph.count(speed) for speed in (30, 25, 20, 15)] == [4, 3, 29, 1]
-    assert fig_6_23.PRINTED_KMH == {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
+    assert chapter_6_roads.PRINTED_KMH == {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
 
 
 def test_the_sizes_that_are_asked_for_give_the_printed_words() -> None:
@@ -83,8 +92,8 @@ def test_the_sizes_that_are_asked_for_give_the_printed_words() -> None:
 def test_a_tube_lifts_a_tires_mean_by_its_area_over_the_patch() -> None:
     """The raised cosine's area is half of height times width."""
     place_m = np.arange(19.8, 20.2, 1e-5)
-    area = float(np.sum(fig_5_22.tube(20.0)(place_m)) * 1e-5)
-    assert area / rav4().contact_patch_m == pytest.approx(fig_5_22.TUBE_M**2 / 2 / 0.25, rel=1e-3)
+    area = float(np.sum(chapter_5.tube(20.0)(place_m)) * 1e-5)
+    assert area / rav4().contact_patch_m == pytest.approx(chapter_5.TUBE_M**2 / 2 / 0.25, rel=1e-3)
 
 
 def test_bump_and_bridge_stand_out_of_the_road_and_a_tube_does_not() -> None:

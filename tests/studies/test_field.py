@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from logger.studies.checks import Word
-from logger.studies.field import (
-    five_modes,
-    golden_car_gain,
-    iri_check_profile,
-    iso_2631_factors,
-    iso_8041_bursts,
-    lab_examination,
-)
-from logger.studies.study import DISSERTATION, Effort, studies
+from logger.studies.field import measurements, standards
+from logger.studies.study import DISSERTATION, Effort, Word, studies
 
 from ..benchmarks.weightings import BURSTS, THIRDS
 from ..roads.test_iri import RUNNING_IRI, golden_response
@@ -35,9 +27,9 @@ def test_the_shelf_is_whole() -> None:
 
 
 def test_the_check_profile_s_printed_values() -> None:
-    for at_m, printed in iri_check_profile.PRINTED:
+    for at_m, printed in standards.PRINTED_IRI_CHECK_PROFILE:
         assert printed == RUNNING_IRI[round(at_m / 0.25) - 1]
-    values = iri_check_profile.run(Effort()).values
+    values = standards._iri_check_profile(Effort()).values
     assert max(abs(one.ours - one.printed) for one in values[:-1]) < 7e-6
     assert values[-1].word is Word.MISPRINT
     assert values[-1].ours == pytest.approx(5.476206e-3, abs=1e-9)
@@ -45,8 +37,8 @@ def test_the_check_profile_s_printed_values() -> None:
 
 @pytest.mark.slow
 def test_the_bursts_are_those_of_the_benchmark_and_agree() -> None:
-    assert iso_8041_bursts.PRINTED_MPS2 == BURSTS
-    wave = iso_8041_bursts.saw_teeth(4)
+    assert standards.PRINTED_MPS2 == BURSTS
+    wave = standards.saw_teeth(4)
     assert np.ptp(wave) == pytest.approx(2, abs=1e-2)
     first = np.flatnonzero(wave)
     assert wave[first[0]] > 0
@@ -56,13 +48,13 @@ def test_the_bursts_are_those_of_the_benchmark_and_agree() -> None:
 
 
 def test_the_gain_is_that_of_the_transfer_function() -> None:
-    for one in golden_car_gain.run(Effort()).values[2:]:
+    for one in standards._golden_car_gain(Effort()).values[2:]:
         assert abs(golden_response(np.array([one.ours]))[0]) == pytest.approx(0.5, abs=2e-3)
 
 
 def test_factors_are_those_of_the_benchmark() -> None:
-    for name, printed in iso_2631_factors.PRINTED.items():
-        known = {float(hz): float(one) for hz, one in zip(iso_2631_factors.HZ, printed, strict=True)}
+    for name, printed in standards.PRINTED_ISO_2631_FACTORS.items():
+        known = {float(hz): float(one) for hz, one in zip(standards.HZ, printed, strict=True)}
         assert {hz: known[hz] for hz in THIRDS[name]} == THIRDS[name]
 
 
@@ -70,11 +62,11 @@ def test_the_building_has_the_printed_frequencies() -> None:
     """A uniform chain of five: 2 w sin((2 k - 1) pi / 22)."""
     mode = np.arange(1, 6)
     hz = np.sqrt(10_000 / 25.91) * 2 * np.sin((2 * mode - 1) * np.pi / 22) / (2 * np.pi)
-    assert np.round(hz, 3) == pytest.approx(five_modes.PRINTED_TRUE_HZ, abs=1e-9)
+    assert np.round(hz, 3) == pytest.approx(measurements.PRINTED_TRUE_HZ, abs=1e-9)
 
 
 def test_counts_of_the_examination_are_those_of_its_page() -> None:
-    counts = lab_examination.examined()
+    counts = measurements.examined()
     page = (Path(__file__).parents[2] / "docs" / "examination.md").read_text("utf-8")
     assert page.startswith(f"# The lab examined\n\n{counts['cases']} random cases")
     assert f"seeds {counts['first_seed']} to {counts['last_seed']}" in page
@@ -87,9 +79,9 @@ def test_counts_of_the_examination_are_those_of_its_page() -> None:
 
 
 def test_intervals_of_the_examination_are_wilson_s() -> None:
-    for goal in lab_examination.examined()["goals"]:
+    for goal in measurements.examined()["goals"]:
         if not goal["of"]:
             continue
         theirs = binomtest(goal["count"], goal["of"]).proportion_ci(0.95, "wilson")
-        assert lab_examination.interval_percent(goal["count"], goal["of"]) == pytest.approx(
+        assert measurements.interval_percent(goal["count"], goal["of"]) == pytest.approx(
             (100 * theirs.low, 100 * theirs.high))

@@ -16,15 +16,14 @@ TITLES = {"dissertation": "The dissertation, item by item", "field": "Other pape
 def tables() -> str:
     """A table for each shelf: a row for each printed item with its word, linked to the file of its study."""
     parts = []
-    for shelf, package in SHELVES.items():
+    for shelf in SHELVES:
         rows = sorted(((_place(item.name, place), item, study) for place, study in enumerate(studies(shelf).values())
                        for item in study.items), key=lambda row: row[0])
         if rows:
-            folder = package.replace(".", "/")
             parts += ["", f"## {TITLES[shelf]}", "",
                       "| printed | study | word | because |", "| --- | --- | --- | --- |",
-                      *(f"| {item.name} | [`{study.called}`](../{folder}/{study.name}.py) | {item.word} | "
-                        f"{item.because} |" for _, item, study in rows)]
+                      *(f"| {item.name} | [`{study.called}`](../{study.run.__module__.replace('.', '/')}.py) | "
+                        f"{item.word} | {item.because} |" for _, item, study in rows)]
     return "\n".join(parts) + "\n"
 
 

@@ -19,8 +19,7 @@ from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.iso8608 import iri_class
-from logger.studies.checks import Word
-from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -130,3 +129,4 @@ STUDY = Study(
                                                                                         "than the car's, by the "
                                                                                         "figures above."),),
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")
+STUDIES = (STUDY,)

@@ -38,8 +38,7 @@ from logger.shipped import vehicle_path
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.checks import Word
-from logger.studies.study import Effort, Item, Picture, Result, Study, Table
+from logger.studies.study import Effort, Item, Picture, Result, Study, Table, Word
 from logger.units import KMH_MPS
 
 Array = npt.NDArray[np.float64]
@@ -244,3 +243,4 @@ STUDY = Study(
     "The reader is tested on small files of the same layout.",
     from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")
+STUDIES = (STUDY,)

@@ -24,8 +24,7 @@ from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.agreement import best_shift_m, matching_cells, mean_between
-from logger.studies.checks import Word
-from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table
+from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -144,3 +143,4 @@ STUDY = Study(
     from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
     "Run on the real files, it gives the ceiling that is printed with every other set; no paper prints it."),),
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")
+STUDIES = (STUDY,)

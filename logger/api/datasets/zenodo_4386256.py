@@ -29,8 +29,7 @@ from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.checks import Word
-from logger.studies.study import Effort, Item, Picture, Result, Study
+from logger.studies.study import Effort, Item, Picture, Result, Study, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -159,3 +158,4 @@ STUDY = Study(
     "on small files of the same layout.",
     from_folder("Zenodo 4386256", _DOWNLOAD, run), (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")
+STUDIES = (STUDY,)

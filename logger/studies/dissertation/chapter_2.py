@@ -1,0 +1,446 @@
+"""Chapter 2: classes of roads, IRI, weightings and exposure. Names of one item end in its number (``PRINTED_T2_2``).
+
+Table 2.2 and Fig 2.5: the classes of ISO 8608, and roads of each of them (2.2.1).
+
+Tables 2.3 and 2.4 and Fig 2.16: which roads have which IRI, and how they ride (2.2.2.3).
+
+Fig 2.6 to 2.9: a smooth and a rough road, their spectra, and the spectra smoothed (2.2.1).
+
+Tables 2.7 and 2.8: the parameters of the six frequency weightings (2.3.4.1).
+
+Fig 2.13: what the IRI hears of waves of each length (2.2.2.1).
+
+Fig 2.18 and 2.19: the curves of the six frequency weightings, and what Eq 2.16 does as printed (2.3.4.1).
+
+The factors of ISO 2631-1 are an outside measure of the principal weightings. Of the additional ones the right sides of
+Eq 2.13 to 2.15, worked out here from the printed Table 2.8, stand beside ours.
+
+Fig 2.20: the health guidance caution zone (2.3.5).
+"""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import inf, isfinite, sqrt
+
+import numpy as np
+
+from logger.chart_data import Curves, Line
+from logger.comfort.exposure import S_PER_HOUR, caution_zone
+from logger.dsp.weightings.wc import WEIGHTING as WC
+from logger.dsp.weightings.wd import WEIGHTING as WD
+from logger.dsp.weightings.we import WEIGHTING as WE
+from logger.dsp.weightings.weighting import Weighting
+from logger.dsp.weightings.wf import WEIGHTING as WF
+from logger.dsp.weightings.wj import WEIGHTING as WJ
+from logger.dsp.weightings.wk import WEIGHTING as WK
+from logger.roads.elevation_spectrum import band_edges, classify, smooth, spectrum
+from logger.roads.golden_car import STANDARD_SPEED_MPS
+from logger.roads.iso8608 import CLASS_GD_N0_CM3, HIGHEST_CPM, LOWEST_CPM, displacement_psd, generate, road_class
+from logger.roads.roughness_words import federal_condition, ride_words, road_kinds
+from logger.roads.wavelength import slope_gain
+from logger.studies.study import (
+    Cell,
+    Column,
+    Effort,
+    Item,
+    Picture,
+    Result,
+    Statement,
+    Study,
+    Table,
+    Value,
+    Word,
+    about,
+    alike,
+)
+from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.quarter_car import GOLDEN_CAR, structure
+
+PRINTED_T2_2 = (("A", None, 16, 32), ("B", 32, 64, 128), ("C", 128, 256, 512), ("D", 512, 1_024, 2_048),
+           ("E", 2_048, 4_096, 8_192), ("F", 8_192, 16_384, 32_768), ("G", 32_768, 65_536, 131_072),
+           ("H", 131_072, 262_144, None))
+"""Class, lower limit, geometric mean, upper limit [cm3]."""
+_ROADS, _LENGTH_M_T2_2, _SPACING_M_T2_2 = 20, 1000.0, 0.05
+_HALVINGS = 50
+_SHORT_M = 200.0  # one segment of a spectrum, also at twice the length
+_PRINTED_POWER = 1.0  # of a metre, in m2 (cycle/m)
+
+
+def _t2_2(effort: Effort) -> Result:
+    limits = [_limit(*pair) for pair in pairwise(CLASS_GD_N0_CM3.items())]
+    roads = effort.count(_ROADS, 2)
+    rows: list[tuple[Cell, ...]] = []
+    values: list[Value] = []
+    for (name, lower, mean, upper), ours in zip(effort.each(PRINTED_T2_2), [*limits, None], strict=True):
+        found = [classify(generate(CLASS_GD_N0_CM3[name], _LENGTH_M_T2_2, _SPACING_M_T2_2, seed), _SPACING_M_T2_2)
+                 for seed in range(roads)]
+        gd, waviness = (float(np.mean([getattr(one, what) for one in found])) for what in ("gd_n0_cm3", "waviness"))
+        right = sum(one.road_class == name for one in found)
+        rows.append((name, lower, mean, upper, ours, gd, waviness, 100 * right / roads))
+        values += about("Table 2.2", [Value(f"class {name}, geometric mean [cm3]", mean, CLASS_GD_N0_CM3[name], 0.0)])
+        if upper is not None and ours is not None:
+            values += about(("Table 2.2", "Fig 2.5"), [
+                Value(f"class {name}, upper limit [cm3]", upper, ours, 1e-6 * upper)])
+    values += about("Table 2.2", [Value("power of a metre in the unit of Gd", _PRINTED_POWER, _power_of_a_metre(), 0.01,
+                                        Word.MISPRINT)])
+    table = Table(f"Classes, and {roads} generated roads of each geometric mean", (
+        Column("class"), Column("printed lower [cm3]", ".0f"), Column("printed mean [cm3]", ".0f"),
+        Column("printed upper [cm3]", ".0f"), Column("our upper [cm3]", ".1f"),
+        Column("Gd(n0) found in the roads [cm3]", ".4g"), Column("waviness found", ".3f"),
+        Column("put into the right class [%]", ".0f")), tuple(rows))
+    verdict = ("All limits and means agree. The printed unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
+               "spectrum is in m2 per cycle/m, that is m3, and 1e-6 of it are cm3. Roads that were generated at each "
+               "mean are found again with their degree of roughness, a waviness near 2 and their class. The power of "
+               "a metre is that by which the spectrum of a road grows when all its lengths are doubled.")
+    n = np.array([LOWEST_CPM, HIGHEST_CPM])
+    picture = Picture(Curves("Bounds of the classes, waviness 2", "wave number [cycle/m]", "displacement spectrum [m3]",
+                             tuple(Line(f"upper limit of {name}", n, displacement_psd(n, limit))
+                                   for name, limit in zip(CLASS_GD_N0_CM3, limits, strict=False)), log_x=True,
+                             log_y=True),
+                      "the bounds of the classes over the spectrum, within the wave numbers of interest")
+    return Result((table,), verdict, (picture,), tuple(values))
+
+
+def _power_of_a_metre() -> float:
+    """Of a spectrum: by how many doublings it grows when heights and distances of a road are twice as large."""
+    road = generate(CLASS_GD_N0_CM3["B"], _SHORT_M, _SPACING_M_T2_2, 0)
+    plain, doubled = spectrum(road, _SPACING_M_T2_2), spectrum(2 * road, 2 * _SPACING_M_T2_2)
+    return float(np.median(np.log2(doubled.psd_m3 / plain.psd_m3)))
+
+
+def _limit(smoother: tuple[str, float], rougher: tuple[str, float]) -> float:
+    """The degree of roughness [cm3] at which the word for a road changes."""
+    low, high = smoother[1], rougher[1]
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if road_class(middle) == rougher[0] else (middle, high)
+    return high
+
+
+T2_2 = Study("table_2_2", "The classes of ISO 8608, and roads of each", "Table 2.2, section 2.2.1",
+              "The limits are those at which ridelog's word for a road changes; roads of 1 km are generated at each "
+              "class's geometric mean and classified from their elevations alone.", _t2_2,
+              items=(Item("Table 2.2", Word.MISPRINT,
+                          "All limits agree; the printed unit should be 1e-6 m2 per cycle/m, which is cm3."),
+                     Item("Fig 2.5", Word.AGREES, "Its bounds are the limits of the table, at waviness 2.")))
+
+
+PRINTED_RANGES = (("airport runways and superhighways", 0.25, 1.75), ("new pavements", 1.50, 3.25),
+                  ("older pavements", 2.25, 5.75), ("maintained unpaved roads", 3.25, 10.00),
+                  ("damaged pavements", 4.00, 10.75), ("rough unpaved roads", 8.00, 20.00))
+PRINTED_MARKS = (4.0, 6.0, 8.0, 10.0)
+"""Marks of Table 2.4's scale at which the second to fifth descriptions begin [m/km]."""
+PRINTED_FEDERAL = (("good", 1.50), ("fair", 2.68))
+"""Upper ends [m/km]: the targets of 2006 and of 2002, 95 and 170 in/mi."""
+_STEP = 0.001  # of the IRI that is asked for; half the last printed figure is 0.005
+_MOST = 25.0
+
+
+def _t2_3(effort: Effort) -> Result:
+    iri = np.round(np.arange(0, _MOST, _STEP), 3)
+    (kinds,) = ([road_kinds(one) for one in iri.tolist()] for _ in effort.each(range(1)))
+    rows, lines = [], []
+    values: list[Value] = []
+    for place, (name, low, high) in enumerate(PRINTED_RANGES):
+        held = iri[[name in kind for kind in kinds]]
+        ours = float(held.min()), float(held.max())
+        rows.append((name, low, ours[0], high, ours[1]))
+        values += about(("Table 2.3", "Fig 2.16"), [
+            Value(f"{name}, {end} [m/km]", printed, mine, 0.005)
+            for end, printed, mine in zip(("from", "to"), (low, high), ours, strict=True)])
+        lines.append(Line(name, np.array(ours), np.full(2, float(len(PRINTED_RANGES) - place))))
+    ranges = Table("Which roads have it", (Column("road"), Column("printed from [m/km]", ".2f"), Column(
+        "ours", ".2f"), Column("printed to [m/km]", ".2f"), Column("ours", ".2f")), tuple(rows))
+    words = [ride_words(one) for one in iri.tolist()]
+    changes = [float(iri[place]) for place in range(1, len(iri)) if words[place] != words[place - 1]]
+    values += about("Table 2.4", [Value(f"ride, mark {mark:.0f} [m/km]", mark, change, 0.005)
+                                  for mark, change in zip(PRINTED_MARKS, changes, strict=True)])
+    rides = Table("How a paved road rides", (Column("printed from [m/km]", ".0f"), Column("ours", ".2f"), Column(
+        "in short")), tuple((mark, change, ride_words(change))
+                            for mark, change in zip((None, *PRINTED_MARKS), (0.0, *changes), strict=True)))
+    federal = [federal_condition(one) for one in iri.tolist()]
+    values += about("2.2.2.3 targets", [
+        Value(f"{word} up to [m/km]", printed, float(iri[[one == word for one in federal]].max()), 0.005)
+        for word, printed in PRINTED_FEDERAL])
+    verdict = ("All bounds agree. Table 2.4 writes its descriptions along a scale; each is taken to hold from the "
+               "mark at which it stands up to the next, the first from 0. The targets of the text, 1.50 and 2.68 m/km, "
+               "are 95 and 170 in/mi, between which a road of the federal system is called fair today.")
+    picture = Picture(Curves("Which roads have it", "IRI [m/km]", "kind of road, as in the table", tuple(lines)),
+                      "the ranges of six kinds of road as Sayers and Karamihas (1998) draw them, those of Table 2.3")
+    return Result((ranges, rides), verdict, (picture,), tuple(values))
+
+
+T2_3 = Study("table_2_3", "Which roads have which IRI, and how they ride", "Table 2.3, section 2.2.2.3",
+              "Ridelog is asked for its words from 0 to 25 m/km in steps of 0.001; the values at which they change "
+              "stand beside the printed ones.", _t2_3,
+              items=(*alike(("Table 2.3", "Fig 2.16"), Word.AGREES,
+                            "Each kind of road begins and ends at the printed IRI."),
+                     Item("Table 2.4", Word.AGREES, "The description of the ride changes at the printed marks."),
+                     Item("2.2.2.3 targets", Word.AGREES, "Good and fair roads end at the targets of 2006 and 2002.")))
+
+
+CLASSES = ("B", "D")
+PROFILES, SPECTRA = {"B": "Fig 2.6", "D": "Fig 2.8"}, {"B": "Fig 2.7", "D": "Fig 2.9"}
+_LENGTH_M_F2_7, _SPACING_M_F2_7, _SEED = 1000.0, 0.05, 0
+_SHOWN_M = 100.0
+_BANDS_CPM = (0.011, 2.0)
+
+
+def _f2_7(effort: Effort) -> Result:
+    rows: list[tuple[Cell, ...]] = []
+    lines, roads, scatters, levels = [], [], [], []
+    values: list[Value | Statement] = []
+    for name in effort.each(CLASSES):
+        gd = CLASS_GD_N0_CM3[name]
+        road = generate(gd, _LENGTH_M_F2_7, _SPACING_M_F2_7, _SEED)
+        raw, found = spectrum(road, _SPACING_M_F2_7), classify(road, _SPACING_M_F2_7)
+        bands = smooth(raw, band_edges(max(_BANDS_CPM[0], 1.5 * raw.step_cpm), _BANDS_CPM[1]))
+        n = raw.wave_number_cpm
+        inside = (n > bands.edges_cpm[0]) & (n < bands.edges_cpm[-1])
+        scatter = [float(np.std(10 * np.log10(level / displacement_psd(at, gd))))
+                   for level, at in ((raw.psd_m3[inside], n[inside]), (bands.psd_m3, bands.centre_cpm))]
+        rows.append((name, found.road_class, gd, found.gd_n0_cm3, found.waviness, *scatter))
+        scatters.append(scatter)
+        values += about((PROFILES[name], SPECTRA[name]), [
+            Value(f"class {name} road, Gd(n0) [cm3]", gd, found.gd_n0_cm3, gd / 2)])
+        values += about(SPECTRA[name], [
+            Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15)])
+        values += about(SPECTRA[name], [
+            Statement(f"class {name}: scatter of the smoothed over that of the raw spectrum", "smoothed, it is easier "
+                      "to put into a class", scatter[1] / scatter[0], most=0.5)])
+        levels.append(bands.psd_m3)
+        thin = slice(None, None, 4)
+        lines += [Line(f"{name}, raw", n[inside][thin], raw.psd_m3[inside][thin]),
+                  Line(f"{name}, smoothed", bands.centre_cpm, bands.psd_m3)]
+        shown = np.arange(0, _SHOWN_M, 0.25)
+        roads.append(Line(f"class {name}", shown,
+                          1000 * np.interp(shown, _SPACING_M_F2_7 * np.arange(len(road)), road)))
+    values += about(tuple(SPECTRA.values()), [Statement(
+        "least of all bands' ratios of the spectra, class D over class B", "shifted upward at all wave numbers",
+        float((levels[1] / levels[0]).min()), least=1.0)])
+    table = Table("Two roads, classified from their elevations", (
+        Column("printed class"), Column("our class"), Column("its mean Gd(n0) [cm3]", ".0f"),
+        Column("Gd(n0) found [cm3]", ".1f"), Column("waviness found", ".3f"),
+        Column("scatter of the raw spectrum [dB]", ".1f"), Column("of the smoothed [dB]", ".2f")), tuple(rows))
+    verdict = ("As the text says of the printed pictures, the rough road's spectrum is that of the smooth one shifted "
+               "upward at all wave numbers, both fall towards short waves, the raw spectra are ragged, and smoothed "
+               f"over the bands of Eq 2.4 to 2.6 they scatter by {scatters[0][1]:.1f} dB in place of "
+               f"{scatters[0][0]:.1f}. The text says that the bands are listed in ISO 2631-1; they are in ISO 8608. "
+               "The printed phases are not known, so the roads are alike in their statistics only.")
+    pictures = (Picture(Curves("The first 100 m of a smooth and a rough road (Fig 2.6, 2.8)", "distance [m]",
+                               "elevation [mm]", tuple(roads)),
+                        "a picture each: a simulated smooth profile, and a rough one"),
+                Picture(Curves("Their spectra (Fig 2.7, 2.9)", "wave number [cycle/m]", "displacement spectrum [m3]",
+                               tuple(lines), log_x=True, log_y=True),
+                        "a picture each, raw and smoothed: falling towards short waves, the rough road's shifted "
+                        "upward at all wave numbers"))
+    return Result((table,), verdict, pictures, tuple(values))
+
+
+F2_7 = Study("fig_2_7", "Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
+              "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", _f2_7,
+              items=(*alike(PROFILES.values(), Word.AGREES,
+                            "A road made for the caption's class is found to be of it."),
+                     *alike(SPECTRA.values(), Word.AGREES,
+                            "The spectra fall, shift and smooth as the text describes.")))
+
+
+NAMES = ("f1", "f2", "f3", "f4", "Q4", "f5", "Q5", "f6", "Q6")
+PRINTED_T2_7: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
+    (WK, (0.4, 100, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91)),
+    (WD, (0.4, 100, 2.0, 2.0, 0.63, inf, None, inf, None)),
+    (WF, (0.08, 0.63, inf, 0.25, 0.86, 0.0625, 0.80, 0.1, 0.80)),
+    (WC, (0.4, 100, 8.0, 8.0, 0.63, inf, None, inf, None)),
+    (WE, (0.4, 100, 1.0, 1.0, 0.63, inf, None, inf, None)),
+    (WJ, (0.4, 100, inf, inf, None, 3.75, 0.91, 5.32, 0.91)),
+)
+
+
+def _t2_7(effort: Effort) -> Result:
+    rows: list[tuple[Cell, ...]] = []
+    values: list[Value] = []
+    for weighting, printed in effort.each(PRINTED_T2_7):
+        ours = (weighting.f1_hz, weighting.f2_hz, weighting.f3_hz, weighting.f4_hz, weighting.q4, weighting.f5_hz,
+                weighting.q5, weighting.f6_hz, weighting.q6)
+        for name, said, mine in zip(NAMES, printed, ours, strict=True):
+            unit = "" if name.startswith("Q") else " [Hz]"
+            if said is not None and isfinite(said):
+                table = "Table 2.7" if weighting in (WK, WD, WF) else "Table 2.8"
+                values += about(table, [Value(f"{weighting.name}, {name}{unit}", said, mine, 0.0)])
+            else:
+                rows.append((weighting.name, name, "infinite" if said else "none",
+                             "without effect" if said is None else "infinite" if mine == inf else f"{mine:g}"))
+    absent = Table("Parts that a weighting does not have", (
+        Column("weighting"), Column("parameter"), Column("printed"), Column("ours")), tuple(rows))
+    verdict = (f"All {len(values)} finite parameters agree, and the parts that the tables leave out, by an infinite "
+               "frequency, are left out here. What the formula does with them is in fig-2-18.")
+    return Result((absent,), verdict, (), tuple(values))
+
+
+T2_7 = Study("table_2_7", "Parameters of the six frequency weightings", "Table 2.7, section 2.3.4.1",
+              "Ridelog's weightings, each as its file has it, parameter by parameter.", _t2_7,
+              items=(Item("Table 2.7", Word.AGREES, "Every parameter of Wk, Wd and Wf agrees."),
+                     Item("Table 2.8", Word.AGREES, "Every parameter of Wc, We and Wj agrees.")))
+
+
+PRINTED_PEAKS_CPM = (0.065, 0.42)
+PRINTED_PEAKS_HZ = (1.44, 9.33)
+_BETWEEN_CPM = 0.2
+_NEAR = 0.05  # as near as the top of a broad hump is read off a figure
+
+
+def _f2_13(effort: Effort) -> Result:
+    wave_number = np.geomspace(0.01, 2.0, effort.count(2000, 200))
+    gain = slope_gain(wave_number, 0.0)
+    slow = wave_number < _BETWEEN_CPM
+    peaks = [int(np.flatnonzero(part)[gain[part].argmax()]) for part in (slow, ~slow)]
+    body_cpm, wheel_cpm = undamped_frequencies_hz(structure(GOLDEN_CAR)) / STANDARD_SPEED_MPS
+    nearest = [float(wave_number[min(peaks, key=lambda peak: abs(np.log(wave_number[peak] / of)))])
+               for of in (wheel_cpm, body_cpm)]
+    rows = tuple((words, printed, float(wave_number[peak]), 1 / float(wave_number[peak]), float(gain[peak]))
+                 for words, printed, peak in zip(("body bounces", "wheel hops"), PRINTED_PEAKS_CPM, peaks, strict=True))
+    table = Table("Where the gain peaks", (
+        Column("motion"), Column("printed [cycle/m]", ".3f"), Column("ours [cycle/m]", ".4f"),
+        Column("wavelength [m]", ".1f"), Column("gain", ".2f")), rows)
+    verdict = ("Both peaks lie within 4 % of where the text has them, as near as a broad hump is read off a figure. "
+               "The text has their meaning the wrong way round: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
+               "hops; at 80 km/h these are its 1.44 and 9.33 Hz.")
+    picture = Picture(Curves("Gain of the IRI's car at 80 km/h, slope of the suspension per slope of the road",
+                             "wave number [cycle/m]", "gain", (Line("gain", wave_number, gain),), log_x=True),
+                      "the IRI of sine waves of 0.1 to 100 m, largest at two wave numbers, 0.065 and 0.42 cycle/m")
+    values = (*(Value(f"{words} peak [cycle/m]", printed, float(wave_number[peak]), _NEAR * printed)
+                for words, printed, peak in zip(("first", "second"), PRINTED_PEAKS_CPM, peaks, strict=True)),
+              *(Value(f"where the {words} [cycle/m]", printed, near, _NEAR * printed, Word.MISPRINT)
+                for words, printed, near in zip(("wheel hops", "body bounces"), PRINTED_PEAKS_CPM, nearest,
+                                                strict=True)),
+              *(Value(f"{printed:g} cycle/m at 80 km/h [Hz]", hz, printed * STANDARD_SPEED_MPS, 0.005, of_print=True)
+                for printed, hz in zip(PRINTED_PEAKS_CPM, PRINTED_PEAKS_HZ, strict=True)))
+    return Result((table,), verdict, (picture,), values)
+
+
+F2_13 = Study("fig_2_13", "What the IRI hears of each wavelength", "Fig 2.13, section 2.2.2.1",
+              "Computed for the Golden Car as a continuous system, without the moving average, as in the figure.",
+              _f2_13,
+              items=(Item("Fig 2.13", Word.MISPRINT,
+                          "The text swaps the two wave numbers: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
+                          "hops; the curve itself agrees."),))
+
+
+PRINCIPAL, ADDITIONAL = ("wk", "wd", "wf"), ("wc", "we", "wj")
+STANDARD = ((WK, ((1.0, 0.482), (4.0, 0.967), (8.0, 1.036), (31.5, 0.405))),
+            (WD, ((1.0, 1.011), (4.0, 0.512), (31.5, 0.0632))),
+            (WF, ((0.1, 0.695), (0.16, 1.006), (0.4, 0.384))))
+"""Factors of ISO 2631-1 Table 3 at frequencies [Hz]; the dissertation prints the curves only."""
+_LAST_DIGIT = 0.001
+_AT_HZ = 1.0
+_ADDITIONAL_HZ = (0.5, 4.0, 20.0)
+_SAME = 1e-6  # of the factor: the formulas are the same but for how they are written
+
+
+def _f2_18(effort: Effort) -> Result:
+    principal = about("Fig 2.18", [
+        Value(f"{weighting.name} at {f_hz:g} Hz (ISO 2631-1)", factor, float(abs(weighting.response(f_hz))),
+              0.75 * _LAST_DIGIT) for weighting, factors in STANDARD for f_hz, factor in factors])
+    additional = about("Fig 2.19", [
+        Value(f"{weighting.name} at {f_hz:g} Hz (Eq 2.13 to 2.15)", by_eq, ours, _SAME * by_eq)
+        for weighting, parameters in PRINTED_T2_7 if weighting.name in ADDITIONAL for f_hz in _ADDITIONAL_HZ
+        for by_eq, ours in [(_by_printed_equations(f_hz, parameters), float(abs(weighting.response(f_hz))))]])
+    # The right side of Eq 2.16 has f5 and Q5 above and below the line, so it is Q6 / Q5 at all frequencies.
+    as_printed = replace(WK, f5_hz=inf, q5=1.0, f6_hz=inf, q6=1.0, gain=WK.q6 / WK.q5)
+    misprint = about("Eq 2.16", [Value(f"wk at {_AT_HZ:g} Hz, by Eq 2.16 as printed", float(abs(as_printed.response(
+        _AT_HZ))), float(abs(WK.response(_AT_HZ))), 0.1, Word.MISPRINT)])
+    f_hz = np.geomspace(0.02, 400.0, effort.count(400, 60))
+    levels = {weighting.name: 20 * np.log10(np.abs(weighting.response(f_hz)))
+              for weighting, _ in effort.each(PRINTED_T2_7)}
+    rows = tuple((name, float(f_hz[level.argmax()]), float(level.max()),
+                  float(f_hz[level > level.max() - 3].min()), float(f_hz[level > level.max() - 3].max()))
+                 for name, level in levels.items())
+    table = Table("The curves (printed as pictures only)", (
+        Column("weighting"), Column("largest at [Hz]", ".3g"), Column("there [dB]", "+.2f"),
+        Column("within 3 dB of it from [Hz]", ".3g"), Column("to [Hz]", ".3g")), rows)
+    verdict = ("The curves meet the standard's factors to the printed digit. Eq 2.16 does not: its right side has f5 "
+               "and Q5 in the denominator, too, and is then 1 at all frequencies, which would make Wk at 1 Hz twice "
+               "as large; f6 and Q6 belong there. The text says of the printed figures only that they have amplitude "
+               "against frequency; here Wk is level at half its height about 1 Hz and highest at 6 Hz, Wd is highest "
+               "at 1 Hz and Wf at 0.17 Hz.")
+    pictures = tuple(Picture(Curves(title, "frequency [Hz]", "factor [dB]", tuple(
+        Line(name, f_hz[levels[name] > -60], levels[name][levels[name] > -60]) for name in names), log_x=True),
+        f"amplitude by frequency of the {printed}") for title, names, printed in (
+            ("Principal weightings (Fig 2.18)", PRINCIPAL, "three principal weightings Wk, Wd and Wf"),
+            ("Additional weightings (Fig 2.19)", ADDITIONAL, "three additional weightings Wc, We and Wj")))
+    return Result((table,), verdict, pictures, (*principal, *additional, *misprint))
+
+
+def _by_printed_equations(f_hz: float, parameters: tuple[float | None, ...]) -> float:
+    """The right sides of Eq 2.13 to 2.15 multiplied, and of an upward step that of Eq 2.16 with f6 and Q6 below the
+    line; parameters as in Tables 2.7 and 2.8."""
+    f1, f2, f3, f4, q4, f5, q5, f6, q6 = (inf if one is None else one for one in parameters)
+    found = sqrt(f_hz**4 / (f_hz**4 + f1**4)) * sqrt(f2**4 / (f_hz**4 + f2**4))
+    if f4 < inf:
+        found *= (1.0 if f3 == inf else sqrt((f_hz**2 + f3**2) / f3**2)) / _second_order(f_hz, f4, q4)
+    if f5 < inf:
+        found *= (f5 / f6) ** 2 * _second_order(f_hz, f5, q5) / _second_order(f_hz, f6, q6)
+    return float(found)
+
+
+def _second_order(f_hz: float, corner_hz: float, q: float) -> float:
+    ratio = (f_hz / corner_hz) ** 2
+    return sqrt(ratio**2 + ratio * (1 / q**2 - 2) + 1)
+
+
+F2_18 = Study("fig_2_18", "Curves of the six frequency weightings", "Fig 2.18, section 2.3.4.1",
+              "The magnitude of the formulas of ISO 2631-1 Annex A, as ridelog weighs whole records.", _f2_18,
+              items=(Item("Fig 2.18", Word.AGREES,
+                          "The principal weightings have the standard's factors to the printed digit."),
+                     Item("Fig 2.19", Word.AGREES,
+                          "The additional weightings are those of Eq 2.13 to 2.15 with the parameters of Table 2.8."),
+                     Item("Eq 2.16", Word.MISPRINT,
+                          "Its right side has f5 and Q5 where the denominator needs f6 and Q6, and is then the same "
+                          "at all frequencies.")))
+
+
+PRINTED_UPPER_VDV, PRINTED_LOWER_VDV = 8.5, 17.0
+PRINTED_SHADED_HOURS = (4.0, 8.0)
+HOURS = (1 / 60, 1 / 6, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 24.0)
+_DOSE_PER_RMS = 1.4  # the estimated dose of ISO 2631-1, Eq B.3
+
+
+def _f2_20(effort: Effort) -> Result:
+    zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(HOURS)]
+    table = Table("The zone, weighted r.m.s.", (
+        Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),
+        Column("n = 4, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"), Column("printed")), tuple(
+        (hours, two.lower, two.upper, four.lower, four.upper,
+         "shaded" if PRINTED_SHADED_HOURS[0] <= hours <= PRINTED_SHADED_HOURS[1] else "not shaded")
+        for hours, two, four in zones))
+    eight = caution_zone(8.0, 4)
+    upper, lower = (_DOSE_PER_RMS * bound * (8.0 * S_PER_HOUR) ** 0.25 for bound in (eight.upper, eight.lower))
+    fine = np.geomspace(1 / 60, 24, 2000)
+    apart = np.array([caution_zone(hour, 2).lower / caution_zone(hour, 4).lower for hour in fine.tolist()])
+    crossing = float(fine[np.abs(np.log(apart)).argmin()])
+    values = (Value("dose of the upper line, n = 4 [m/s^1.75]", PRINTED_UPPER_VDV, upper, 0.01, Word.MISPRINT),
+              Value("dose of the lower line, n = 4 [m/s^1.75]", PRINTED_LOWER_VDV, lower, 0.01, Word.MISPRINT),
+              Value("where the lines cross: middle of the shaded hours", 6.0, crossing, 2.0))
+    verdict = ("The text has 8.5 for the upper line and 17 for the lower; it is the other way round. The lines of the "
+               f"two schools, a^2 t and a^4 t constant, cross at {crossing:.1f} hours and lie within "
+               f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
+               "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
+               f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high.")
+    hours = np.geomspace(1 / 60, 24, 60)
+    lines = tuple(Line(f"n = {exponent}, {bound}", hours, np.array([
+        getattr(caution_zone(hour, exponent), bound) for hour in hours.tolist()]))
+                  for exponent in (2, 4) for bound in ("lower", "upper"))
+    picture = Picture(Curves("The caution zone", "hours a day", "weighted r.m.s. [m/s2]", lines, log_x=True,
+                             log_y=True),
+                      "two dashed lines for n = 2 and two dotted ones for n = 4, shaded between 4 and 8 hours")
+    return Result((table,), verdict, (picture,), values)
+
+
+F2_20 = Study("fig_2_20", "The health guidance caution zone", "Fig 2.20, section 2.3.5",
+              "The zone's bounds as ridelog has them for an exposure of a minute to a day; the doses of its lines are "
+              "those of ISO 2631-1 Eq B.3.", _f2_20,
+              items=(Item("Fig 2.20", Word.MISPRINT,
+                          "The text has the doses of the two lines the wrong way round: 17 is the upper, 8.5 the "
+                          "lower."),))
+
+STUDIES = (T2_2, T2_3, F2_7, T2_7, F2_13, F2_18, F2_20)
