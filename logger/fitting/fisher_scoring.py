@@ -1,0 +1,119 @@
+"""Fisher scoring: the numbers that make a likelihood the largest, of which slopes and information are known.
+
+The value of a likelihood with a road integrated out is never computed, its slopes and their covariance, the
+information, are; the latter at many times the price. Each step solves the information for the slopes (R. A. Fisher
+1925). It serves on from step to step, and learns from each how the slopes really change (C. G. Broyden 1965), as long
+as the expected gain falls: few simulated drives give a few numbers' slopes another steepness than their mean has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.fitting.information_matrix import whitening
+
+Array = npt.NDArray[np.float64]
+
+_FALLING = 0.5
+"""Share of the expected gain before, above which the information is taken again: at a half steps still converge."""
+
+
+class Scored(Protocol):
+    """What a likelihood makes of a point x (m,): slopes (m,), and the information (m, m) where it was asked for."""
+
+    @property
+    def slopes(self) -> Array: ...
+
+    @property
+    def information(self) -> Array: ...
+
+
+S = TypeVar("S", bound=Scored)
+
+
+@dataclass(frozen=True, eq=False)
+class Maximum(Generic[S]):
+    """Where scoring ended.
+
+    x              (m,)
+    at             what was made of that point
+    information    (m, m), as it was taken last
+    steps          that were taken
+    converged      whether what was left was less than asked for
+    """
+
+    x: Array
+    at: S
+    information: Array
+    steps: int
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Curvature:
+    """What is known of how slopes change: the information taken last, of the numbers that were free to move the
+    ``whitening`` and the ``correction`` (r, r) learnt since, and the step that was taken: its slopes before (r,) and
+    itself (r,), in standard errors, and what share of it."""
+
+    information: Array
+    moving: npt.NDArray[np.bool_]
+    whitening: Array
+    correction: Array
+    slopes: Array
+    along: Array
+    part: float = 0.0
+
+    @staticmethod
+    def of(information: Array, moving: npt.NDArray[np.bool_]) -> _Curvature:
+        """As the information says."""
+        whiten = whitening(information[np.ix_(moving, moving)])
+        nothing = np.zeros(len(whiten))
+        return _Curvature(information, moving, whiten, np.eye(len(whiten)), nothing, nothing)
+
+    def after(self, slopes: Array) -> _Curvature:
+        """Corrected by the slopes (r,) that the step led to."""
+        if not self.part * float(self.along @ self.along) > 0:
+            return self
+        missed = self.slopes - slopes - self.correction @ (self.part * self.along)
+        learnt = np.outer(missed, self.along) / (self.part * float(self.along @ self.along))
+        return replace(self, correction=self.correction + learnt)
+
+
+def maximise(score: Callable[[Array, bool], S], start: Array, low: Array, high: Array, longest: Array, *,
+             close: float, most_steps: int) -> Maximum[S]:
+    """The point that a likelihood is largest at, uphill from a start (m,).
+
+    score        of a point, with the information if that is asked for
+    low, high    bounds (m,)
+    longest      step of each number (m,)
+    close        the end is reached where so many standard errors are left
+    """
+    x = np.clip(start, low, high)
+    at = score(x, True)
+    curvature, before, steps = None, np.inf, 0
+    information = at.information
+    while True:
+        moving = ~(((x <= low) & (at.slopes < 0)) | ((x >= high) & (at.slopes > 0)))
+        if curvature is None or curvature.information is not information or (curvature.moving != moving).any():
+            curvature = _Curvature.of(information, moving)
+        slopes = curvature.whitening @ at.slopes[moving]
+        left = float(slopes @ slopes)
+        if left < close**2 or steps == most_steps:
+            return Maximum(x, at, information, steps, left < close**2)
+        if left > _FALLING * before and information is not at.information:
+            at, before = score(x, True), np.inf
+            information = at.information
+            continue
+        curvature, before = curvature.after(slopes), left
+        along = np.linalg.solve(curvature.correction, slopes)
+        step = np.zeros_like(x)
+        step[moving] = curvature.whitening.T @ along
+        part = min(1.0, 1 / max(float(np.abs(step / longest).max()), 1e-300))
+        curvature = replace(curvature, slopes=slopes, along=along, part=part)
+        x = np.clip(x + part * step, low, high)
+        at, steps = score(x, False), steps + 1
