@@ -57,8 +57,8 @@ class Maximum(Generic[S]):
 @dataclass(frozen=True, eq=False)
 class _Curvature:
     """What is known of how slopes change: the information taken last, of the numbers that were free to move the
-    ``whitening`` and the ``correction`` (r, r) learnt since, and the step that was taken: its slopes before (r,) and
-    itself (r,), in standard errors, and what share of it."""
+    ``whitening`` and the ``correction`` (r, r) learnt since, and the step that was taken, in standard errors: the
+    slopes before (r,), and itself (r,), 0 where it was cut short."""
 
     information: Array
     moving: npt.NDArray[np.bool_]
@@ -66,7 +66,6 @@ class _Curvature:
     correction: Array
     slopes: Array
     along: Array
-    part: float = 0.0
 
     @staticmethod
     def of(information: Array, moving: npt.NDArray[np.bool_]) -> _Curvature:
@@ -77,11 +76,10 @@ class _Curvature:
 
     def after(self, slopes: Array) -> _Curvature:
         """Corrected by the slopes (r,) that the step led to."""
-        if not self.part * float(self.along @ self.along) > 0:
+        if not (size := float(self.along @ self.along)) > 0:
             return self
-        missed = self.slopes - slopes - self.correction @ (self.part * self.along)
-        learnt = np.outer(missed, self.along) / (self.part * float(self.along @ self.along))
-        return replace(self, correction=self.correction + learnt)
+        missed = self.slopes - slopes - self.correction @ self.along
+        return replace(self, correction=self.correction + np.outer(missed, self.along) / size)
 
 
 def maximise(score: Callable[[Array, bool], S], start: Array, low: Array, high: Array, longest: Array, *,
@@ -90,7 +88,7 @@ def maximise(score: Callable[[Array, bool], S], start: Array, low: Array, high: 
 
     score        of a point, with the information if that is asked for
     low, high    bounds (m,)
-    longest      step of each number (m,)
+    longest      change of each number (m,) in one step
     close        the end is reached where so many standard errors are left
     """
     x = np.clip(start, low, high)
@@ -113,7 +111,7 @@ def maximise(score: Callable[[Array, bool], S], start: Array, low: Array, high: 
         along = np.linalg.solve(curvature.correction, slopes)
         step = np.zeros_like(x)
         step[moving] = curvature.whitening.T @ along
-        part = min(1.0, 1 / max(float(np.abs(step / longest).max()), 1e-300))
-        curvature = replace(curvature, slopes=slopes, along=along, part=part)
-        x = np.clip(x + part * step, low, high)
+        taken = np.clip(x + np.clip(step, -longest, longest), low, high) - x
+        curvature = replace(curvature, slopes=slopes, along=along if np.allclose(taken, step) else np.zeros_like(along))
+        x = x + taken
         at, steps = score(x, False), steps + 1

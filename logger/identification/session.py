@@ -22,7 +22,7 @@ from logger.identification.obstacle_search import located
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
-from logger.identification.unknown_road.drive_operator import Drive
+from logger.identification.unknown_road.road_operator import Drive
 from logger.runs import READING, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free

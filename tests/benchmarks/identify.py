@@ -23,8 +23,8 @@ from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
-from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.road_fit import fit_roads
+from logger.identification.unknown_road.road_operator import Drive
 from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.runs import Run

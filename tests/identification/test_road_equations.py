@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logger.identification.unknown_road.road_equations import factored, solve
+from logger.identification.unknown_road.road_operator import factored, solve
 
 COUNT, SAMPLES, VARIANCE = 40, 60, 1e-4
 RNG = np.random.default_rng(4)

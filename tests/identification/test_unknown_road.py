@@ -9,10 +9,9 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
-from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.fisher_scoring import RoadFit, RoadProblem
-from logger.identification.unknown_road.road_fit import fit_roads
-from logger.identification.unknown_road.road_state import GD_N0, NOISE, Options
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, Options
+from logger.identification.unknown_road.road_fit import RoadFit, RoadProblem, fit_roads
+from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
@@ -103,10 +102,10 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     problem = RoadProblem(response(HALF, MASS, DAMPERS), [drives], options)
     x = problem.start()
     x[-2] = 0.3
-    one = problem.roads[0]
+    one = problem.roads.roads[0]
 
     def covariance(at: Array) -> Array:
-        model = one.model(problem.state(at, problem.places[0]))
+        model = one.model(problem.roads.state(0, *problem.apart(at)))
         unit = np.eye(one.grid.count)
         maps = [crossing.readings(crossing.under_axles(unit, waves), gains).T for crossing, waves, gains in
                 zip(one.crossings, model.waves, model.responses, strict=True)]
@@ -120,7 +119,7 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     changes = [(covariance(x + step) - covariance(x - step)) / 2e-4 for step in steps]
     exact = np.array([0.5 * u @ change @ u - 0.5 * np.trace(inverse @ change) for change in changes])
     information = 0.5 * np.array([[np.trace(inverse @ a @ inverse @ b) for a in changes] for b in changes])
-    looked = problem.look(x, information=True)
+    looked = problem.score(x, information=True)
     deviations = np.sqrt(np.diag(information))
     assert looked.slopes / deviations == pytest.approx(exact / deviations, abs=4 / np.sqrt(options.probes))
     scale = np.outer(deviations, deviations)

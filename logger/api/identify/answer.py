@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from logger.identification.drive_model import DriveModel
     from logger.identification.prediction_error_fit import Fit, FitOptions
     from logger.identification.unknown_inputs import RoadInput
-    from logger.identification.unknown_road.fisher_scoring import RoadFit
-    from logger.identification.unknown_road.road_state import Options as RoadOptions
+    from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
+    from logger.identification.unknown_road.road_fit import RoadFit
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.uncertain import NumberErrors
 
@@ -400,7 +400,7 @@ def _road_fit_errors(fit: RoadFit) -> NumberErrors:
 
 def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:
     """How to fit, and the question without what is not the car's. BadInput for what needs a known road."""
-    from logger.identification.unknown_road.road_state import Options
+    from logger.identification.unknown_road.marginal_likelihood import Options
 
     unused = {**(question.obstacles or {}), "low_pass_hz": question.low_pass_hz, "robust": question.robust,
               "tries": question.tries, "noise": question.noise != "auto"}

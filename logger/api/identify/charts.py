@@ -10,7 +10,7 @@ import numpy.typing as npt
 from logger.api.identify.words import NORMAL_95
 from logger.chart_data import Bars, Chart, Curves, Line
 from logger.identification.prediction_error_fit import Fit
-from logger.identification.unknown_road.fisher_scoring import RoadFit
+from logger.identification.unknown_road.road_fit import RoadFit
 
 Array = npt.NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from logger.api.identify.words import NORMAL_95
-from logger.identification.unknown_road.fisher_scoring import RoadFit
-from logger.identification.unknown_road.road_state import GD_N0, NOISE, OFFSET
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET
+from logger.identification.unknown_road.road_fit import RoadFit
 from logger.vehicle.named_parameters import Free
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}

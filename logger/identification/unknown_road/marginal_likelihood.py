@@ -20,34 +20,124 @@ estimate is then a root of a smooth function, unbiased however few they are, and
 
 Nothing here knows a vehicle: ``ResponseCar`` is all that is asked for. Numbers that no such drive can determine
 (masses, rates and dampers all larger by one factor) are refused (``identifiability``).
+
+The prior of a road is that of ISO 8608, Gd(n0) (n / n0)^-w, flat below the longest waves. Its level is counted at a
+pivot where a car is shaken, so that level and waviness can be separated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.decimating_low_pass import DecimatingLowPass
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM
 from logger.identification.noise_models import RoadNoise
-from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.relative_placement import best_placement
-from logger.identification.unknown_road.road_equations import MOST_ROUNDS, DrivesModel, Preconditioner, factored, solve
-from logger.identification.unknown_road.road_state import (
-    GD_N0,
-    HUNDREDTH,
-    Options,
-    ResponseCar,
-    RoadState,
-    at_n0,
-    by_waviness,
-    displacement_psd_m3,
+from logger.identification.unknown_road.road_operator import (
+    MOST_ROUNDS,
+    Crossing,
+    Drive,
+    DrivesModel,
+    Preconditioner,
+    best_placement,
+    factored,
+    grid_under,
+    solve,
 )
-from logger.roads.iso8608 import displacement_psd
+from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
+from logger.vehicle.named_parameters import Free
 
 Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Ints = npt.NDArray[np.intp]
+
+GD_N0, WAVINESS, NOISE, OFFSET, SCALE = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m", "distance_scale"
+HUNDREDTH = 0.01
+"""A scale of distances moves by hundredths."""
+
+
+class ResponseCar(Protocol):
+    """A car as far as it is known here."""
+
+    @property
+    def parameters(self) -> Sequence[Free]: ...
+
+    @property
+    def behind_m(self) -> Array:
+        """(x,) how far behind the front one each axle stands [m]."""
+
+    @property
+    def contact_patch_m(self) -> float: ...
+
+    def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
+        """Readings per elevation under each axle (x, f) with these values (p,), and their derivatives (p, x, f)."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to fit.
+
+    waviness         of every road, or where it starts
+    free_waviness    find it, one for each road
+    place_off_m      how far the places of two drives over one road may be off; 0: they are exact
+    scale_off        how far their distances may be off beyond that, as a share; 0: they are exact
+    probes           simulated drives that slopes are compared with on the way
+    last_probes      and at the end, where what they have in common is an error of the estimate
+    seed             of them
+    most_steps       of Fisher's
+    solved           what is left of a set of equations when it counts as solved, of what it began with
+    fisher_probes    simulated drives that the information is a mean over
+    refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` says it
+    """
+
+    waviness: float = STANDARD_WAVINESS
+    free_waviness: bool = False
+    place_off_m: float = 3.0
+    probes: int = 10
+    seed: int = 1
+    most_steps: int = 30
+    solved: float = 3e-4
+    fisher_probes: int = 2
+    refuse: bool = True
+    scale_off: float = 0.0
+    last_probes: int = 40
+
+
+@dataclass(frozen=True, eq=False)
+class RoadState:
+    """Numbers of a car and a road in plain units; the level is the logarithm of Gd at the pivot, in units of 1 cm3 at
+    n0, and the scales those of the drives' distances, 1 if none are given."""
+
+    values: Array
+    level: float
+    waviness: float
+    offsets_m: Array
+    noise_mps2: float
+    scales: Array | None = None
+
+
+def displacement_psd_m3(level: float, waviness: float, wave_number_cpm: Array) -> Array:
+    """Spectrum (k,) [m3] of a road whose level is given as in ``RoadState``; nothing at the first wave number, 0."""
+    psd = np.exp(level) * CM3_M3 * (np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM) ** -waviness
+    psd[0] = 0.0
+    return np.asarray(psd)
+
+
+def by_waviness(wave_number_cpm: Array) -> Array:
+    """Derivative (k,) of the logarithm of the spectrum by the waviness."""
+    return np.asarray(-np.log(np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM))
+
+
+def at_n0(waviness: float) -> float:
+    """Gd at n0 over Gd at the pivot."""
+    return float((REFERENCE_N0_CPM / PIVOT_CPM) ** -waviness)
+
 
 _SHORTEST_CPM = 4.0
 _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
@@ -270,3 +360,104 @@ class UnknownRoad:
 def _highest_cpm(drive: Drive) -> float:
     pace_m = float(np.median(np.abs(np.diff(drive.distance_m))))
     return 0.45 / max(pace_m, 1e-3)
+
+
+@dataclass(frozen=True, eq=False)
+class RoadsScore:
+    """What a likelihood makes of all numbers: its slopes (m,), the information (m, m) or zeros, rms of what is
+    unexplained over that of what was measured, and the rounds that it took to solve the equations."""
+
+    slopes: Array
+    information: Array
+    error: float
+    rounds: int
+
+
+class Roads:
+    """Roads, the drives over each, and one noise. Their numbers are one vector (r,): of each road its level, its
+    waviness if that is free, the places of its drives but the first, and the scales of their distances; the noise last.
+
+    names    (r,)
+    parts    indices of each road's numbers, the noise's in them
+
+    ValueError unless there is a drive over every road.
+    """
+
+    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options) -> None:
+        if not roads or not all(roads):
+            raise ValueError("expected a drive over every road")
+        generator = np.random.default_rng(options.seed)
+        self.options = options
+        self.roads = [UnknownRoad(car, list(drives), options, generator) for drives in roads]
+        self.names: list[str] = []
+        ends = [0]
+        for number, drives in enumerate(roads, 1):
+            own = [GD_N0, *[WAVINESS] * options.free_waviness]
+            own += [f"drive{drive}.{what}" for what, off in ((OFFSET, options.place_off_m), (SCALE, options.scale_off))
+                    for drive in range(2, len(drives) + 1) if off]
+            self.names += [f"road{number}.{one}" for one in own]
+            ends.append(len(self.names))
+        self.names.append(NOISE)
+        self.parts = [np.append(np.arange(*pair), ends[-1]) for pair in pairwise(ends)]
+
+    def are(self, what: str) -> npt.NDArray[np.bool_]:
+        """Which of the numbers (r,) are of this kind: ``GD_N0``, ``WAVINESS``, ``OFFSET``, ``SCALE``, ``NOISE``."""
+        return np.array([name.rpartition(".")[2] == what for name in self.names])
+
+    def places(self, road: int) -> Ints:
+        """Indices of the places of a road's drives but the first."""
+        return self.parts[road][self.are(OFFSET)[self.parts[road]]]
+
+    def with_cars(self, cars: Sequence[ResponseCar]) -> Roads:
+        """The same with another car, whose axles stand where they stood, in each drive over each road."""
+        other, cars = copy(self), list(cars)
+        other.roads = []
+        for road in self.roads:
+            count = len(road.drives)
+            other.roads.append(road.with_cars(cars[:count]))
+            cars = cars[count:]
+        return other
+
+    def prepared(self, values: Array, numbers: Array) -> Roads:
+        """The same, whose equations are solved in few rounds near these values of the car's and the roads' numbers."""
+        other = copy(self)
+        other.roads = [copy(road) for road in self.roads]
+        for index, road in enumerate(other.roads):
+            road.prepare(self.state(index, values, numbers))
+        return other
+
+    def state(self, road: int, values: Array, numbers: Array) -> RoadState:
+        """A road's numbers, and the car's (p,), among those of all roads (r,)."""
+        part, drives = self.parts[road], len(self.roads[road].drives)
+        waviness = float(numbers[part[1]]) if self.options.free_waviness else self.options.waviness
+        offsets_m, scales = np.zeros(drives), np.ones(drives)
+        if self.options.place_off_m:
+            offsets_m[1:] = numbers[self.places(road)]
+        if self.options.scale_off:
+            scales[1:] += HUNDREDTH * numbers[part[self.are(SCALE)[part]]]
+        return RoadState(values, float(numbers[part[0]]), waviness, offsets_m, float(np.exp(numbers[-1])), scales)
+
+    def first_guess(self, values: Array, least_mps2: float = 0.0) -> Array:
+        """Numbers (r,) with levels and a noise, no less than this, from spectra; drives where they were recorded."""
+        numbers, noises = np.zeros(len(self.names)), []
+        for road, part in zip(self.roads, self.parts, strict=True):
+            numbers[part[0]], noise_mps2 = road.first_guess(values)
+            noises.append(noise_mps2)
+        numbers[self.are(WAVINESS)] = self.options.waviness
+        numbers[-1] = np.log(max(float(np.median(noises)), least_mps2))
+        return numbers
+
+    def score(self, values: Array, numbers: Array, information: bool, fisher_probes: int | None = None) -> RoadsScore:
+        """Slopes by the car's numbers (p,) and the roads' (r,); arguments as of ``UnknownRoad.score``."""
+        p = len(values)
+        slopes = np.zeros(p + len(numbers))
+        matrix = np.zeros((len(slopes), len(slopes)))
+        left = whole = 0.0
+        for index, (road, part) in enumerate(zip(self.roads, self.parts, strict=True)):
+            own, known, squares = road.score(self.state(index, values, numbers), information, fisher_probes)
+            at = np.append(np.arange(p), p + part)
+            slopes[at] += own
+            matrix[np.ix_(at, at)] += known
+            left, whole = left + squares[0], whole + squares[1]
+        error = float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+        return RoadsScore(slopes, matrix, error, max(road.rounds for road in self.roads))

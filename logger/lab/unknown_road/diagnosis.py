@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, probability_by_chance
-from logger.lab.unknown_road.fisher_scoring import RoadFit, fit, inverse
+from logger.lab.unknown_road.fisher_scoring import SameRoadFit, fit
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.placement import placed_by_road
 from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
@@ -214,8 +215,8 @@ def _by_effect(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
     return found
 
 
-def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
-          least: float = 6.0, starts: int = 2, first_steps: int = 2) -> dict[str, RoadFit]:
+def _fits(base: SameRoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3,
+          share: float = 0.1, least: float = 6.0, starts: int = 2, first_steps: int = 2) -> dict[str, SameRoadFit]:
     """Fit the effects with the largest gains on top of the model, by name; the best of so many ``first_steps`` from
     each start goes on.
 
@@ -238,7 +239,7 @@ def _fits(base: RoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progre
     return found
 
 
-def _placed_anew(now: RoadFit, progress: Progress) -> RoadFit:
+def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
     and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
     where they are."""
@@ -254,13 +255,13 @@ def _placed_anew(now: RoadFit, progress: Progress) -> RoadFit:
     return fit(problem.preconditioned(begin), begin)
 
 
-def _with_effect(base: RoadFit, one: Chosen) -> RoadFitState:
+def _with_effect(base: SameRoadFit, one: Chosen) -> RoadFitState:
     """The state of a model with one more effect."""
     effects = (*base.state.effects, one)
     return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
 
 
-def _candidates(base: RoadFit, models: Mapping[str, RoadFit], count: int, error: float) -> list[Candidate]:
+def _candidates(base: SameRoadFit, models: Mapping[str, SameRoadFit], count: int, error: float) -> list[Candidate]:
     """Fitted effects as candidates of so many, best first, each with those that cannot be distinguished from it."""
     imitation = IMITATION * _full_explanation(base)
     found = [replace(_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count),
@@ -288,26 +289,26 @@ def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, 
 # --- the residual ---
 
 
-def _with_errors(model: RoadFit) -> tuple[Chosen, ...]:
+def _with_errors(model: SameRoadFit) -> tuple[Chosen, ...]:
     """The effects of a model with standard errors."""
     first, count = len(model.state.logs), len(model.free_parameters)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + count]
     return with_standard_errors(model.state.effects, model.free_parameters, deviations)
 
 
-def _confounded_numbers(model: RoadFit) -> tuple[Finding, ...]:
+def _confounded_numbers(model: SameRoadFit) -> tuple[Finding, ...]:
     """Masses, springs and dampers that these drives cannot identify while the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.free_parameters), len(model.data))
-    mixed = model.data[np.ix_(own, road)]
-    marginal = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
+    both = np.append(own, road)
+    marginal = integrated_out(model.data[np.ix_(both, both)], np.arange(len(own), len(both)))
     powers, directions = np.linalg.eigh(marginal)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
     return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
 
 
-def _full_explanation(model: RoadFit) -> float:
+def _full_explanation(model: SameRoadFit) -> float:
     """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as explained;
     at least 0."""
     noise = model.problem.noise(model.state)
@@ -315,7 +316,7 @@ def _full_explanation(model: RoadFit) -> float:
     return max(0.0, 2 * PASS_OF_RATE * model.problem.samples * 2 * float(np.log(over)))
 
 
-def _excess(model: RoadFit, noise: Noise) -> float:
+def _excess(model: SameRoadFit, noise: Noise) -> float:
     """Share by which what no road explains is above the noise; where chance may give as much, no more than
     ``UNEXPLAINED``. Degrees of freedom of a sample are reduced by the recorder's filter."""
     from scipy.stats import norm

@@ -1,17 +1,15 @@
-"""Fits of a model to drives over an unknown road, by Fisher scoring.
-
-The score and the information of the marginal likelihood are known, its value is not: each step solves the information
-for the score, within the bounds of the numbers (R. A. Fisher 1925).
-"""
+"""Fits of a model to drives over an unknown road, by Fisher scoring, and score tests of effects on top of one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.fitting.fisher_scoring import maximise
+from logger.identification.unknown_road.marginal_likelihood import RoadsScore
 from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
 from logger.vehicle.effect_parameters import (
@@ -27,7 +25,7 @@ Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class RoadFit:
+class SameRoadFit:
     """A fitted state, with the information on its numbers.
 
     free_parameters    of its effects
@@ -44,66 +42,41 @@ class RoadFit:
     problem: SameRoad
 
 
-def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, converged: float = 0.1,
-        many_rounds: int = 8, falling: float = 0.5) -> RoadFit:
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3,
+        many_rounds: int = 8) -> SameRoadFit:
     """Fit the most probable state, by so many scoring steps from a state at most.
 
-    converged      the fit ends before a step of a smaller expected gain in the log of the probability
+    close          standard errors from the end that are near enough
     many_rounds    equations that take more iterations get a new preconditioner, which takes about as long as they
-    falling        the information, which takes most of the time, is kept from step to step as long as the expected gain
-                   falls to this share or less: at a half steps converge still, if no longer quadratically
     """
     free_parameters = free_parameters_of(state.effects)
     p, q = len(state.logs), len(free_parameters)
-    here = np.concatenate([state.logs, coordinates_of(state.effects, free_parameters), state.roads])
-    low, high, longest = _limits(state.effects, free_parameters, len(here), p)
+    start = np.concatenate([state.logs, coordinates_of(state.effects, free_parameters), state.roads])
+    low, high, longest = _limits(state.effects, free_parameters, len(start), p)
     low[-1] = np.log(problem.least_mps2)
-
-    def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
-        return here[:p], with_coordinates(state.effects, free_parameters, here[p : p + q]), here[p + q :]
-
     probes = 1 if len(problem.stretches) > 2 else None  # where there are many stretches, these are a mean as well
-    data, last_gain = np.empty((0, 0)), 0.0
-    for count in range(steps):
-        logs, effects, roads = at(here)
+    rounds = 0
+
+    def at(x: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
+        return x[:p], with_coordinates(state.effects, free_parameters, x[p : p + q]), x[p + q :]
+
+    def score(x: Array, information: bool) -> RoadsScore:
+        nonlocal problem, rounds
+        logs, effects, roads = at(x)
         gains, slopes = response_and_slopes(problem, effects, free_parameters, logs)
-        if problem.rounds > many_rounds:
+        if rounds > many_rounds:
             problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
-        tables = problem.tables(gains, slopes)
+        found = problem.score(problem.tables(gains, slopes), roads, information, probes)
+        rounds = found.rounds
         off, precision = problem.prior_terms(logs, q, roads)
-        for renewed in (False, True) if count else (True,):
-            score, found = problem.score_and_information(tables, roads, renewed, probes)
-            score -= precision * off
-            data = found if renewed else data
-            information = data + np.diag(precision)
-            step = _step(score, information, here, low, high)
-            gain = float(score @ step)
-            if gain < falling * last_gain:
-                break
-        if count and gain < converged:
-            break
-        last_gain = gain
-        here = np.clip(here + np.clip(step, -longest, longest), low, high)
-    logs, effects, roads = at(here)
-    state = RoadFitState(effects, logs, roads, problem.response(effects, logs))
-    return RoadFit(state, tuple(free_parameters), data, information, problem)
+        return replace(found, slopes=found.slopes - precision * off, information=found.information + np.diag(precision))
 
-
-def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
-    """The scoring step within bounds."""
-    free = ~(((here <= low) & (score < 0)) | ((here >= high) & (score > 0)))
-    step = np.zeros_like(here)
-    step[free] = inverse(information[np.ix_(free, free)]) @ score[free]
-    return step
-
-
-def inverse(information: Array, ridge: float = 1e-6) -> Array:
-    """Inverse of a symmetric matrix (m, m), scaled to a unit diagonal and regularised by a ridge. Of a number of which
-    next to nothing is known, a standard error of 1e8 on its scale, it is 0: no step moves it."""
-    known = np.diag(information) > np.finfo(float).eps
-    scale = np.where(known, 1 / np.sqrt(np.where(known, np.diag(information), 1.0)), 0.0)
-    scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
-    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
+    found = maximise(score, start, low, high, longest, close=close, most_steps=steps)
+    logs, effects, roads = at(found.x)
+    fitted = RoadFitState(effects, logs, roads, problem.response(effects, logs))
+    _, precision = problem.prior_terms(logs, q, roads)
+    return SameRoadFit(fitted, tuple(free_parameters), found.information - np.diag(precision), found.information,
+                       problem)
 
 
 def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_parameters: Sequence[FreeParameter],

@@ -25,9 +25,16 @@ from itertools import pairwise, permutations
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.unknown_road.drive_operator import Drive
-from logger.identification.unknown_road.marginal_likelihood import UnknownRoad
-from logger.identification.unknown_road.road_state import Options, RoadState
+from logger.identification.unknown_road.marginal_likelihood import (
+    OFFSET,
+    WAVINESS,
+    Options,
+    Roads,
+    RoadsScore,
+    RoadState,
+    UnknownRoad,
+)
+from logger.identification.unknown_road.road_operator import Drive
 from logger.lab.likelihood.noise_floor import Noise, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
@@ -41,7 +48,6 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-Ints = npt.NDArray[np.intp]
 
 PROBES = 8
 """Simulated drives by which the score's expectation is estimated; a gain is overestimated by one part in so many, and
@@ -103,20 +109,14 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(free_waviness=True, probes=PROBES)
-        generator = np.random.default_rng(options.seed)
         self.motions = [DriveConditions(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0,
                                         STANDARD_WAVINESS)
                         for parts in self.stretches for _, one in parts]
         nominal = self.tables(self.response((), self.start_vehicle))
-        self._roads = [UnknownRoad(nominal[0], [one for _, one in parts], options, generator)
-                       for parts in self.stretches]
-        sizes = [1 + len(parts) for parts in self.stretches]
-        ends = np.cumsum(sizes)
-        self._parts = [np.append(np.arange(end - size, end), ends[-1]) for size, end in zip(sizes, ends, strict=True)]
-        self._first = self._start(nominal)
+        self._roads = Roads(nominal[0], [[one for _, one in parts] for parts in self.stretches],
+                            Options(free_waviness=True, probes=PROBES)).with_cars(nominal)
+        self._first = self._start()
         self.motions = self._moved_by(self._first)
-        self.count, self.rounds = len(self._first), 0
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -139,9 +139,9 @@ class SameRoad:
 
     def _moved_by(self, roads: Array) -> list[DriveConditions]:
         """What moves the car in each drive over each stretch, on roads of these numbers (r,)."""
-        levels = [roads[part[:2]] for part, parts in zip(self._parts, self.stretches, strict=True) for _ in parts]
-        return [replace(one, level=float(level), waviness=float(waviness))
-                for one, (level, waviness) in zip(self.motions, levels, strict=True)]
+        return [replace(self.motions[drive], level=at.level, waviness=at.waviness)
+                for drive, at in enumerate(self._roads.state(road, np.zeros(0), roads)
+                                           for road, parts in enumerate(self.stretches) for _ in parts)]
 
     def moved_as(self, state: RoadFitState) -> SameRoad:
         """The problem, its car moved by the roads of a state, and not by those that spectra alone let expect."""
@@ -153,43 +153,28 @@ class SameRoad:
         """The vehicle that fits begin at, with these effects, on roads of a likely level."""
         return RoadFitState(tuple(effects), self.start_vehicle, self._first, self.response(effects, self.start_vehicle))
 
-    def score_and_information(self, tables: Sequence[Tabulated], roads: Array, information: bool,
-                              fisher_probes: int | None = None) -> tuple[Array, Array]:
-        """Score of the log-likelihood (m,) by the parameters of tables' derivatives and by the numbers of the roads,
+    def score(self, tables: Sequence[Tabulated], roads: Array, information: bool,
+              fisher_probes: int | None = None) -> RoadsScore:
+        """Slopes of the log-likelihood (m,) by the parameters of tables' derivatives and by the numbers of the roads,
         and the information (m, m) or zeros, both without the priors.
 
         fisher_probes    simulated drives over each stretch that the information is a mean over
         """
-        p, self.rounds = len(tables[0].slopes), 0
-        slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
-        for road, at, part, _ in self._at(tables, roads):
-            whole = np.append(np.arange(p), p + part)
-            own, known, _ = road.score(at, information, fisher_probes)
-            self.rounds = max(self.rounds, road.rounds)
-            slopes[whole] += own
-            matrix[np.ix_(whole, whole)] += known
-        return slopes, matrix
+        return self._roads.with_cars(tables).score(np.zeros(len(tables[0].slopes)), roads, information, fisher_probes)
 
     def preconditioned(self, state: RoadFitState) -> SameRoad:
         """The problem with preconditioners for models near a state."""
         other = copy(self)
-        other._roads = []
-        for road, at, *_ in self._at(self.tables(state.gains), state.roads):
-            road.prepare(at)
-            other._roads.append(road)
+        other._roads = self._roads.with_cars(self.tables(state.gains)).prepared(np.zeros(0), state.roads)
         return other
 
-    def _at(self, tables: Sequence[Tabulated], roads: Array,
-            ) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
-        """Every stretch under a car of these responses: its road, its numbers, their indices among those of all roads,
-        and the runs of its drives."""
-        first = 0
-        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
-            own = roads[part]
-            at = RoadState(np.zeros(len(tables[0].slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
-                           float(np.exp(own[-1])))
-            yield road.with_cars(tables[first : first + len(parts)]), at, part, [run for run, _ in parts]
-            first += len(parts)
+    def _at(self, state: RoadFitState) -> Iterator[tuple[UnknownRoad, RoadState, list[int]]]:
+        """Every stretch under the car of a state: its road, its numbers, and the runs of its drives."""
+        return self._under(self._roads.with_cars(self.tables(state.gains)), state.roads)
+
+    def _under(self, roads: Roads, numbers: Array) -> Iterator[tuple[UnknownRoad, RoadState, list[int]]]:
+        for index, (road, parts) in enumerate(zip(roads.roads, self.stretches, strict=True)):
+            yield road, roads.state(index, np.zeros(0), numbers), [run for run, _ in parts]
 
     def prior_terms(self, logs: Array, free_parameters: int, roads: Array, waviness_off: float = 0.3,
                     place_off_m: float = 0.05) -> tuple[Array, Array]:
@@ -199,21 +184,17 @@ class SameRoad:
         waviness_off, place_off_m    prior standard deviations of a stretch's waviness, and of its places from those of
                                      the whole way (judgements)
         """
-        off, precision = np.zeros(self.count), np.zeros(self.count)
-        for part in self._parts:
-            off[part[1]] = roads[part[1]] - STANDARD_WAVINESS
-            precision[part[1]] = waviness_off**-2
-            places = part[2:-1]
-            off[places] = roads[places] - self._first[places]
-            precision[places] = place_off_m**-2
+        known = [(self._roads.are(what), off) for what, off in ((WAVINESS, waviness_off), (OFFSET, place_off_m))]
+        off = sum(which * (roads - self._first) for which, _ in known)
         free = np.zeros(free_parameters)
-        return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
+        return np.concatenate([logs, free, off]), np.concatenate([
+            self.prior.precision, free, sum(which * deviation**-2 for which, deviation in known)])
 
     def cost(self, state: RoadFitState) -> float:
         """Minus twice the log-density of the priors of a state's numbers, without its constant."""
         p = len(state.logs)
         off, precision = self.prior_terms(state.logs, 0, state.roads)
-        return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
+        return self.prior.cost(state.logs) + float(precision[p:] @ off[p:] ** 2)
 
     def gain(self, before: RoadFitState, after: RoadFitState, nodes: int = 3) -> float:
         """Decrease of minus twice the log-posterior from one state to another: the integral of the score between
@@ -223,20 +204,20 @@ class SameRoad:
         places, weights = np.polynomial.legendre.leggauss(nodes)
         for node, weight in zip(0.5 * (places + 1), 0.5 * weights, strict=True):
             tables = self.tables(before.gains + node * change, change[None])
-            slopes, _ = self.score_and_information(tables, before.roads + node * road_change, information=False)
+            slopes = self.score(tables, before.roads + node * road_change, information=False).slopes
             total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
     def predicted_by_others(self, state: RoadFitState) -> Iterator[tuple[int, Array, Array]]:
         """Every drive over every stretch: its run, what was read (n,), and its prediction by the other drives (n,)."""
-        for road, at, _, runs in self._at(self.tables(state.gains), state.roads):
+        for road, at, runs in self._at(state):
             for number, run in enumerate(runs):
                 yield run, road.measured[number], road.predicted(at, number)
 
     def predicted_by_each(self, state: RoadFitState) -> Iterator[tuple[int, int, Array, Array]]:
         """Every ordered pair of drives over a stretch: the run, the one that predicts it, what was read (n,), and its
         prediction by the latter alone (n,)."""
-        for road, at, _, runs in self._at(self.tables(state.gains), state.roads):
+        for road, at, runs in self._at(state):
             for number, by in permutations(range(len(runs)), 2):
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
@@ -253,7 +234,7 @@ class SameRoad:
     @property
     def size_mps2(self) -> float:
         """R.m.s. of what was read, by which errors are divided [m/s2]."""
-        squares = sum(float((one**2).sum()) for road in self._roads for one in road.measured)
+        squares = sum(float((one**2).sum()) for road in self._roads.roads for one in road.measured)
         return float(np.sqrt(squares / self.samples))
 
     @property
@@ -276,29 +257,23 @@ class SameRoad:
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
-    def _start(self, nominal: Sequence[Tabulated]) -> Array:
+    def _start(self) -> Array:
         """First guess of the roads' numbers: levels and noise from spectra; places by ``_offsets``."""
-        first = np.zeros(int(self._parts[-1][-1]) + 1)
-        noises = []
-        for road, part in zip(self._roads, self._parts, strict=True):
-            first[part[0]], noise = road.first_guess(np.zeros(0))
-            first[part[1]] = STANDARD_WAVINESS
-            noises.append(noise)
-        first[-1] = np.log(max(np.median(noises), self.least_mps2))
-        offsets = self._offsets(nominal, first)
-        for part, parts in zip(self._parts, self.stretches, strict=True):
+        first = self._roads.first_guess(np.zeros(0), self.least_mps2)
+        offsets = self._offsets(first)
+        for road, parts in enumerate(self.stretches):
             own = [offsets[run] for run, _ in parts]
-            first[part[2:-1]] = np.array(own[1:]) - own[0]
+            first[self._roads.places(road)] = np.array(own[1:]) - own[0]
         return first
 
-    def _offsets(self, nominal: Sequence[Tabulated], first: Array) -> Array:
+    def _offsets(self, first: Array) -> Array:
         """Offsets of each run's places [m] from those of the first run of the stretch that most runs share; of runs
         that are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}
-        open_ones = list(self._at(nominal, first))
+        open_ones = list(self._under(self._roads, first))
         while open_ones := [one for one in open_ones if any(run not in offsets for run in one[-1])]:
             tied = [one for one in open_ones if any(run in offsets for run in one[-1])]
-            road, at, _, runs = max(tied or open_ones, key=lambda one: len(one[-1]))
+            road, at, runs = max(tied or open_ones, key=lambda one: len(one[-1]))
             offset = partial(road.offset, at)  # against the first run of the stretch
             if runs[0] not in offsets:
                 known = next((number for number, run in enumerate(runs) if run in offsets), None)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from logger.fitting.information_matrix import inverse
 from logger.lab.selection.screening import scale_strength
-from logger.lab.unknown_road.fisher_scoring import RoadFit, inverse, response_and_slopes
+from logger.lab.unknown_road.fisher_scoring import SameRoadFit, response_and_slopes
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
 
@@ -30,7 +31,7 @@ class Trial:
     share_beyond_road: float
 
 
-def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Trial]:
+def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list[Trial]:
     """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
     numbers and the roads' are projected out."""
     state = base.state
@@ -38,9 +39,9 @@ def screen(problem: SameRoad, base: RoadFit, ones: Sequence[Chosen]) -> list[Tri
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
     tables = problem.tables(gains, np.array([*own, *changes]))
-    slopes, information = problem.score_and_information(tables, state.roads, information=True)
-    rest = np.r_[0:p, p + k : p + k + problem.count]
-    road = np.arange(p + k, p + k + problem.count)
+    scored = problem.score(tables, state.roads, information=True)
+    slopes, information = scored.slopes, scored.information
+    rest, road = np.r_[0:p, p + k : len(slopes)], np.arange(p + k, len(slopes))
     off, precision = problem.prior_terms(state.logs, len(base.free_parameters), state.roads)
     known = inverse(information[np.ix_(rest, rest)] + np.diag(precision))
     by_road = inverse(information[np.ix_(road, road)] + np.diag(precision[p:]))

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
-from logger.identification.unknown_road.road_state import displacement_psd_m3
+from logger.identification.unknown_road.marginal_likelihood import displacement_psd_m3
 from logger.vehicle.compose import Car
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import is_linear, known_car, linearised

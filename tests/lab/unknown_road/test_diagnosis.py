@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.road_state import at_n0
+from logger.identification.unknown_road.marginal_likelihood import at_n0
+from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.fisher_scoring import fit
@@ -144,7 +144,7 @@ def test_what_may_only_imitate_is_not_named() -> None:
 def deviance(problem: SameRoad, state: RoadFitState) -> float:
     """Minus twice the log-likelihood of all drives by their covariance, written out, and the priors."""
     total = problem.cost(state)
-    for road, part, parts in zip(problem._roads, problem._parts, problem.stretches, strict=True):
+    for road, part, parts in zip(problem._roads.roads, problem._roads.parts, problem.stretches, strict=True):
         own, grid = state.roads[part], road.grid
         n = np.maximum(grid.wave_number_cpm, 0.01)
         psd = np.exp(own[0]) * CM3_M3 * (n / 0.2) ** -own[1]
@@ -311,7 +311,7 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
     problem = SameRoad([parts[one] for one in order], CAR, Tolerance())
     assert [len(shared) for shared in problem.stretches] == [2, 2]
     first = problem.start().roads
-    for own, shared in zip(problem._parts, problem.stretches, strict=True):
+    for own, shared in zip(problem._roads.parts, problem.stretches, strict=True):
         there_m = np.array([off_m[order[run]] for run, _ in shared])
         assert first[own[2:-1]] == pytest.approx(there_m[0] - there_m[1:], abs=0.15)
     assert all(one.is_significant for one in road_agreements(problem, problem.start()))

@@ -1,13 +1,18 @@
-"""One drive over a road that nobody measured: what the sensor reads as a linear function of the road, and back.
+"""Roads to readings and back: a drive as a linear map of a road that nobody measured, and the most probable road.
 
 The road is elevations on an even grid. They are read where each axle stood at each instant, averaged over the contact
 patch, and go through the car frequency by frequency, whatever the speed did. Before its first sample the car comes from
 a road that is unknown too, at the speed it had; so nothing is said of how it moved when the record began. A sensor's
 zero is not trusted: the mean of all readings is left out.
+
+Drives y = B w + noise over a road of innovations w: (1 + B' B / variance) w = B' y / variance, which is solved by
+conjugate gradients. B is never formed: a drive is applied to a road, and back, by transforms. Preconditioned as if the
+drives were endless and their speeds even, or by a factor of the matrix itself, taken nearby.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -195,3 +200,154 @@ def _window(count: int, swell: int, tail: int) -> Array:
     window[:swell] = 0.5 * (1 - np.cos(np.pi * np.arange(swell) / swell))
     window[count - tail:] = 0.5 * (1 + np.cos(np.pi * np.arange(1, tail + 1) / tail))
     return window
+
+
+_STEP_M = 0.04
+# A scale of distances is looked for by the shifts of parts of a drive, so many metres of stretching each.
+_PART_SHIFTS_M, _MOST_SHIFT_M = 0.3, 12.0
+
+
+def best_placement(
+    crossing: Crossing, measured: Array, way_m: Array, response: Complex, wave_number_cpm: Array, waves: Complex,
+    white: Array, place_off_m: float, scale_off: float,
+) -> tuple[float, float]:
+    """Where a drive's places best agree with a road [m], and at what scale of its distances.
+
+    crossing, measured    the drive, its readings (n,) [m/s2] and recorded distances (n,) ``way_m``
+    response              (x, k) of the car at its speeds
+    waves, white          (k,) at the wave numbers and (1, count): the road, what makes it of innovations and those
+    place_off_m           how far places may be off; ``scale_off`` distances beyond that, as a share
+
+    The road is laid out at every shift once; a scale shifts each part of the drive by another one.
+    """
+    length_m = float(np.ptp(way_m))
+    scale_off = min(scale_off, 2 * _MOST_SHIFT_M / length_m)
+    most_m = place_off_m + scale_off * length_m / 2
+    shifts = np.arange(-np.ceil(most_m / _STEP_M), np.ceil(most_m / _STEP_M) + 1) * _STEP_M
+    parts = np.array_split(np.arange(len(way_m)), max(1, int(np.ceil(scale_off * length_m / _PART_SHIFTS_M))))
+    like, power = np.empty((2, len(shifts), len(parts)))
+    for index, shift in enumerate(shifts):
+        shifted = waves * np.exp(2j * np.pi * wave_number_cpm * shift)
+        predicted = crossing.readings(crossing.under_axles(white, shifted), response)[0]
+        for place, part in enumerate(parts):
+            like[index, place] = predicted[part] @ measured[part]
+            power[index, place] = predicted[part] @ predicted[part]
+    from_middle_m = np.array([way_m[part].mean() for part in parts]) - 0.5 * (way_m.min() + way_m.max())
+    best, found_at = -np.inf, (0.0, 1.0)
+    steps = int(scale_off * length_m / 2 / (2 * _STEP_M))
+    for scale in np.linspace(-scale_off, scale_off, 2 * steps + 1):
+        moved = np.rint(scale * from_middle_m / _STEP_M).astype(int)
+        off = int(place_off_m / _STEP_M)
+        at_shift = len(shifts) // 2 + np.arange(-off, off + 1)[:, None] + moved
+        at_shift = np.clip(at_shift, 0, len(shifts) - 1)
+        likeness = (np.take_along_axis(like, at_shift, 0).sum(axis=1)
+                    / np.sqrt(np.take_along_axis(power, at_shift, 0).sum(axis=1) + 1e-300))
+        index = int(likeness.argmax())
+        if likeness[index] > best:
+            best, found_at = float(likeness[index]), ((index - off) * _STEP_M, 1 + float(scale))
+    return found_at
+
+
+Preconditioner = Callable[[Array], Array]
+
+MOST_ROUNDS, _AT_ONCE = 150, 256
+
+
+@dataclass(frozen=True, eq=False)
+class DrivesModel:
+    """Drives over one road at one place of all numbers.
+
+    crossings      the drives
+    waves          (k,) for each: what makes a road as it lies under the drive out of innovations
+    responses      (x, k) for each, and their derivatives (p, x, k)
+    spectral       (k,) of the preconditioner for endless drives
+    variance       of the noise [(m/s2)2]
+    """
+
+    crossings: list[Crossing]
+    waves: list[Complex]
+    responses: list[Complex]
+    derivatives: list[Complex]
+    spectral: Array
+    variance: float
+
+    def of(self, drives: Sequence[int]) -> DrivesModel:
+        """Some of the drives."""
+        return DrivesModel([self.crossings[one] for one in drives], [self.waves[one] for one in drives],
+                           [self.responses[one] for one in drives], [self.derivatives[one] for one in drives],
+                           self.spectral, self.variance)
+
+    def readings(self, white: Array) -> list[Array]:
+        """Readings (b, n) of each drive over roads of innovations (b, count)."""
+        return [one.readings(one.under_axles(white, waves), response) for one, waves, response in
+                zip(self.crossings, self.waves, self.responses, strict=True)]
+
+    def back(self, readings: Sequence[Array], count: int) -> Array:
+        """The transpose of ``readings`` (b, count), over the variance."""
+        total = np.zeros((len(readings[0]), count))
+        for one, part, waves, response in zip(self.crossings, readings, self.waves, self.responses, strict=True):
+            total += one.back(part, waves, response)
+        return total / self.variance
+
+    def filtered(self, residual: Array) -> Array:
+        """About what solves the equations for a residual (b, count), were the drives endless and their speeds even."""
+        return np.asarray(np.fft.irfft(np.fft.rfft(residual) * self.spectral, residual.shape[1]))
+
+
+def factored(model: DrivesModel, count: int) -> Preconditioner:
+    """What solves the equations of a model, for those of a place nearby."""
+    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg.blas import ssyrk
+
+    normal = np.eye(count, dtype=np.float32, order="F")
+    for one, waves, response in zip(model.crossings, model.waves, model.responses, strict=True):
+        rows = np.concatenate([one.unit_readings(waves, response, first, min(first + _AT_ONCE, count))
+                               for first in range(0, count, _AT_ONCE)])
+        normal = ssyrk(1 / model.variance, rows.T, beta=1.0, c=normal, trans=1, lower=1, overwrite_c=1)
+    factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
+
+    def condition(residual: Array) -> Array:
+        # By a power of two, which rounds nothing: of single precision 1e39 is infinite, and 1e-46 is 0.
+        scale = np.exp2(np.ceil(np.log2(np.abs(residual).max(axis=1, initial=np.finfo(float).tiny))))[:, None]
+        solved = cho_solve(factor, (residual / scale).T.astype(np.float32), check_finite=False).T
+        return np.asarray(solved, float) * scale
+
+    return condition
+
+
+def solve(model: DrivesModel, readings: Sequence[Array], count: int, solved: float, rounds: int | None = None,
+          preconditioner: Preconditioner | None = None) -> tuple[Array, list[Array], int]:
+    """Innovations (b, count) of the most probable roads, inv(C) times the readings (b, n) of each drive, and how many
+    rounds that took.
+
+    For all b at once, until what is left is ``solved`` of what it began with, or so many ``rounds``: slopes at
+    neighbouring places can be compared only if they come from as many.
+    """
+    condition = model.filtered if preconditioner is None else preconditioner
+    residual = model.back(readings, count)
+    white = np.zeros_like(residual)
+    unexplained = [one.copy() for one in readings]
+    direction, before = np.zeros_like(residual), np.zeros(len(residual))
+    first, done = None, 0
+    while done < (MOST_ROUNDS if rounds is None else rounds):
+        conditioned = condition(residual)
+        size = (residual * conditioned).sum(axis=1)
+        # A preconditioner of another place, or of few digits, may point uphill: then it goes down from there anew.
+        uphill = size <= 0
+        conditioned[uphill] = residual[uphill]
+        size[uphill] = (residual[uphill] ** 2).sum(axis=1)
+        first = size if first is None else first
+        if rounds is None and (size <= solved**2 * first).all():
+            break
+        done += 1
+        kept = np.divide(size, before, out=np.zeros_like(size), where=(before > 0) & ~uphill)
+        direction = conditioned + kept[:, None] * direction
+        image = model.readings(direction)
+        curve = (direction**2).sum(axis=1) + sum((one**2).sum(axis=1) for one in image) / model.variance
+        step = np.divide(size, curve, out=np.zeros_like(size), where=curve > 0)[:, None]
+        white += step * direction
+        for one, part in zip(unexplained, image, strict=True):
+            one -= step * part
+        residual -= step * (direction + model.back(image, count))
+        before = np.where(size > np.finfo(float).tiny, size, 0.0)
+    return white, [one / model.variance for one in unexplained], done
