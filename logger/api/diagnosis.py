@@ -293,7 +293,7 @@ def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuesti
     """Which effects the model lacks. BadInput as ``diagnose_same_road``."""
     from logger.lab.unknown_road import diagnosis
     from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
-    from logger.lab.unknown_road.placement import placed_by_road
+    from logger.lab.unknown_road.one_road import placed_by_road
 
     off, given = tolerance_of(question.tolerance), model.given or model.vehicle
     word, notify = word_of(question.vehicle, model), question.progress

@@ -108,10 +108,10 @@ def maximise(score: Callable[[Array, bool], S], start: Array, low: Array, high: 
             information = at.information
             continue
         curvature, before = curvature.after(slopes), left
-        along = np.linalg.solve(curvature.correction, slopes)
+        along = np.asarray(np.linalg.solve(curvature.correction, slopes), float)
         step = np.zeros_like(x)
         step[moving] = curvature.whitening.T @ along
         taken = np.clip(x + np.clip(step, -longest, longest), low, high) - x
-        curvature = replace(curvature, slopes=slopes, along=along if np.allclose(taken, step) else np.zeros_like(along))
+        curvature = replace(curvature, slopes=slopes, along=along * np.allclose(taken, step))
         x = x + taken
         at, steps = score(x, False), steps + 1

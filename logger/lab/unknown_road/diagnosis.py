@@ -19,11 +19,9 @@ from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, probability_by_chance
-from logger.lab.unknown_road.fisher_scoring import SameRoadFit, fit
+from logger.lab.unknown_road.fit import SameRoadFit, Trial, fit, screen
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.placement import placed_by_road
-from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
-from logger.lab.unknown_road.screening import Trial, screen
+from logger.lab.unknown_road.one_road import certain_two_roads, placed_by_road, possible_two_roads, road_agreements
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, RoadEffect, chosen
 from logger.vehicle.effect_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE

@@ -13,11 +13,17 @@ from logger.identification.unknown_road.marginal_likelihood import at_n0
 from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
-from logger.lab.unknown_road.fisher_scoring import fit
-from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.same_road_test import certain_two_roads, possible_two_roads, road_agreements
-from logger.lab.unknown_road.screening import screen
-from logger.lab.unknown_road.tabulated_response import DriveConditions, Tabulated, response_of, responses_of
+from logger.lab.unknown_road.fit import fit, screen
+from logger.lab.unknown_road.likelihood import (
+    DriveConditions,
+    NotOneRoad,
+    RoadFitState,
+    SameRoad,
+    Tabulated,
+    response_of,
+    responses_of,
+)
+from logger.lab.unknown_road.one_road import certain_two_roads, possible_two_roads, road_agreements
 from logger.profiles.track import Track
 from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
