@@ -249,7 +249,7 @@ def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tu
     """What was found, and by which method. ValueError for a record that is too short or of another kind, an order that
     it cannot carry, or an input that shows nothing."""
     from logger.modal.analysis import decays, find_modes
-    from logger.modal.decrement import decrement_mode
+    from logger.modal.decay import decrement_mode
 
     method = question.method
     decay = inputs is None and (decays(record.samples) if question.response is None else

@@ -1,34 +1,176 @@
-"""Drives, a car and a road with numbers that are free: what the models that predict these drives have in common.
+"""What a vehicle's accelerometer would have recorded on the runs that were driven, and how that depends on each number.
 
 Problem: one model answers in frequency, exactly and at once, and knows linear cars only; another one steps any car
 through time. What is free, how names become a car, effects and a road, and what a random road would do to the sensor
-are the same for both. Solution: that is here, and a model adds its predictions and their derivatives.
+are the same for both. Solution: ``DriveModel`` has that, and a model adds its predictions and their derivatives.
+
+``FrequencyDomainModel``: a fit asks for the model's response, and for its derivative by every free number, tens of
+times; stepping the car finely through each run for each of them takes seconds. Solution: a linear car answers each
+frequency by itself, whatever the speed did, because the speed only shapes what passes under the wheels, and that does
+not depend on masses, springs and dampers. So the road under each wheel is laid out in time once, finely, by its exact
+mean over each step, band-limited as the recorder does it, and transformed; every prediction then is a small linear
+system per frequency. The same solution, with one more for the sensor's row (the matrices are symmetric), gives all
+derivatives exactly.
+
+A transform takes a record for one period of an endless one. Behind the record the road therefore comes back to where it
+began and the car comes to rest; and the transform is taken along s = damping + i omega, which makes what comes round
+from the end a ten-thousandth of what is left of it there.
+
+``TimeDomainModel``: dry friction, a bump stop or a sensor on a loose bracket are no numbers of a linear car, and the
+laws of some of them have no transform. Solution: the car with its effects is driven through the runs as the lab drives
+it (``SimulatedRuns``), whatever its laws are; derivatives are differences of such drives, over steps on the scales that
+the numbers move on. An obstacle of which only the kind is known lies on the road in closed form, as it does in
+frequency.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.road_transform import RoadInTime
-from logger.identification.unknown_inputs import RoadInput, changed_input, check_names, is_input, read_input
+from logger.identification.unknown_inputs import (
+    SPEED_SCALE,
+    Obstacle,
+    RoadInput,
+    changed_input,
+    check_names,
+    is_input,
+    read_input,
+    run_and_name,
+)
+from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
+from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import free_parameter_named
-from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.effect_parameters import free_parameter_named, slope_of, steps_of
+from logger.vehicle.frequency_response import (
+    SensedCar,
+    Sensitivity,
+    body_acceleration_response,
+    sensed_car,
+    sensitivity,
+)
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
-from logger.vehicle.simulate import recorder_gain
+from logger.vehicle.passage import finer, smooth_length
+from logger.vehicle.simulate import FINE_RATE_HZ, recorder_gain, recorder_taps
+from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+
+# The car has come to the first sample as fast as it goes there for so long [s].
+_APPROACH_S = 3.0
+# How long the road behind a record takes to come back to where it began [s].
+_RETURN_S = 6.0
+_ROUND_THE_END = 1e-4
+_EVEN = 1e-3
+# Over less than this a car stands, and the road has no slope [m].
+_STANDING_M = 1e-9
+
+
+class RoadInTime:
+    """The road under the wheels of one record, transformed.
+
+    s    (f,) where the transform is taken [1/s]
+    """
+
+    def __init__(self, record: Run) -> None:
+        rate_hz = record.rate_hz
+        self._track = record.track
+        self._steps = int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN))
+        fine_hz = rate_hz * self._steps
+        lead, half = int(np.ceil(_APPROACH_S * rate_hz)), (len(recorder_taps(1)) - 1) // 2
+        distance = record.distance_m
+        pace_m = distance[1] - distance[0]
+        ahead_m = distance[-1] - distance[-2]
+        way = np.concatenate([distance[0] + pace_m * np.arange(-lead, 0), distance,
+                              distance[-1] + ahead_m * np.arange(1, 2 * half)])
+        self._way_m = finer(way, self._steps)
+        self._time_s = (np.arange(len(self._way_m)) / self._steps - lead) / rate_hz
+        self._count = smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
+        self._kept = slice(lead + record.first, lead + len(distance))
+        damping = -np.log(_ROUND_THE_END) * rate_hz / self._count
+        f_hz = np.arange(self._count // 2) * rate_hz / self._count
+        self.s = damping + 2j * np.pi * f_hz
+        self._fading = np.exp(-damping * np.arange(self._count * self._steps) / fine_hz)
+        self._growth = np.exp(damping * np.arange(self._count) / rate_hz)[self._kept]
+        # The mean over a step is the road times this, and the recorder's filter follows.
+        over = self.s / fine_hz
+        taps = recorder_taps(self._steps)
+        place = np.arange(len(taps)) - (len(taps) - 1) / 2
+        fading_taps = np.zeros(self._count * self._steps)
+        fading_taps[: len(taps)] = taps * np.exp(-damping * place / fine_hz)
+        filtered = np.fft.rfft(fading_taps)[: len(f_hz)] * np.exp(2j * np.pi * f_hz * (len(taps) - 1) / 2 / fine_hz)
+        self._filter = filtered * over / np.expm1(over) / self._steps
+        self._known: dict[tuple[float, ...], Complex] = {}
+
+    def under_wheels(self, structure: Structure, road: RoadInput) -> Complex:
+        """Transforms (f, w) of the elevations under the wheels, counted from where they began [m s]."""
+        under = self._profile(structure, road.speed_scale)
+        for obstacle in road.obstacles.values():
+            path = obstacle.path(structure.contact_patch_m)
+            under = under + self._wheels(structure, road.speed_scale, [path, path])
+        return under
+
+    def by_input(self, structure: Structure, road: RoadInput, name: str) -> Complex:
+        """Derivatives (f, w) of that by a number of the road's input, by its name for all runs."""
+        patch_m = structure.contact_patch_m
+        if name != SPEED_SCALE:
+            part, _, leaf = name.partition(".")
+            path = road.obstacles[part].slopes(patch_m)[leaf]
+            return self._wheels(structure, road.speed_scale, [path, path])
+        assert isinstance(self._track, Track)  # a rig has no speed
+        under = self._wheels(structure, road.speed_scale, self._track.tire_paths(patch_m), by_scale=True)
+        for obstacle in road.obstacles.values():
+            path = obstacle.path(patch_m)
+            under = under + self._wheels(structure, road.speed_scale, [path, path], by_scale=True)
+        return under
+
+    def _profile(self, structure: Structure, speed_scale: float) -> Complex:
+        place = (speed_scale, structure.contact_patch_m, *structure.behind_m, *structure.left_m)
+        if place not in self._known:
+            if len(self._known) > 2:
+                self._known.clear()
+            _, means = self._track.under_wheels(Way(self._way_m / speed_scale, self._time_s), structure)
+            self._known[place] = np.stack([self._transform(one) for one in means.T], axis=1)
+        return self._known[place]
+
+    def _wheels(self, structure: Structure, speed_scale: float, paths: Sequence[WheelPath],
+                by_scale: bool = False) -> Complex:
+        """Transforms of what the wheels meet on their paths, left and right, or of its derivative by the scale."""
+        wheels = []
+        for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True):
+            way = self._way_m / speed_scale
+            path = paths[-1] if left_m < 0 else paths[0]
+            elevation, means = path.step_means(way - behind_m)
+            if by_scale:
+                step = np.diff(way)
+                slope = np.diff(elevation) / np.where(np.abs(step) < _STANDING_M, np.inf, step)
+                middle, excess = (way[1:] + way[:-1]) / 2, (elevation[1:] + elevation[:-1]) / 2 - means
+                means = -(middle * slope + excess) / speed_scale
+            wheels.append(self._transform(means))
+        return np.stack(wheels, axis=1)
+
+    def samples(self, transform: Complex) -> Array:
+        """The samples (..., n) of transforms (..., f), without the beginning."""
+        return np.fft.irfft(transform, self._count)[..., self._kept] * self._growth
+
+    def _transform(self, means: Array) -> Complex:
+        rise = means - means[0]
+        back = np.zeros(len(self._fading))
+        back[: len(rise)] = rise
+        rest = len(back) - len(rise)
+        back[len(rise):] = rise[-1] * 0.5 * (1 + np.cos(np.pi * np.arange(rest) / rest))
+        return np.fft.rfft(back * self._fading)[: len(self.s)] * self._filter
+
 
 # Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
 _SPEEDS = 12
@@ -154,3 +296,166 @@ class DriveModel:
     def _roads(self) -> list[RoadInTime]:
         """The road under the wheels of each record."""
         return [RoadInTime(record) for record in self.records]
+
+
+class VehicleModel(DriveModel):
+    """A linear car without effects."""
+
+    exact = True
+
+    def predict(self, values: Array) -> list[Array]:
+        """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
+        car = sensed_car(self.vehicle_with(values))
+        return [self.observed(run, road.samples(_response(
+                    car, road.s, road.under_wheels(car.structure, self.road_with(values, run)))))
+                for run, road in enumerate(self._roads)]
+
+    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
+        """As ``DifferentiablePredictor``; derivatives are exact but for those by places and lengths of the car, which
+        shift the road."""
+        vehicle = self.vehicle_with(values)
+        car = sensed_car(vehicle)
+        changes = {index: sensitivity(vehicle, one) for index, one in enumerate(self.parameters)
+                   if not is_input(one.name)}
+        predictions, slopes = [], []
+        for run, road in enumerate(self._roads):
+            at = self.road_with(values, run)
+            under = road.under_wheels(car.structure, at)
+            q, w = _solved(car, road.s, under)
+            derivatives = np.zeros((len(self.parameters), len(road.s)), dtype=complex)
+            for index, change in changes.items():
+                moved = None
+                if change.shifts_road:
+                    before, after = (road.under_wheels(one.structure, at) for one in (change.before, change.after))
+                    moved = (after - before) / change.apart
+                derivatives[index] = _by_car(car, change, road.s, under, q, w, moved)
+            for index, name in self._inputs_of(run):
+                derivatives[index] = _through(car, w, road.by_input(car.structure, at, name))
+            prediction = road.samples(road.s**2 * (q @ car.row))
+            predictions.append(self.observed(run, prediction))
+            slopes.append(self.observed_slopes(run, prediction, road.samples(derivatives).T))
+        return predictions, slopes
+
+    def _inputs_of(self, run: int) -> list[tuple[int, str]]:
+        """Which free numbers change the road's input in a run: their indices, and their names for all runs."""
+        names = [(index, *run_and_name(one.name)) for index, one in enumerate(self.parameters) if is_input(one.name)]
+        return [(index, name) for index, only, name in names if only in (None, run)]
+
+
+def _response(car: SensedCar, s: Complex, under: Complex) -> Complex:
+    """Transform (f,) of the sensor's acceleration, of a road (f, w) under the wheels."""
+    forces = under @ car.structure.road.T
+    return np.asarray(s**2 * (np.linalg.solve(car.dynamic_stiffness(s), forces[..., None])[..., 0] @ car.row))
+
+
+def _solved(car: SensedCar, s: Complex, under: Complex) -> tuple[Complex, Complex]:
+    """q and w (f, n), with D = s2 M + s C + K, D q = R z and D w = s2 r; the sensor reads y = s2 r q."""
+    forces = np.stack([under @ car.structure.road.T, (s * s)[:, None] * car.row], axis=-1)
+    q, w = np.moveaxis(np.linalg.solve(car.dynamic_stiffness(s), forces), -1, 0)
+    return q, w
+
+
+def _through(car: SensedCar, w: Complex, moved: Complex) -> Complex:
+    """What the sensor makes (f,) of a change (f, w) of the road under the wheels: w R dz."""
+    return np.asarray((w * (moved @ car.structure.road.T)).sum(axis=1))
+
+
+def _by_car(car: SensedCar, change: Sensitivity, s: Complex, under: Complex, q: Complex, w: Complex,
+            moved: Complex | None) -> Complex:
+    """Derivative (f,) of the sensor's acceleration by a number of the car: s2 dr q + w (dR z - dD q) + w R dz."""
+    s2 = s * s
+    force = under @ change.road.T - s2[:, None] * (q @ change.mass.T) - s[:, None] * (q @ change.damping.T)
+    force -= q @ change.stiffness.T
+    derivative = (w * force).sum(axis=1) + s2 * (q @ change.row)
+    return np.asarray(derivative if moved is None else derivative + _through(car, w, moved))
+
+
+# Steps of differences, either way: of what moves by factors, and of effects' numbers as shares; of a factor of all
+# distances, which moves what lies far away; of places [m]. What sticks and slips makes a response that is jagged on a
+# fine scale: smaller steps show its teeth, and not where it leads.
+_STEP, _SHARE_STEP, _SPEED_STEP, _PLACE_STEP_M = 5e-3, 1e-2, 1e-6, 5e-3
+_KEPT_TRACKS = 4
+
+
+class SimulatedModel(DriveModel):
+    """A car with effects, of any laws."""
+
+    exact = False
+
+    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
+                 road: RoadInput | None = None, effects: Sequence[Chosen] = ()) -> None:
+        super().__init__(vehicle, parameters, records, road, effects)
+        self._runs = SimulatedRuns(records, steps_hz(vehicle))
+        self._tracks: dict[tuple[int, tuple[Obstacle, ...]], WheelTracks] = {}
+
+    def predict(self, values: Array) -> list[Array]:
+        """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
+        roads = [self.road_with(values, run) for run in range(len(self.records))]
+        farther_m = [record.distance_m * (1 / road.speed_scale - 1)
+                     for record, road in zip(self.records, roads, strict=True)]
+        tracks = [self._track(run, road) for run, road in enumerate(roads)]
+        predictions = self._runs.predict(self.car_with(values), farther_m, tracks=tracks)
+        return [self.observed(run, one[self.records[run].first:]) for run, one in enumerate(predictions)]
+
+    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
+        """As ``DifferentiablePredictor``: differences, to both sides of a number unless it is at a bound."""
+        columns = []
+        for index, one in enumerate(self.parameters):
+            step = self._step(one, float(values[index]))
+            ends = np.clip(values[index] + step * np.array([-1.0, 1.0]), one.low, one.high)
+            low, high = (self.predict(np.where(np.arange(len(values)) == index, end, values)) for end in ends)
+            columns.append([(there - here) / (ends[1] - ends[0]) for here, there in zip(low, high, strict=True)])
+        return self.predict(values), [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
+
+    def _step(self, one: Free, value: float) -> float:
+        """Of a number where it is."""
+        if (free := self._free_parameters.get(one.name)) is not None:
+            chosen = self.effects[free.effect]
+            parameter = chosen.effect.parameters[free.parameter]
+            here = Chosen(chosen.effect, {**chosen.values, parameter.name: value})
+            step = float(steps_of([*self.effects[: free.effect], here], [free], _STEP, _SHARE_STEP)[0])
+            return step / slope_of(parameter, value)
+        if one.by_factors:
+            return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _STEP)
+        return _PLACE_STEP_M
+
+    def _track(self, run: int, road: RoadInput) -> WheelTracks:
+        """The road of a run with what lies on it; the same object as long as nothing changes."""
+        track, obstacles = self.records[run].track, tuple(road.obstacles.values())
+        if not obstacles or not isinstance(track, Track):
+            return track
+        if (run, obstacles) not in self._tracks:
+            for old in [*self._tracks][: -_KEPT_TRACKS * len(self.records)]:
+                del self._tracks[old]
+            self._tracks[run, obstacles] = _TrackWithObstacles(track, obstacles)
+        return self._tracks[run, obstacles]
+
+
+@dataclass(frozen=True, eq=False)
+class _TrackWithObstacles:
+    """A track on which obstacles lie, alike under left and right wheels."""
+
+    track: Track
+    obstacles: tuple[Obstacle, ...]
+
+    def resurfaced(self, surface: Surface) -> _TrackWithObstacles:
+        """The road itself under the obstacles, which stay what they are."""
+        return replace(self, track=self.track.resurfaced(surface))
+
+    def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
+        """As ``WheelTracks``."""
+        patch_m = stance.contact_patch_m
+        obstacles = [one.path(patch_m) for one in self.obstacles]
+        return along_paths([_Sum([path, *obstacles]) for path in self.track.tire_paths(patch_m)], way, stance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sum:
+    """Paths on top of each other."""
+
+    paths: Sequence[WheelPath]
+
+    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
+        """As ``WheelPath``."""
+        elevations, means = zip(*(one.step_means(distance_m) for one in self.paths), strict=True)
+        return sum(elevations[1:], elevations[0]), sum(means[1:], means[0])

@@ -4,7 +4,7 @@ A record is one of three things; each has one method, the best known for it, and
 
 - a free decay (era): poles are proposed, least squares decides and gives the errors (``logger.modal.decay``);
 - a response to unmeasured random forces (ssi): poles of the best order, errors by leaving out one segment of the record
-  after the other, choice by rule (``logger.modal.stabilisation``);
+  after the other, choice by rule (``logger.modal.mode``);
 - the same beside a measured input (n4sid).
 
 Methods that were offered once and are not: AR, ARX and ARMAX, whose damping the noise of the sensors makes too high
@@ -22,11 +22,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.modal import subspace
-from logger.modal.decay import decay_modes
-from logger.modal.era import proposals
-from logger.modal.mode import Array, ModalResult, OrderPoles, order_poles
-from logger.modal.moments import Moments, jackknife, segment_products
-from logger.modal.stabilisation import best_size, generous_size, judge
+from logger.modal.decay import decay_modes, proposals
+from logger.modal.mode import Array, ModalResult, OrderPoles, best_size, generous_size, judge, order_poles
+from logger.modal.subspace import Moments, jackknife, segment_products
 
 METHODS = {
     "era": "eigensystem realisation of a free decay",

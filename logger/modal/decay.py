@@ -11,10 +11,19 @@ fitted by least squares, which for white noise attains the Cramer-Rao bound. Pro
 that explains most first, as long as it explains more than the largest of a thousand draws of noise would, noise being
 what is left around its frequency and while it lasts: that of a sensor that errs by a share of what it reads, or of few
 digits, shrinks as the modes do. After each the poles of all are refitted, and the poles of each smaller order are tried
-as a start too. Amplitudes are linear and
-are eliminated (variable projection, Golub and Pereyra, 1973), which leaves two unknowns per mode and makes a step cheap
-however many channels there are. Standard errors follow from the same matrices; noise that is louder around a mode than
-elsewhere enlarges them.
+as a start too. Amplitudes are linear and are eliminated (variable projection, Golub and Pereyra, 1973), which leaves
+two unknowns per mode and makes a step cheap however many channels there are. Standard errors follow from the same
+matrices; noise that is louder around a mode than elsewhere enlarges them.
+
+The logarithmic decrement (Eq 5.2 of Blum 2015) is the damping from how fast peaks shrink. Two peaks give a number
+without an error. Here the line through the logarithms of all peaks above the noise gives both. The record must hold one
+vibration: others are cut out around the strongest by Fourier transform first.
+
+Eigensystem realisation gives poles of every order: a free decay y[k] = C A^k x0 laid in a block Hankel matrix has rank
+n, and the same matrix one sample later is the first with A in its middle (Juang and Pappa, 1985; 3.2.1 of Blum 2015).
+
+With noise the rank is full and the order has to be chosen. The realisations of all orders are nested: that of order n
+is the upper left corner of the largest, so a whole stabilisation diagram costs one singular value decomposition.
 """
 
 from __future__ import annotations
@@ -35,6 +44,7 @@ from logger.modal.mode import (
     damping_ratio,
     errors_of,
     normalised,
+    order_poles,
 )
 
 Propose = Callable[[Array, float], tuple[OrderPoles, ...]]
@@ -316,3 +326,95 @@ def _unsupported(poles: Complex, diagram: tuple[OrderPoles, ...]) -> list[Reject
         return []
     left = [complex(s) for s in diagram[-1].poles if not len(poles) or np.abs(poles - s).min() > 0.05 * abs(s)]
     return [Rejected(abs(s) / (2 * np.pi), -s.real / abs(s), "explains no more than noise would") for s in left]
+
+
+_BAND = (0.6, 1.4)  # of the strongest frequency
+_FADED = 0.1  # of the first peak: what is below is left to the noise
+_FEWEST_PEAKS = 4
+
+
+@dataclass(frozen=True)
+class Decrement:
+    """Damping ratio and frequency [Hz] with standard deviations; times (n,) [s] and heights (n,) of the peaks used."""
+
+    damping_ratio: float
+    damping_std: float
+    frequency_hz: float
+    frequency_std_hz: float
+    peak_s: Array
+    peak_height: Array
+
+
+def damping_of_two_peaks(first: float, later: float, cycles: int) -> float:
+    """Eq 5.2: ln(first / later) / 2 pi cycles, for light damping."""
+    return float(np.log(first / later) / (2 * np.pi * cycles))
+
+
+def log_decrement(samples: Array, rate_hz: float) -> Decrement:
+    """The strongest vibration of a free decay (n,).
+
+    ValueError when fewer than four peaks rise above a tenth of the first.
+    """
+    wave, strongest_hz = _alone(samples, rate_hz)
+    top = np.flatnonzero((wave[1:-1] > wave[:-2]) & (wave[1:-1] >= wave[2:]) & (wave[1:-1] > 0)) + 1
+    edge = rate_hz / strongest_hz  # the cut rings at both ends
+    top = top[(top > edge) & (top < len(wave) - edge)]
+    faded = np.flatnonzero(wave[top] < _FADED * wave[top].max(initial=0.0)) if len(top) else np.empty(0, int)
+    top = top[:faded[0]] if len(faded) else top
+    if len(top) < _FEWEST_PEAKS:
+        raise ValueError(f"expected at least {_FEWEST_PEAKS} peaks of one vibration, found {len(top)}")
+    below, peak, above = wave[top - 1], wave[top], wave[top + 1]
+    shift = 0.5 * (below - above) / (below - 2 * peak + above)
+    height, time_s = peak - 0.25 * (below - above) * shift, (top + shift) / rate_hz
+    (decrement, decrement_std), (period_s, period_std_s) = _slope(-np.log(height)), _slope(time_s)
+    damped_hz = 1 / period_s
+    ratio = decrement / np.hypot(2 * np.pi, decrement)
+    return Decrement(float(ratio), float(decrement_std / (2 * np.pi)), float(damped_hz / np.sqrt(1 - ratio**2)),
+                     float(period_std_s * damped_hz**2), time_s, height)
+
+
+def decrement_mode(samples: Array, rate_hz: float) -> ModalResult:
+    """The same as the only mode of a record of one channel. ValueError as ``log_decrement``."""
+    found = log_decrement(samples, rate_hz)
+    mode = FoundMode(found.frequency_hz, found.damping_ratio, found.frequency_std_hz, found.damping_std,
+                     np.ones(1, np.complex128))
+    return ModalResult((mode,), (), 0, f"logarithmic decrement (Eq 5.2) over {len(found.peak_s)} peaks")
+
+
+def _alone(samples: Array, rate_hz: float) -> tuple[Array, float]:
+    seen = np.fft.rfft(samples - samples.mean())
+    frequency_hz = np.fft.rfftfreq(len(samples), 1 / rate_hz)
+    strongest_hz = float(frequency_hz[1 + np.abs(seen[1:]).argmax()])
+    inside = (frequency_hz > _BAND[0] * strongest_hz) & (frequency_hz < _BAND[1] * strongest_hz)
+    return np.fft.irfft(np.where(inside, seen, 0), len(samples)), strongest_hz
+
+
+def _slope(values: Array) -> tuple[float, float]:
+    """Of the line through values at 0, 1, 2, ..., with its standard deviation."""
+    index = np.arange(len(values)) - (len(values) - 1) / 2
+    power = (index**2).sum()
+    slope = (index @ values) / power
+    left = values - values.mean() - slope * index
+    return float(slope), float(np.sqrt((left**2).sum() / (len(values) - 2) / power))
+
+
+_MOST_ROWS, _MOST_COLUMNS = 300, 400
+_PROPOSED_STATES = 40
+_RANK = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
+
+
+def proposals(samples: Array, rate_hz: float, most: int | None = None) -> tuple[OrderPoles, ...]:
+    """Poles of the orders 2, 4, ... ``most`` (None: 40) of a free decay (samples, channels)."""
+    count, channels = samples.shape
+    rows = max(2, min(_MOST_ROWS // channels, count // 2))
+    columns = max(1, min(_MOST_COLUMNS, count - rows))
+    blocks = samples[np.arange(rows)[:, None] + np.arange(columns + 1)]  # (rows, columns + 1, channels)
+    whole = blocks.transpose(0, 2, 1).reshape(rows * channels, columns + 1)
+    early, late = whole[:, :-1], whole[:, 1:]
+    squares, left = np.linalg.eigh(early @ early.T)
+    sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
+    n = max(1, min(most or _PROPOSED_STATES, int((sizes > _RANK * sizes[0]).sum())))
+    left, root = left[:, :n], np.sqrt(np.maximum(sizes[:n], 1e-300))
+    transition = left.T @ late @ ((left.T @ early) / sizes[:n, None]).T / np.outer(root, root)
+    observe = left[:channels] * root
+    return tuple(order_poles(transition[:k, :k], observe[:, :k], rate_hz) for k in range(2, n + 1, 2))

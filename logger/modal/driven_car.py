@@ -25,8 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.modal.mode import FoundMode, ModalResult, Rejected
-from logger.modal.stabilisation import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR
+from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
 from logger.roads.iso8608 import HIGHEST_CPM
 from logger.vehicle.frequency_response import AxleResponse
 from logger.vehicle.models import structure_of

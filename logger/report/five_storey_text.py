@@ -10,8 +10,7 @@ def five_storey() -> dict[str, Any]:
     import numpy as np
 
     from logger.modal import five_storey
-    from logger.modal.decay import decay_modes
-    from logger.modal.era import proposals
+    from logger.modal.decay import decay_modes, proposals
     from logger.report.modal_text import mode_json
 
     building = five_storey.structure()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from logger.lab.planning.next_drives import Option
 from logger.lab.planning.outlook import ISOLABLE_SIGMA
 from logger.lab.planning.plan import NextDrive, Plan
+from logger.lab.planning.planned_drive import Option
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.text_layout import columns, paragraphs
 

@@ -15,14 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import SimulatedModel, VehicleModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
-from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.shared_road_covariance import with_common_roughness
-from logger.identification.time_domain_model import SimulatedModel
-from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
+from logger.identification.unknown_inputs import Bump, RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.road_fit import fit_roads
 from logger.identification.unknown_road.road_operator import Drive
 from logger.profiles.track import Track

@@ -17,8 +17,8 @@ import numpy as np
 
 from logger.modal import five_storey
 from logger.modal.analysis import find_modes
+from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
 from logger.modal.mode import mac
-from logger.modal.structure_response import Masses, chain, free_decay, random_response, with_damping_ratios
 
 from .figures import Figures
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.prediction_error_fit import fit
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, Run

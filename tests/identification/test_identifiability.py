@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
 from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.runs import Run

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from logger.identification.obstacle_paths import Bump, Obstacle, ObstaclePath, RoadStep
+from logger.identification.unknown_inputs import Bump, Obstacle, ObstaclePath, RoadStep
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from logger.identification.residual_whiteness import autocorrelation, cross_correlation
+from logger.identification.noise_models import autocorrelation, cross_correlation
 
 GENERATOR = np.random.default_rng(11)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.session import (
     UnusableRun,

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from logger.api.identify.words import common_words
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.noise_models import RoadNoise
-from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
-from logger.identification.unknown_inputs import RoadInput, expanded, free_input
+from logger.identification.unknown_inputs import Bump, RoadInput, expanded, free_input
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate

@@ -9,13 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import SimulatedModel, VehicleModel
 from logger.identification.identifiability import TOGETHER, NotIdentifiable
 from logger.identification.noise_models import White
-from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
-from logger.identification.time_domain_model import SimulatedModel
-from logger.identification.unknown_inputs import RoadInput, free_input, is_input
+from logger.identification.unknown_inputs import Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns

@@ -8,14 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.identifiability import WEAK, NotIdentifiable
 from logger.identification.noise_models import White
-from logger.identification.obstacle_paths import Bump, RoadStep
-from logger.identification.obstacle_search import located
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
+from logger.identification.session import located
 from logger.identification.unknown_inputs import (
+    Bump,
     RoadInput,
+    RoadStep,
     changed_input,
     expanded,
     free_input,

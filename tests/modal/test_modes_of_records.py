@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from logger.modal.analysis import decays, find_modes
+from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
 from logger.modal.mode import FoundMode, mac
-from logger.modal.structure_response import Masses, chain, free_decay, random_response, with_damping_ratios
 
 RATE_HZ = 100.0
 FREQUENCIES_HZ = 2.48 * np.sin((2 * np.arange(1, 6) - 1) * np.pi / 22) / np.sin(np.pi / 22)  # of a uniform chain

@@ -7,11 +7,10 @@ import pytest
 from scipy.linalg import eigh
 
 from logger.modal import five_storey
-from logger.modal.decrement import damping_of_two_peaks, log_decrement
+from logger.modal.decay import damping_of_two_peaks, log_decrement
+from logger.modal.five_storey import chain, free_decay, with_damping_ratios
 from logger.modal.mode import errors_of, mac
-from logger.modal.moments import segment_products
-from logger.modal.spectral_peaks import summed_spectrum
-from logger.modal.structure_response import chain, free_decay, with_damping_ratios
+from logger.modal.subspace import segment_products, summed_spectrum
 
 
 def test_moments_are_the_products_of_lagged_samples() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.smoothed_profile import FAMILY
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track

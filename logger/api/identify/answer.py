@@ -246,8 +246,7 @@ def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
 
 def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.obstacle_paths import Bump, RoadStep
-    from logger.identification.unknown_inputs import RoadInput
+    from logger.identification.unknown_inputs import Bump, RoadInput, RoadStep
 
     kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
     for name, numbers in (question.obstacles or {}).items():

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from logger.identification.drive_model import DriveModel
+from logger.identification.noise_models import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.prediction_error_fit import Fit, least_share
-from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
 from logger.lab.readings_fit import ReadingsFit
 from logger.runs import Run

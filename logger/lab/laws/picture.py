@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.chart_data import CURVE_POINTS, CURVE_REACH, Curves, Line
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import Draft, LawContext
 from logger.vehicle.effect import Chosen, ForceEffect
 from logger.vehicle.laws import Seen, linear
 from logger.vehicle.uncertain import NumberErrors

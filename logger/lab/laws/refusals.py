@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family
+from logger.lab.laws.draft import Draft, Family
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors

@@ -22,18 +22,27 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.planning.next_drives import Option, option_drives
 from logger.lab.planning.outlook import (
     ISOLABLE_SIGMA,
     EffectGrid,
     Indices,
+    LinearisedDrives,
     Outlook,
     most_likely_sizes,
     outlook,
+    refitted_gain,
     representatives,
 )
-from logger.lab.planning.planned_drive import SIZES, Information, PlannedCar, PlannedDrive, SensorNoise, information
-from logger.lab.planning.refit import LinearisedDrives, refitted_gain
+from logger.lab.planning.planned_drive import (
+    SIZES,
+    Information,
+    Option,
+    PlannedCar,
+    PlannedDrive,
+    SensorNoise,
+    information,
+    option_drives,
+)
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.runs import Run

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from logger.dsp.pass_band import HALF_WIDTH_HZ
-from logger.identification.residual_whiteness import LAGS, autocorrelation
+from logger.identification.noise_models import LAGS, autocorrelation
 from logger.lab.likelihood.whittle import BLOCK_S
 from logger.lab.residual_tests.tests import (
     BANDS,

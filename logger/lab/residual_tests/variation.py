@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.identification.residual_whiteness import LAGS
+from logger.identification.noise_models import LAGS
 from logger.lab.residual_tests.tests import (
     LEAST_GROWTH,
     ResidualEvidence,

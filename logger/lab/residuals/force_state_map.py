@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.residual_whiteness import autocorrelation
+from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.vehicle.passage import smooth_length
 from logger.vehicle.stepping import force_input

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.changing_with_speed import FAMILY
-from logger.lab.laws.families.family import LawContext
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import lambertw
 
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.damper_heat import FAMILY
-from logger.lab.laws.families.family import LawContext
 from logger.vehicle.effect import ForceEffect
 from logger.vehicle.laws import Seen, linear
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.extension_stop import FAMILY
-from logger.lab.laws.families.family import LawContext
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import ForceEffect, chosen

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import Draft, LawContext
 from logger.lab.laws.families.flat_spot import FAMILY, _draft
 from logger.lab.likelihood.map_fit import align
 from logger.simulation.simulated_runs import SimulatedRuns

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.hung_mass import FAMILY
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose

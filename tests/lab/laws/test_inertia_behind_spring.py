@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import Draft, LawContext
 from logger.lab.laws.families.inertia_behind_spring import FAMILY
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose

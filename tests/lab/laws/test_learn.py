@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.lab.laws.learn import Learning, learn
 from logger.plugins import catalogue
 from logger.store.formats.effect_file import own_effect, shipped_effects

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import decimate, firwin, lfilter
 
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.loose_sensor import FAMILY
 from logger.vehicle.effect import RecordEffect, Recording, chosen
 

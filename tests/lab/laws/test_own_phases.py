@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from logger.lab.diagnosis import refit
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.laws.families.wheel_turns import FAMILY as WHEEL_TURNS
-from logger.lab.laws.own_phases import EACH
-from logger.lab.laws.screening import screen_law
+from logger.lab.laws.learn import screen_law
+from logger.lab.laws.repeating import EACH
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment
 from logger.simulation.simulated_runs import SimulatedRuns

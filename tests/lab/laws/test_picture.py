@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.chart_data import Curves
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.friction_with_memory import FAMILY as FRICTION
 from logger.lab.laws.families.spring_with_memory import FAMILY as RUBBER
 from logger.lab.laws.picture import picture

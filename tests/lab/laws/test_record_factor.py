@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import freqs
 
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.record_factor import FAMILY
 from logger.vehicle.effect import SensorEffect
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from logger.lab.laws.draft import Draft
+from logger.lab.laws.draft import Draft, Family, LawContext
 from logger.lab.laws.families.damping_by_travel import FAMILY as BY_BOTH
-from logger.lab.laws.families.family import Family, LawContext
 from logger.lab.laws.families.force_by_rate import FAMILY as BY_RATE
 from logger.lab.laws.families.record_factor import FAMILY as FACTOR
 from logger.lab.laws.refusals import Nearest, _beyond, does_nothing, known_instead, refusal

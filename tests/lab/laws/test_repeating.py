@@ -64,7 +64,7 @@ def test_noise_does_not_repeat(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nothing_is_drafted_where_nothing_repeats() -> None:
-    from logger.lab.laws.families.family import LawContext
+    from logger.lab.laws.draft import LawContext
 
     posterior = posterior_of(secret_runs())
     context = LawContext(posterior, posterior.start())
@@ -82,7 +82,7 @@ def test_a_limited_record_is_that_of_a_limited_motion(limits: Callable[[Array], 
     does, one bends much alike."""
     from scipy.signal import firwin, resample_poly
 
-    from logger.lab.laws.families.family import LawContext
+    from logger.lab.laws.draft import LawContext
 
     posterior = posterior_of(secret_runs())
     effect, = (one.effect for one in CLIPPING.drafts(LawContext(posterior, posterior.start()))

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.skyhook import ACTIVE, FAMILY, SEMI_ACTIVE
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose

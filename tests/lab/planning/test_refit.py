@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from logger.lab.planning.outlook import LinearisedDrives, refitted_gain
 from logger.lab.planning.planned_drive import PlannedDrive
-from logger.lab.planning.refit import LinearisedDrives, refitted_gain
 from logger.runs import Array
 
 from .test_outlook import planned

@@ -7,8 +7,7 @@ temperature.
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """

@@ -6,8 +6,7 @@ T (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7, on fade).
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """

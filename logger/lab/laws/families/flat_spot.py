@@ -12,10 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.own_phases import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run
-from logger.lab.laws.repeating import best_lags_m, comb_frequency
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.repeating import ALL_ALIKE, BEGINS, EACH, best_lags_m, comb_frequency, each_run, in_run, of_run
 from logger.vehicle.effect import Chosen, Parameter, Scale, chosen
 
 _FUNCTIONS = """

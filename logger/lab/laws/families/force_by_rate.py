@@ -6,7 +6,7 @@ A power of the rate, or a smooth curve through points, which may differ in bump 
 from __future__ import annotations
 
 from logger.lab.laws.curves import RATE, CurveFamily
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 
 
 class ForceByRate(CurveFamily):

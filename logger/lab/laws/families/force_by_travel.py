@@ -6,7 +6,7 @@ A power of the travel, or a smooth curve through points, which may differ in com
 from __future__ import annotations
 
 from logger.lab.laws.curves import TRAVEL, CurveFamily
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 
 _SHARE = 0.3  # of the spring's own force
 

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.own_phases import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run
-from logger.lab.laws.repeating import spatial_frequency, tone_in_time
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.repeating import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run, spatial_frequency, tone_in_time
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):

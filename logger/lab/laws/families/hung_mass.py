@@ -6,8 +6,7 @@ list.
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE, _MOST = 0.05, 1.0  # of the mass that carries it: tried, and what may be

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

@@ -7,8 +7,7 @@ one can only resist its own rate v: it gives the smaller of C |z'| and B |v| whe
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 ACTIVE, SEMI_ACTIVE = "active", "semi-active"

@@ -3,8 +3,7 @@ branch)."""
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

@@ -7,7 +7,7 @@ let go.
 from __future__ import annotations
 
 from logger.lab.laws.curves import DEFLECTION, CurveFamily
-from logger.lab.laws.families.family import LawContext
+from logger.lab.laws.draft import LawContext
 
 _SHARE = 0.3  # of the tire's own force
 
