@@ -4,7 +4,7 @@ Problem: one model answers in frequency, exactly and at once, and knows linear c
 through time. What is free, how names become a car, effects and a road, and what a random road would do to the sensor
 are the same for both. Solution: ``DriveModel`` has that, and a model adds its predictions and their derivatives.
 
-``FrequencyDomainModel``: a fit asks for the model's response, and for its derivative by every free number, tens of
+``VehicleModel``: a fit asks for the model's response, and for its derivative by every free number, tens of
 times; stepping the car finely through each run for each of them takes seconds. Solution: a linear car answers each
 frequency by itself, whatever the speed did, because the speed only shapes what passes under the wheels, and that does
 not depend on masses, springs and dampers. So the road under each wheel is laid out in time once, finely, by its exact
@@ -16,7 +16,7 @@ A transform takes a record for one period of an endless one. Behind the record t
 began and the car comes to rest; and the transform is taken along s = damping + i omega, which makes what comes round
 from the end a ten-thousandth of what is left of it there.
 
-``TimeDomainModel``: dry friction, a bump stop or a sensor on a loose bracket are no numbers of a linear car, and the
+``SimulatedModel``: dry friction, a bump stop or a sensor on a loose bracket are no numbers of a linear car, and the
 laws of some of them have no transform. Solution: the car with its effects is driven through the runs as the lab drives
 it (``SimulatedRuns``), whatever its laws are; derivatives are differences of such drives, over steps on the scales that
 the numbers move on. An obstacle of which only the kind is known lies on the road in closed form, as it does in

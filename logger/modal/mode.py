@@ -3,7 +3,7 @@
 A pole exp(s t) of a structure is quoted as a natural frequency |s| / 2 pi and a damping ratio -Re s / |s|. Sampled
 every dt seconds the same pole is z = exp(s dt).
 
-``stabilised`` makes the choice by rule that an analyst makes on a stabilisation diagram. Problem: a model of order 20
+``judge`` makes the choice by rule that an analyst makes on a stabilisation diagram. Problem: a model of order 20
 has ten poles, and a structure that shows five modes has five. Analysts plot the poles of all orders and pick by eye the
 ones that stay.
 
