@@ -33,11 +33,10 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import VehicleModel
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
-from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
-from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput, free_input, is_input
+from logger.identification.unknown_inputs import SPEED_SCALE, Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.gd_iri import iri_per_root_gd

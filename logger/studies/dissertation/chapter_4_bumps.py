@@ -24,9 +24,8 @@ from itertools import chain
 import numpy as np
 
 from logger.chart_data import Curves, Field, Line
-from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit
-from logger.identification.unknown_inputs import RoadInput
+from logger.identification.unknown_inputs import Bump, RoadInput
 from logger.runs import Run
 from logger.studies.drives import (
     BUMP_HEIGHT_M,

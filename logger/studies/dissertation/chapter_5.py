@@ -18,9 +18,7 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.identification.identifiability import NotIdentifiable
 from logger.modal import five_storey
-from logger.modal.decay import decay_modes
-from logger.modal.decrement import damping_of_two_peaks
-from logger.modal.era import proposals
+from logger.modal.decay import damping_of_two_peaks, decay_modes, proposals
 from logger.modal.five_storey import (
     DAMPING_RATIO,
     PRINTED_RMS,
@@ -31,7 +29,7 @@ from logger.modal.five_storey import (
     structure,
 )
 from logger.modal.mode import ModalResult
-from logger.modal.spectral_peaks import summed_spectrum
+from logger.modal.subspace import summed_spectrum
 from logger.runs import Run
 from logger.studies.drives import (
     BRIDGE_MPS,

@@ -16,9 +16,8 @@ from logger.chart_data import Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
 from logger.estimation.rms_calibration import CalibrationSettings, calibrate
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.obstacle_paths import Bump, RoadStep
 from logger.identification.prediction_error_fit import Fit
-from logger.identification.unknown_inputs import RoadInput
+from logger.identification.unknown_inputs import Bump, RoadInput, RoadStep
 from logger.roads.obstacles import pothole, step
 from logger.runs import Run
 from logger.studies.dissertation.chapter_6_roads import LOW_PASS_HZ, PRINTED_MPH

@@ -23,10 +23,9 @@ from logger.estimation.road_profile import RoadProfile, band_passed
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.unknown_road.drive_operator import Drive
-from logger.identification.unknown_road.fisher_scoring import RoadFit
-from logger.identification.unknown_road.road_fit import fit_roads
-from logger.identification.unknown_road.road_state import Options
+from logger.identification.unknown_road.marginal_likelihood import Options
+from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
+from logger.identification.unknown_road.road_operator import Drive
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file, vehicle_names

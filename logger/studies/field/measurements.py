@@ -22,7 +22,7 @@ from scipy.special import ndtri
 
 from logger.chart_data import Curves, Line
 from logger.modal.analysis import find_modes
-from logger.modal.structure_response import Masses, chain, random_response, with_damping_ratios
+from logger.modal.five_storey import Masses, chain, random_response, with_damping_ratios
 from logger.studies.drives import (
     BUMP_MPS,
     MASS,
