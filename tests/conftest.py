@@ -19,6 +19,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from .support.drives.short_drive import SHORT_PLAN
+from .support.machine_code import make
 
 # Byte code is kept, of the tests with their asserts and for the commands that they start: to make it again costs each
 # worker 13 s of a processor and each command one.
@@ -33,6 +34,18 @@ hypothesis.settings.load_profile("any_machine")
 def pytest_collection_finish() -> None:
     """The tests themselves stay to the end: no search for garbage need go through them."""
     gc.freeze()
+
+
+MANY_TESTS = 1000
+"""So many together need the compiled loops for certain."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def machine_code(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The compiled loops are there before a worker's first test: to make both takes half a minute of a processor."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker is not None and len(request.session.items) > MANY_TESTS:
+        make(tmp_path_factory.getbasetemp().parent, int(worker.removeprefix("gw")))
 
 
 @pytest.fixture

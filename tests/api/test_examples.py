@@ -19,8 +19,11 @@ import pytest
 import logger.api
 import ridelog
 
+from ..support.slow import slow
+
 MODULES = [importlib.import_module(one.name) for one in pkgutil.walk_packages(logger.api.__path__, "logger.api.")]
-SLOW = ("logger.api.lab_questions", "logger.api.diagnosis", "logger.api.fleet", "logger.api.plan")
+SLOW = ("logger.api.lab_questions", "logger.api.diagnosis", "logger.api.fleet", "logger.api.fleet_questions",
+        "logger.api.bench", "logger.api.plan")
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +154,7 @@ def test_a_long_run_is_drawn_with_its_peaks_and_few_points() -> None:
     assert len(run._repr_html_()) < 200_000
 
 
-@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare", "modes"])
+@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "modes", *slow("compare")])
 def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     from logger.commands.main import main
 

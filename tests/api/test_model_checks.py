@@ -74,6 +74,7 @@ def test_a_large_change_by_one_effect_is_no_other_car(tmp_path: Path) -> None:
         check_model("rav4-2009", MODEL, runs, silent, others, Tolerance.numbers)
 
 
+@pytest.mark.slow
 def test_a_free_one_in_feet_or_upside_down_is_refused(tmp_path: Path) -> None:
     run, = stuck(tmp_path, "B", 5).runs
     for factor, words in ((-1.0, "upside down"), (1 / 0.3048, "ft/s2")):

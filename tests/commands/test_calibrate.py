@@ -18,6 +18,8 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linearise import known_vehicle
 
+from ..support.slow import slow
+
 CONTRACT = ["speed_mps", "iri_per_accel_rms", "spread"]
 TEXT = vehicle_file("rav4-2009").read_text(encoding="utf-8")
 
@@ -34,10 +36,10 @@ def car(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def few_roads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sixth of the roads, where it is tested what is kept and not what is computed."""
+    """A twentieth of the roads, where it is tested what is kept and not what is computed."""
     computed = rms_calibration.calibrate
     monkeypatch.setattr(rms_calibration, "calibrate", lambda car, gain, settings: computed(
-        car, gain, replace(settings, roads=rms_calibration.ROADS // 6)))
+        car, gain, replace(settings, roads=rms_calibration.ROADS // 20)))
 
 
 class Call:
@@ -95,7 +97,7 @@ def test_the_second_time_it_is_found(
 
 
 @pytest.mark.usefixtures("few_roads")
-@pytest.mark.parametrize("more", [["--recompute"], ["--window", "30.48"], ["--seed", "2"], ["--low-pass", "15"]])
+@pytest.mark.parametrize("more", [["--recompute"], ["--low-pass", "15"], *slow(["--window", "30.48"], ["--seed", "2"])])
 def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
     first = Call(capsys, car, "--json")
     other = Call(capsys, car, "--json", *more)

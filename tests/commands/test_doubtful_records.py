@@ -133,6 +133,7 @@ def test_what_cannot_be_mended_is_refused_all_the_same(comfort) -> None:
     assert comfort(EVEN_S, at(EVEN_S, FINE), "--resample", "3")[0] == 2
 
 
+@pytest.mark.slow
 def test_estimate_refuses_and_mends_as_well(tmp_path: Path) -> None:
     road, drive = tmp_path / "road.csv", tmp_path / "drive.csv"
     called("road", "generate", "--class", "B", "--length", "400", "--out", road).check_returncode()

@@ -114,6 +114,7 @@ def test_without_a_line_the_distance_begins_anywhere_and_the_way_is_right(
     assert not (tmp_path / "town" / "profile.csv").exists()
 
 
+@pytest.mark.slow
 def test_extracting_again_leaves_nothing_of_before(place: Path, tmp_path: Path) -> None:
     assert called("extract", place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
     assert called("extract", place / "town.dump", "--out", tmp_path).returncode == 0

@@ -20,6 +20,7 @@ from logger.store.log.row_format import HEADER, format_row
 
 from ..support.command import called
 from ..support.drives.logged_rows import repeated_drives
+from ..support.slow import slow
 
 LONG = "Q" * 1_000_000
 WORDS = ("<script>alert(1)</script>", "=cmd|' /C calc'!A0", "+1+1", "-1+1", "@SUM(A1)", "\tx", "\x1b[2J\x1b]0;x\x07",
@@ -74,9 +75,9 @@ def check_written(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("verb", "option", "name"), [
-    ("report", "--out", "page.html"), ("convert", "--to", "a.csv"), ("convert", "--to", "a.kml"),
-    ("convert", "--to", "a.gpx"), ("convert", "--to", "a.geojson"), ("sections", "--out", "s.csv"),
-    ("passes", "--out", "p.html"), ("passes", "--visit", "v.kml")])
+    ("report", "--out", "page.html"), ("convert", "--to", "a.csv"), ("passes", "--visit", "v.kml"),
+    *slow(("convert", "--to", "a.kml"), ("convert", "--to", "a.gpx"), ("convert", "--to", "a.geojson"),
+          ("sections", "--out", "s.csv"), ("passes", "--out", "p.html"))])
 def test_of_logs(verb: str, option: str, name: str, stick: Path, tmp_path: Path) -> None:
     out = tmp_path / name
     done = called(verb, *sorted(stick.iterdir()), option, out, *(["--length", "100m"] if verb == "sections" else []))
@@ -94,6 +95,7 @@ def test_of_a_map_s_roads(ending: str, tmp_path: Path) -> None:
     check_written(out)
 
 
+@pytest.mark.slow
 def test_a_page_s_own_name(stick: Path, tmp_path: Path) -> None:
     done = called("report", stick, "--out", tmp_path / "\x1b[2J\u202e.html")
     assert done.returncode == 0

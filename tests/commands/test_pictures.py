@@ -43,11 +43,11 @@ COMMANDS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_result_is_a_page_that_stands_alone(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch,
-                                              capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_is_a_page_that_stands_alone_and_pictures_are_files_of_their_kind(
+        name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(folder)
     words, shown = COMMANDS[name]
-    assert main([*words, "--out", f"{name}.html"]) == 0
+    assert main([*words, *(word for ending in ("html", "png", "svg") for word in ("--out", f"{name}.{ending}"))]) == 0
     said = capsys.readouterr().out
     page = (folder / f"{name}.html").read_text("utf-8")
     assert all(one in page for one in shown)
@@ -56,12 +56,6 @@ def test_a_result_is_a_page_that_stands_alone(name: str, folder: Path, monkeypat
     assert "src=" not in page
     assert page.count("<svg") >= 1
     assert "nan" not in page.partition("<svg")[2]
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_pictures_alone_are_files_of_their_kind(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    assert main([*COMMANDS[name][0], "--out", f"{name}.png", "--out", f"{name}.svg"]) == 0
     data = (folder / f"{name}.png").read_bytes()
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     width, height = struct.unpack(">II", data[16:24])

@@ -112,14 +112,14 @@ def test_a_recording_that_was_cut_gives_what_it_holds(
     assert not any(apart_s[3:])
 
 
-def test_an_unverified_profile_is_named_in_every_log(ridelog: Path, tmp_path: Path) -> None:
+def test_an_unverified_profile_is_named_in_every_log(tmp_path: Path) -> None:
     dump = tmp_path / "raw.dump"
     writer = DumpWriter(dump, DumpHeader(None, {"driver": "pasco", "profile": "ps2119"}, {"baud": 9600}, "rav4-2009"))
     frame = (4096).to_bytes(2, "little") * 2 + (4424).to_bytes(2, "little")
     for count in range(3000):
         writer.write(Event(1_000_000 + 10_000 * count, "pasco", frame))
     writer.close()
-    done = call(ridelog, "replay", dump, "--out", tmp_path / "out")
+    done = called("replay", dump, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     (sidecar,) = (tmp_path / "out").glob("*-001.json")
     sensor = json.loads(sidecar.read_text())["sensor"]

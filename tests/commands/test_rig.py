@@ -15,6 +15,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 
 from ..support.drives.bench_rig import RATE_HZ, Recorded, Rig, random_table, shaken, swept_table, write_run
+from ..support.slow import slow
 
 NOISE_MPS2 = 0.01
 
@@ -80,7 +81,7 @@ def test_what_needs_a_road_cannot_be_tried_and_nothing_is_missing(
               "--out", str(bench / "out.yaml")])
 
 
-@pytest.mark.parametrize("run", ["random", "sweep"])
+@pytest.mark.parametrize("run", slow("random", "sweep"))
 def test_numbers_of_the_rig_are_identified(bench: Path, run: str, capsys: pytest.CaptureFixture[str]) -> None:
     found = reported(capsys, "identify", "--vehicle", bench / "true.yaml", bench / run, "--free",
                  "sprung_mass_kg,front.suspension_damping_n_s_per_m", "--start", "sprung_mass_kg=4")

@@ -57,8 +57,10 @@ def late_us(fake: FakeAdxl345, block: AccelerationBlock, begin_us: int) -> np.nd
     return block.t_us - taken_us
 
 
-@pytest.mark.parametrize("rate_hz", [200, 400, *slow(800)])
-@pytest.mark.parametrize("clock_error", [0.0, 0.0001, -0.013, 0.035])
+@pytest.mark.parametrize(("rate_hz", "clock_error"), [
+    (200, 0.0), (200, -0.013), (400, 0.035),
+    *slow((200, 0.0001), (200, 0.035), (400, 0.0), (400, 0.0001), (400, -0.013),
+          (800, 0.0), (800, 0.0001), (800, -0.013), (800, 0.035))])
 def test_every_sample_comes_once_at_the_time_when_it_was_taken(
     fake: FakeAdxl345, rate_hz: int, clock_error: float
 ) -> None:

@@ -401,6 +401,7 @@ VALUES = st.recursive(
     lambda one: st.lists(one, max_size=4) | st.dictionaries(st.sampled_from("xyz"), one, max_size=3), max_leaves=9)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(data=st.one_of(
     st.binary(max_size=200),

@@ -409,6 +409,7 @@ def cut(data, places):
     return [(a // 100 * 160_000, data[a:b]) for a, b in pairwise(edges)]
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     st.sampled_from(["ps2119", "lines"]),

@@ -17,6 +17,8 @@ from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
+from ..support.slow import slow
+
 SPACING_M, COUNT, SPEED_MPS, NOISE_MPS2 = 0.1524, 1024, 18.0, 0.06
 ROAD = RoadSpectrum.of_iri(2.5)  # as rough as the common road
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
@@ -95,7 +97,7 @@ def near(count: int) -> np.ndarray:
     return weight
 
 
-@pytest.mark.parametrize("variance_of", [stretches, pothole])
+@pytest.mark.parametrize("variance_of", [stretches, *slow(pothole)])
 def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[], np.ndarray]) -> None:
     """From the posterior covariance S of dense algebra, r = 1 - S_ii / d_i: the level by one step of the evidence of a
     Student t on the posterior of a Gaussian process, then the scale by MacKay's fixed point with four points that say
@@ -135,7 +137,7 @@ def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[],
 
 
 @pytest.mark.parametrize("variance_of", [stretches, pothole])
-@pytest.mark.parametrize("seed", [10, 11])
+@pytest.mark.parametrize("seed", [10, *slow(11)])
 def test_what_is_settled_on_explains_the_readings(variance_of: Callable[[], np.ndarray], seed: int) -> None:
     """Of the evidence that the true variances gain over a road as rough everywhere, most is gained."""
     reading = read(variance_of(), np.random.default_rng(seed))
@@ -166,6 +168,7 @@ def scores_of(log_variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.array([off[first:first + 52].mean() / found.log_std(first, 52) for first in firsts])
 
 
+@pytest.mark.slow
 def test_the_error_of_a_road_whose_processes_are_as_believed() -> None:
     """Log variance drawn from the prior: the processes, and a scale every 2.5 m as four points give it."""
     count, scores = a_block()[0].count, []
@@ -191,6 +194,7 @@ def test_a_step_of_the_level_is_followed_within_some_metres() -> None:
     assert np.mean(found) == pytest.approx(np.log(0.5), abs=0.35)
 
 
+@pytest.mark.slow
 def test_a_pothole_raises_no_level() -> None:
     """A hundred times the variance over 0.8 m: 15 m from it the road is as rough as without it."""
     block, _, _ = a_block()
@@ -320,6 +324,7 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
     assert scatter > 0.5 * unlearnt
 
 
+@pytest.mark.slow
 def test_a_place_that_jumps_costs_no_memory() -> None:
     """By 60 km within a block: what is far behind is carried, and matrices stay as small as of the longest block."""
     count = 400_000

@@ -102,6 +102,7 @@ def test_a_lone_bump(
     assert after.flags == {"faint"} or after.iri_m_per_km < max(1.0, 2 * exact[number + 12])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "least_r2", "bias"), [(FINE, 0.97, 0.2), (COARSE, 0.87, 0.5)])
 def test_stretches_four_times_as_rough_as_others(sensor: Sensor, least_r2: float, bias: float) -> None:
     """Every 45 m it changes. A coarse sensor hardly feels the smooth ones."""

@@ -126,6 +126,7 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     assert np.abs(looked.information / scale - information / scale).max() < 0.35
 
 
+@pytest.mark.slow
 def test_one_drive_over_a_road_of_which_only_the_kind_is_known() -> None:
     fitted = found(HALF, [[driven(HALF, track(280.0, 3), 14.0, 280.0, 3)]], MASS, DAMPERS)
     assert fitted.converged

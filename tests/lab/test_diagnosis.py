@@ -81,6 +81,7 @@ def test_a_clock_that_runs_a_little_fast_lacks_no_physics(flawless: SimulatedRun
     assert found.final_error < found.baseline_error
 
 
+@pytest.mark.slow
 def test_numbers_within_their_tolerance_lack_no_physics() -> None:
     rng = np.random.default_rng(5)
     numbers = (*SPRINGS, "sprung_mass_kg", "front.suspension_damping_n_s_per_m", "rear.tire_stiffness_n_per_m")
@@ -145,6 +146,7 @@ def test_one_effect_is_enough_to_ask_for() -> None:
     assert found.verdict == ("sensor_gain",) and not found.unexplained
 
 
+@pytest.mark.slow
 def test_none_can_be_asked_for_too(flawless: SimulatedRuns) -> None:
     found = diagnosed(flawless, [])
     assert nothing_is_missing(found) and found.candidates == () and found.undetectable == ()
@@ -189,6 +191,7 @@ def test_what_only_shifts_records_is_not_tried_on_runs_that_were_laid_where_the_
     assert obstacles_of(posterior_of(SimulatedRuns([first, *laid[1:]])), tried, []) == {}
 
 
+@pytest.mark.slow
 def test_effects_that_the_runs_would_hide_are_reported(flawless: SimulatedRuns) -> None:
     found = diagnosed(flawless, (*FEW, "wheel_lift"))
     hidden_ones = {one.effect.name: one.deviations for one in found.undetectable}

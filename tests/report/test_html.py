@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import logger.report
@@ -38,6 +38,7 @@ def test_no_part_of_a_page_obeys_a_text(made: Html) -> None:
     assert SAFE in made
 
 
+@settings(max_examples=30)
 @given(st.text(max_size=40))
 def test_what_is_shown_is_the_text_and_what_cannot_be_seen_its_number(text: str) -> None:
     seen = printable(text, keep="\n\t\u00a0")

@@ -23,6 +23,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from ..support.drives.replay import Rows, core_for, rows_of
 from ..support.drives.short_drive import SHORT_PLAN
 from ..support.faults.sensors import checked
+from ..support.slow import slow
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def cut_anywhere(events: list[Event], seed: int) -> list[Event]:
     return pieces
 
 
-@pytest.mark.parametrize("date", ["31,12,9999", "01,01,0001"])
+@pytest.mark.parametrize("date", ["31,12,9999", *slow("01,01,0001")])
 def test_a_date_that_cannot_be_ends_nothing(short_drive: Drive, expected: list[str], date: str) -> None:
     """At the end of time, at midnight: a second later there is no date any more."""
     nine = [(Event(event.t_us, "nmea", checked(f"GPZDA,235959.00,{date},00,00")
@@ -186,6 +187,7 @@ def test_a_sensor_read_eight_times_as_fast_gives_the_same_road(expected: list[st
     assert abs(np.median(ratio) - 1) < 0.05
 
 
+@pytest.mark.slow
 def test_a_serial_sensor_gives_the_same_road(short_rows: Rows, lines_rows: Rows) -> None:
     """Lines over a port, in bursts: as many windows, and the comfort of the noiseless record within a few per cent."""
     found = lines_rows.records

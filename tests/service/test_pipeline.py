@@ -143,6 +143,7 @@ def test_comfort_is_that_of_the_exact_weighting_of_the_same_samples(
     assert max(worst.values()) < 0.02, worst
 
 
+@pytest.mark.slow
 def test_the_15_hz_low_pass_is_a_setting(short_drive: Drive, records: list[WindowRecord]) -> None:
     config = replace(CONFIG, pipeline=replace(CONFIG.pipeline, low_pass_hz=15.0))
     passed = rows_of(short_drive.header, short_drive.events, config).records

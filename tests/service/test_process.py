@@ -203,6 +203,7 @@ def test_accelerometer_missing_at_start_while_the_rest_goes_on(
     assert service.terminate() == 0
 
 
+@pytest.mark.slow
 def test_a_sensor_beside_the_middle_line_is_reported(start: Callable[[], Service], tmp_path: Path) -> None:
     car = vehicle_file("rav4-2009-full").read_text()
     (tmp_path / "car.yaml").write_text(f"{car}\nsensor: {{left_m: -0.3}}\n")
@@ -217,6 +218,7 @@ def test_a_sensor_beside_the_middle_line_is_reported(start: Callable[[], Service
     assert service.errors.read_text().count(notice) == 1
 
 
+@pytest.mark.slow
 def test_logs_in_memory_are_reported(ridelog: Path, start: Callable[[], Service], tmp_path: Path) -> None:
     write_config(tmp_path, "250")
     config = tmp_path / "ridelog.yaml"

@@ -53,10 +53,9 @@ def minimum_alone(utc: datetime, t_s: float) -> list[str]:
           Receiver(minimum_alone, buffer_bytes=1024), Receiver(by_and_by),
           Receiver(rmc_gga_and(14), jumps=((-1, 2), (40, -2)))),
     *slow(Receiver(rmc_gga_and(2), jumps=((-1, 1), (40, -1)))),
-    Receiver(rmc_gga_and(2), every_s=2),
+    *slow(Receiver(rmc_gga_and(2), every_s=2)),
     *slow(Receiver(rmc_gga_and(2), every_s=5), Receiver(two_rates)),
-    Receiver(place_time_speed_apart),
-    *slow(Receiver(speed_first)),
+    *slow(Receiver(place_time_speed_apart), Receiver(speed_first)),
 ], ids=["full", "full at 4800", "full at 10 Hz", "full with RMC alone, a small buffer", "full now and then",
         "full, and its clock jumps by 2 s", "its clock jumps by 1 s", "each 2 s", "each 5 s", "speed each 3 s", "GLL",
         "VTG before GLL"])

@@ -27,7 +27,7 @@ from ..support.slow import slow
 WHOLE_ROWS = 185
 
 
-@pytest.mark.parametrize("rate_hz", [104, *slow(96, 98, 120, 150, 200, 400, 800)])
+@pytest.mark.parametrize("rate_hz", slow(104, 96, 98, 120, 150, 200, 400, 800))
 def test_a_sensor_of_another_rate_gives_the_same_iri(rate_hz: int) -> None:
     expected, _ = mean_iri(rows_at(100)[1])
     found, count = mean_iri(rows_at(rate_hz)[1])
@@ -66,8 +66,7 @@ def test_single_lines_lost_by_a_fast_sensor_are_seen(rate_hz: int) -> None:
 
 
 @pytest.mark.parametrize(("rate_hz", "every", "count"), [
-    (100, 50, 1),
-    *slow((104, 50, 1), (200, 100, 2), (100, 100, 1), (100, 100, 2), (100, 25, 1), (98, 50, 1),
+    *slow((100, 50, 1), (104, 50, 1), (200, 100, 2), (100, 100, 1), (100, 100, 2), (100, 25, 1), (98, 50, 1),
           (125, 50, 1), (150, 50, 1), (150, 100, 2))
 ])
 def test_rows_with_lines_lost_at_even_intervals_are_right_or_flagged(rate_hz: int, every: int, count: int) -> None:
@@ -118,8 +117,8 @@ def test_nothing_is_lost_on_a_line_that_loses_nothing() -> None:
 
 @pytest.mark.parametrize(("rate_hz", "share", "says"), [
     (80, 0.0, ("80 samples a second", "100")),
-    (100, 0.1, ("samples a second", "lost")),
     (100, 0.02, ("lost",)),
+    *slow((100, 0.1, ("samples a second", "lost"))),
 ])
 def test_status_says_which_rate_was_seen_and_what_to_do(
     tmp_path: Path, rate_hz: int, share: float, says: tuple[str, ...]

@@ -91,6 +91,7 @@ def test_a_wrong_factor_of_the_speed_is_found_in_a_town(factor: float, found_s: 
     assert np.median([doubted(town_drive(1200, seed, factor))[0] for seed in range(9)]) < found_s
 
 
+@pytest.mark.slow
 def test_a_good_receiver_is_not_doubted_in_queues_and_among_houses() -> None:
     assert sum(len(doubted(town_drive(3600, seed))[1]) for seed in range(40, 44)) == 0
 

@@ -28,8 +28,8 @@ from ..support.study_results import STUDIES, study_result
 
 SLOW = ("section-7-2-input", "table-6-3", "iso-8041-bursts", "table-6-1", "fig-4-27", "five-modes", "table-4-4",
         "section-7-2-speed", "fig-5-22", "fig-6-9", "section-7-2-other-vehicles", "section-7-2-sensor-position",
-        "fig-6-23")
-"""Studies that take more than half a second with the least effort."""
+        "fig-6-23", "fig-6-16", "table-6-5", "fig-4-22", "fig-4-21", "fig-4-31", "table-5-4")
+"""Studies that take more than a third of a second with the least effort."""
 
 
 def stands_alone(text: str, pictures: int) -> None:

@@ -96,6 +96,7 @@ def test_a_tube_lifts_a_tires_mean_by_its_area_over_the_patch() -> None:
     assert area / rav4().contact_patch_m == pytest.approx(chapter_5.TUBE_M**2 / 2 / 0.25, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_bump_and_bridge_stand_out_of_the_road_and_a_tube_does_not() -> None:
     rows = result("fig-5-22").tables[0].rows
     above = numbers(rows, 6)
@@ -105,6 +106,7 @@ def test_bump_and_bridge_stand_out_of_the_road_and_a_tube_does_not() -> None:
     assert max(float(str(row[7])) for row in rows[:2]) < 5
 
 
+@pytest.mark.slow
 def test_the_drift_with_speed_has_the_printed_signs_and_ours_has_none() -> None:
     rows = result("fig-6-9").tables[0].rows
     assert (rows[0][1], rows[-1][1]) == ("too high", "too low")
@@ -161,6 +163,7 @@ def test_the_place_of_the_sensor_matters_until_it_is_known() -> None:
     assert max(abs(one) for one in numbers(rows, 3)) < 4
 
 
+@pytest.mark.slow
 def test_the_estimate_is_near_the_least_possible_error_at_every_speed() -> None:
     rows = result("section-7-2-speed").tables[0].rows
     for by_rms, ours, least in zip(*(numbers(rows, column) for column in (3, 4, 5)), strict=True):

@@ -392,6 +392,7 @@ def test_a_law_that_will_not_do_is_refused_with_its_file(tmp_path: Path, functio
     assert str(caught.value).startswith(str(tmp_path / "mine.py"))
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
     """Friction of a wheel on rails; and rubber that creeps, which at last lets everything go."""
     page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")

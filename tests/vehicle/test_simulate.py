@@ -22,6 +22,7 @@ from logger.vehicle.structure import body_point, suspension_travel, tire_deflect
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.drives.newton_car import Told, judge, road_under
+from ..support.slow import slow
 
 RMS_GOAL = 1e-4
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -93,7 +94,10 @@ def error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.mean(expected**2, axis=0)).max())
 
 
-@pytest.mark.parametrize("case", CASES)
+LONG = ("half car, random road", "half car, stop and go", "quarter car, random road")
+
+
+@pytest.mark.parametrize("case", [*(one for one in CASES if one not in LONG), *slow(*LONG)])
 def test_simulate_agrees_with_newtons_laws(case: str) -> None:
     vehicle, track, way, _ = CASES[case]
     time_s, expected = judged(case)

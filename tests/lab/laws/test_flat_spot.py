@@ -37,6 +37,7 @@ def drafted(context: LawContext, axle: str) -> Draft:
     return next(one for one in FAMILY.drafts(context) if one.axle == axle and one.variant == "spot")
 
 
+@pytest.mark.slow
 def test_on_one_wheel_it_is_a_road_that_dips_once_in_each_turn() -> None:
     """A tire is a spring: what it is shorter by, the road might be lower by."""
     car = replace(CAR, model="quarter_car", rear=None, contact_patch_m=0.001)

@@ -36,6 +36,7 @@ def test_its_force_by_hand(variant: str) -> None:
         assert motion.force(motion.p, still._replace(body_mps=body_mps, rate_mps=rate_mps)) == pytest.approx(force_n)
 
 
+@pytest.mark.slow
 def test_an_active_one_holds_the_body_still() -> None:
     """The speed of the body, which is what they resist."""
     posterior = posterior_of(secret_runs())

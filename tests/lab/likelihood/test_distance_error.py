@@ -227,6 +227,7 @@ def test_a_wrong_wheel_and_a_late_clock_are_no_distance_errors(one: Chosen, star
     assert found.values[name] == pytest.approx(one.values[name], abs=0.002 if name == "delay_s" else 3e-4)
 
 
+@pytest.mark.slow
 def test_a_wrong_wheel_is_found_from_a_start_that_is_a_little_off() -> None:
     _, found = gain_of(noisy_runs([WHEEL]), chosen(SPEED_SCALE, {"scale": 1.008}))
     assert found.values["scale"] == pytest.approx(1.01, abs=5e-4)

@@ -19,6 +19,7 @@ from logger.vehicle.named_parameters import changed, read
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.runs_with_residual import CAR
 from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2
+from ...support.slow import slow
 
 
 def from_start(posterior: Posterior, *effects: Chosen) -> LinearModel:
@@ -64,7 +65,7 @@ def test_an_effect_is_found_with_its_number() -> None:
     assert found.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(300.0, abs=80.0)
 
 
-@pytest.mark.parametrize("start", [30.0, 800.0])
+@pytest.mark.parametrize("start", [30.0, *slow(800.0)])
 def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
     other = from_start(damped().posterior, tire_damping(start))
     assert other.score == pytest.approx(damped().score, abs=2 * CONVERGED)
@@ -109,6 +110,7 @@ def test_an_effect_that_does_nothing_explains_nothing_and_costs_its_numbers() ->
     assert rise == pytest.approx(np.log(posterior.freedom), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_not_there_gains_nothing_when_it_is_fitted() -> None:
     one = chosen(EFFECTS["sensor_bandwidth"], EFFECTS["sensor_bandwidth"].usual)
     for found in (from_start(plain().posterior, tire_damping(100.0)), from_start(plain().posterior, one)):

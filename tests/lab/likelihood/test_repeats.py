@@ -52,6 +52,7 @@ def test_it_is_the_noise_where_the_highest_frequencies_tell_of_less() -> None:
         assert noise == pytest.approx(LEVEL, rel=0.1) if expected else noise < 0.2 * LEVEL
 
 
+@pytest.mark.slow
 def test_a_comparison_says_so() -> None:
     found = compare(SimulatedRuns(rig_runs((2, 3))), CAR)
     (line,) = [one for one in headline(found) if "repeat each other" in one]

@@ -22,6 +22,7 @@ from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
+from ...support.slow import slow
 
 Array = npt.NDArray[np.float64]
 NOISE_MPS2 = 0.05
@@ -117,7 +118,8 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     assert not mark(found, "shift").found
 
 
-@pytest.mark.parametrize(("ratio", "words"), [(1.5, "rebound more than bump"), (0.7, "bump more than rebound")])
+@pytest.mark.parametrize(("ratio", "words"), [(1.5, "rebound more than bump"),
+                                              *slow((0.7, "bump more than rebound"))])
 def test_the_direction_of_asymmetric_dampers(ratio: float, words: str) -> None:
     """Rebound 2 r c / (1 + r), bump 2 c / (1 + r): their half difference is c (r - 1) / (r + 1)."""
     residuals = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": ratio})], NOISE_MPS2))
@@ -240,6 +242,7 @@ def test_every_test_has_a_sentence_with_all_of_its_figures() -> None:
         assert one.sentence.endswith("."), one.name
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_test_with_one_file(tmp_path: Path) -> None:
     """Named in the comparison's JSON, and with its sentence in the evidence."""
     (tmp_path / "their_tests.py").write_text("""

@@ -36,6 +36,7 @@ def added(runs: SimulatedRuns) -> AddedEffects:
     return add(posterior_of(runs), [], [hidden("sensor_offset", offset_m=0.2)])
 
 
+@pytest.mark.slow
 def test_the_number_that_was_hidden_is_found_within_its_error(added: AddedEffects) -> None:
     (one,) = added.effects
     assert added.names == ("sensor_offset",) and added.new == (one,)

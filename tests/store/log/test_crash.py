@@ -17,7 +17,7 @@ from ...support.faults.disk_models import CrashModel, RecordingFiles
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, 1, [one.name for one in HAZARDS[1:]]), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=0), ids=label)
 def test_cut_at_every_change(tmp_path: Path, hazard: Hazard, case: object) -> None:
     found = hazard.trial(tmp_path, case)
     assert found.wrong == ()

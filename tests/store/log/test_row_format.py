@@ -194,6 +194,7 @@ def test_cut_at_every_byte_keeps_the_whole_rows() -> None:
         assert intact(whole[:cut]) == rows[:kept]
 
 
+@pytest.mark.slow
 def test_any_wrong_byte_costs_its_own_row_only() -> None:
     rows = [format_row(replace(RECORD, segment=n)) for n in range(3)]
     whole = log_of(rows)
