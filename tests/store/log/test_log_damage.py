@@ -17,7 +17,8 @@ from ...support.faults.crashes import FACTS, OFFSET_US, problems, window
 from ...support.faults.log_damage import HAZARDS
 from ...support.faults.trials import Hazard, cases_for_tests, label
 
-LONG = ("a bit flipped in the sidecar of an open log", "damage inside an open log", "damage inside an open log and the file that was made of it")
+LONG = ("a bit flipped in the sidecar of an open log", "damage inside an open log",
+        "damage inside an open log and the file that was made of it")
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, 1, LONG), ids=label)
