@@ -1,14 +1,128 @@
-"""What chips on an I2C bus have in common: what a failed transfer means, which address a chip answers at, and whether
-it still holds its settings."""
+"""Chips on an I2C bus: their registers, what a failed transfer means, and buffers that the host empties.
+
+Register fields as declarations.
+
+Problem: shifts and masks scattered through a driver go wrong silently: a value too large for its field spills
+into the neighbour, a write clears bits that somebody else owns, and some registers change the chip when they are
+merely read. Solution: a driver declares each register and field once. A field refuses what does not fit, an update
+touches only the declared bits and reads them back, and a register whose read has a side effect is of another type
+that has no plain ``read`` at all.
+
+An ``OSError`` of the bus passes through; the driver knows what it means for its device.
+
+What chips on an I2C bus have in common: what a failed transfer means, which address a chip answers at, and whether
+it still holds its settings.
+
+What chips have in common that sample by their own clock into a buffer, which the host empties on a bus.
+
+Problem: such a chip's rate is no more than nominal, its buffer gives samples without times, and one that ran over has
+lost some. Solution: ``BufferedChip`` empties the buffer and says where entries were lost, also by a transfer that
+failed; ``BufferedDecoder`` gives the samples their times (``SampleClock``) and starts them over after a loss;
+``buffered_source`` looks often enough that the buffer stays half empty. A chip's own file has its registers, the bytes
+of an entry, and their scale.
+"""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost, Timeout, WrongDevice
-from drivers.ports import I2cBus
-from drivers.registers import Register, RegisterField
+import numpy as np
+import numpy.typing as npt
+
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, Timeout, WrongDevice
+from drivers.hardware import I2cBus, Machine
+from drivers.readings import UNREAD_CHIP, AccelerationBlock
+from drivers.sample_clock import DatedSamples, UndatedSamples
+from drivers.sources import US_PER_S, ChipSource, Scattered
+
+
+@dataclass(frozen=True)
+class RegisterField:
+    """Bits ``high_bit`` down to ``low_bit`` of a byte register, both included."""
+
+    name: str
+    high_bit: int
+    low_bit: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.low_bit <= self.high_bit <= 7:
+            raise ValueError(f"field {self.name}: bits {self.high_bit}:{self.low_bit} are not inside a byte")
+
+    @property
+    def largest(self) -> int:
+        return (1 << (self.high_bit - self.low_bit + 1)) - 1
+
+    @property
+    def mask(self) -> int:
+        return self.largest << self.low_bit
+
+    def extract(self, byte: int) -> int:
+        """The field's value in ``byte``."""
+        return (byte & self.mask) >> self.low_bit
+
+    def insert(self, byte: int, value: int) -> int:
+        """``byte`` with this field set to ``value``; SettingsError when it does not fit."""
+        if not 0 <= value <= self.largest:
+            raise SettingsError(f"{self.name} takes 0 to {self.largest}, not {value}")
+        return (byte & ~self.mask) | (value << self.low_bit)
+
+
+@dataclass(frozen=True)
+class Register:
+    """A byte register that may be read at any time. ``reset_value`` is what it holds after power-on."""
+
+    name: str
+    address: int
+    reset_value: int = 0
+
+    def read(self, bus: I2cBus, chip: int) -> int:
+        return bus.read_byte_data(chip, self.address)
+
+    def check(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
+        """Read the register once; BadReply when a field does not hold its value."""
+        byte = self.read(bus, chip)
+        for field, value in values.items():
+            if field.extract(byte) != value:
+                raise BadReply(
+                    f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X}: "
+                    f"{field.name} reads {field.extract(byte)}, expected {value}"
+                )
+
+    def update(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
+        """Set the fields, leave all other bits as they are, and check that the chip took them.
+
+        SettingsError when a value does not fit (nothing is written then), BadReply when it reads back otherwise.
+        """
+        byte = self.read(bus, chip)
+        for field, value in values.items():
+            byte = field.insert(byte, value)
+        bus.write_byte_data(chip, self.address, byte)
+        self.check(bus, chip, values)
+
+
+@dataclass(frozen=True)
+class ToggleRegister:
+    """A register whose every read flips a state of the chip: 0x00 answers "I was running, now I am not", 0xFF answers
+    "I was not, now I am running". A read that failed may or may not have flipped it, so it is never repeated blindly.
+    """
+
+    name: str
+    address: int
+
+    def flip(self, bus: I2cBus, chip: int) -> bool:
+        """Flip the state by one read. True: the chip runs now. BadReply when the answer is neither 0x00 nor 0xFF."""
+        answer = bus.read_byte_data(chip, self.address)
+        if answer not in (0x00, 0xFF):
+            raise BadReply(
+                f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X} "
+                f"answered 0x{answer:02X}, expected 0x00 or 0xFF"
+            )
+        return answer == 0xFF
+
 
 NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
 
@@ -106,3 +220,145 @@ class ConfiguredChip:
         if self._chip is None:
             raise NotPresent(f"the {self.name} has not been started")
         return self._chip
+
+
+LONGEST_LOOK_US = 50_000
+"""Between two looks: how late a reading may come, whatever the buffer holds."""
+
+
+class BufferState(NamedTuple):
+    """What a chip says of its buffer: how many entries it holds, whether some were lost, and the bytes that said so."""
+
+    entries: int
+    overrun: bool
+    said: bytes
+
+
+class BufferedChip(ConfiguredChip, ABC):
+    """One chip on a bus. A driver's ``start`` empties the buffer and sets ``_lost``: what was before is gone.
+
+    entry_bytes     of one entry, which a read at ``data_address`` takes out of the buffer
+    """
+
+    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[RegisterField, int]]],
+                 data_address: int, entry_bytes: int) -> None:
+        super().__init__(name, bus, settings)
+        self._data_address = data_address
+        self._entry_bytes = entry_bytes
+        self._lost = True
+
+    @abstractmethod
+    def start(self) -> int:
+        """Find the chip, set it up with an empty buffer, and let it measure. Gives the address that it answers at."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Let the chip stand by. Never raises."""
+
+    @abstractmethod
+    def _waiting(self, chip: int) -> BufferState:
+        """Ask the chip about its buffer. OSError of the bus."""
+
+    @abstractmethod
+    def _marked(self, said: bytes, lost: bool) -> bytes:
+        """What the chip said, with its mark of an overrun as ``lost`` has it."""
+
+    def read(self, now_us: Callable[[], int]) -> tuple[int, bytes]:
+        """The time at which the chip was asked how many entries it holds [us], and its answer: what it said, then each
+        entry, oldest first. Empty where it holds none.
+
+        Its mark of an overrun is also set where entries were lost between the last answer and this one: by a transfer
+        that failed, or because the chip has been started.
+        """
+        chip = self._started()
+        try:
+            waiting = self._waiting(chip)
+            t_us = now_us()
+            if not waiting.entries:
+                return t_us, b""
+            lost = self._lost or waiting.overrun
+            self._lost = True  # until all entries are here
+            entries = [self._entry(chip) for _ in range(waiting.entries)]
+        except OSError as error:
+            raise bus_fault(error, chip) from error
+        self._lost = False
+        return t_us, self._marked(waiting.said, lost) + b"".join(entries)
+
+    def _entry(self, chip: int) -> bytes:
+        data = bytes(self._bus.read_i2c_block_data(chip, self._data_address, self._entry_bytes))
+        if len(data) != self._entry_bytes:
+            raise BadReply(f"{self.name} at 0x{chip:02X}: a read of {self._entry_bytes} bytes gave {len(data)}")
+        return data
+
+
+class Entries(NamedTuple):
+    """Decoded entries of one answer: ``after_loss``, some were lost before them; accelerations (n, 3) [m/s2]; at an
+    end of the range (n,)."""
+
+    after_loss: bool
+    accel_mps2: npt.NDArray[np.float64]
+    clipped: npt.NDArray[np.bool_]
+
+
+class BufferedDecoder(ABC):
+    """What ``BufferedChip.read`` gave, in; samples with their times, out.
+
+    check    what to look at where samples are lost
+    """
+
+    name: str
+    check: ClassVar[str] = ("Check the wires of the bus, its clock (400 kHz for 400 samples a second and more), and "
+                            "what else keeps the computer busy")
+
+    def __init__(self, rate_hz: int, rate_tolerance: float) -> None:
+        self._samples = DatedSamples(rate_hz, rate_tolerance)
+        self._overruns = 0
+
+    @abstractmethod
+    def _decoded(self, data: bytes) -> Entries:
+        """The entries of one answer. BadReply for what is none."""
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the samples that come; empty: nothing."""
+        return self._samples.doubt(self.check)
+
+    @property
+    def note(self) -> str:
+        """How the samples come; empty: as they should."""
+        return self._samples.note
+
+    unread = UNREAD_CHIP
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What came in so far, and what is missing in it."""
+        clock = self._samples.clock
+        return {"samples": self._samples.good, "overruns": self._overruns, "lost": clock.lost,
+                "resyncs": clock.resyncs, "undated": self._samples.undated}
+
+    def feed(self, t_us: int, data: bytes) -> None:
+        """Take the entries of one look at ``t_us``. BadReply (and nothing taken) for bytes that are none."""
+        entries = self._decoded(data)
+        count = len(entries.accel_mps2)
+        self._overruns += entries.after_loss
+        self._samples.add(UndatedSamples(
+            after_loss=entries.after_loss, arrivals_us=np.full(count, t_us, dtype=np.int64),
+            accel_mps2=entries.accel_mps2, clipped=entries.clipped, good=np.ones(count, dtype=np.bool_)))
+
+    def flush(self) -> None:
+        """No more will come: the next ``take`` gives all."""
+        self._samples.flush()
+
+    def take(self) -> AccelerationBlock:
+        """The samples whose times are certain by now."""
+        return self._samples.take()
+
+
+def buffered_source(name: str, machine: Machine, i2c_bus: int, make_chip: Callable[[I2cBus], BufferedChip],
+                    rate_hz: int, entries: int) -> ChipSource:
+    """Looks that leave a buffer of so many entries half empty."""
+    interval_us = US_PER_S // rate_hz
+    look_us = min(LONGEST_LOOK_US, entries // 2 * interval_us)
+    return ChipSource(name, lambda: machine.open_i2c(i2c_bus, None), make_chip, machine.now_us,
+                      Scattered(look_us, interval_us, machine.sleep))

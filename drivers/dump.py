@@ -26,10 +26,9 @@ from types import TracebackType
 from typing import Any
 
 from drivers.accelerometers import accelerometers
-from drivers.disk import FileSystem
+from drivers.disk import FileSystem, open_regular
 from drivers.errors import DumpError, shortened
-from drivers.events import GPS, Event
-from drivers.regular_file import open_regular
+from drivers.readings import GPS, Event
 
 VERSION = "1"
 ACCELEROMETERS = tuple(accelerometers())

@@ -1,9 +1,25 @@
-"""Real wires: the only file that imports smbus2 and pyserial.
+"""The wires of this machine: what drivers ask of one, how one is opened, and which is the board's own.
+
+The two kinds of wire a driver may hold, as protocols. Real ones and replayed ones look the same.
+
+Which serial port is on the pins of a Raspberry Pi, where somebody named another one.
+
+Problem. /dev/serial0 is on pins 8 and 10 of every Raspberry Pi but the 5 and its like, where it is the three-pin debug
+connector: a receiver on the pins is silent there, however right its wires. And /dev/ttyAMA0, which is right on those,
+is the Bluetooth chip on a 3, a 4 and a Zero W. Solution. What the names lead to, and the model, are read from the
+kernel.
+
+Sources: Raspberry Pi documentation, computers/configuration/uart.adoc (primary and secondary UART by model; pull
+request 3294 of raspberrypi/documentation); overlays/README (dtparam uart0).
+
+Real wires: the only file that imports smbus2 and pyserial.
 
 Problem: both libraries report a missing device, missing rights and a pulled plug in ways of their own, and pyserial's
 ``read`` waits for a full buffer; and some USB adapters cannot read several I2C registers in one transfer. Solution: two
-functions that open a wire behind the protocols of ``drivers.ports``. What cannot be opened is NotPresent with the next
+functions that open a wire behind these protocols. What cannot be opened is NotPresent with the next
 step to take; what breaks later is an ``OSError`` with an errno, whatever the library raises; closing raises nothing.
+
+What a source may use of the computer that it runs on, handed in, so that tests can hand in another one.
 """
 
 from __future__ import annotations
@@ -12,16 +28,70 @@ import errno
 import logging
 import os
 import select
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
-from drivers.errors import NotPresent, SettingsError
-from drivers.foreign_faults import as_os_error, error_number, why_forbidden, words_of
-from drivers.ports import BytePort, I2cBus
+from drivers.errors import NotPresent, SettingsError, as_os_error, error_number, why_forbidden, words_of
 
 if TYPE_CHECKING:
     from serial import Serial
     from smbus2 import SMBus
+
+
+class I2cBus(Protocol):
+    """The part of smbus2's ``SMBus`` that drivers use. A fault is an ``OSError`` with the kernel's errno
+    (121 EREMOTEIO or 6 ENXIO: not acknowledged, 110 ETIMEDOUT: bus held, 16 EBUSY: a kernel driver owns it)."""
+
+    def read_byte_data(self, i2c_addr: int, register: int) -> int: ...
+    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None: ...
+    def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]: ...
+    def close(self) -> None: ...
+
+
+class BytePort(Protocol):
+    """A serial line. ``read`` waits up to ``timeout_s`` for the first byte, then returns what is there
+    (at most ``size``); empty means silence. A port that has gone raises ``OSError``."""
+
+    def read(self, size: int, timeout_s: float) -> bytes: ...
+    def write(self, data: bytes) -> int: ...
+    def close(self) -> None: ...
+
+
+MODEL = "sys/firmware/devicetree/base/model"
+DEBUG = "ttyAMA10"
+SWITCH_ON = "switch the port on (sudo raspi-config, Interface Options, Serial Port: no login shell, but the hardware)"
+_SINCE_5 = ("Raspberry Pi 5", "Raspberry Pi Compute Module 5")  # "Raspberry Pi 500" begins so too
+_ON_THE_PINS = "pins 8 and 10 of a {model} are /dev/ttyAMA0: write dtparam=uart0=on into /boot/firmware/config.txt, " \
+               "restart, and set the port to /dev/ttyAMA0"
+
+
+def port_advice(port: str, root: Path = Path("/")) -> str:
+    """What to do about a port of the board that is not the one on its pins, or is off; empty: nothing is known.
+    ``root``: below it lie ``dev`` and ``sys``."""
+    try:
+        place = root / Path(port).relative_to("/")
+        target = place.resolve()
+        is_there = place.exists()
+        model = (root / MODEL).read_text("ascii", "replace").strip("\0\n ") if (root / MODEL).exists() else ""
+        is_second = target == (root / "dev/serial1").resolve() and (root / "dev/serial1").exists()
+    except (OSError, ValueError):
+        return ""
+    if target.name == DEBUG:
+        return f"{port} is the three-pin debug connector; {_ON_THE_PINS.format(model='Raspberry Pi 5')}"
+    if model.startswith(_SINCE_5):
+        is_of_the_board = Path(port).name in ("serial0", "ttyS0") and target.name != "ttyAMA0"
+        is_off = Path(port).name == "ttyAMA0" and not is_there
+        return _ON_THE_PINS.format(model="Raspberry Pi 5") if is_of_the_board or is_off else ""
+    if is_second and Path(port).name != "serial0":
+        return (f"{port} is not on pins 8 and 10, but on the Bluetooth chip where the Pi has one: set the port to "
+                "/dev/serial0")
+    if model.startswith("Raspberry Pi") and Path(port).name in ("serial0", "ttyS0") and not is_there:
+        return SWITCH_ON
+    return ""
+
 
 WRITE_TIMEOUT_S = 1.0
 _PIPES = tuple(f"pipe_abort_{use}_{end}" for use in ("read", "write") for end in "rw")
@@ -198,3 +268,28 @@ def _serial_hint(error: Exception, path: str = "/dev/PORT") -> str:
     reason = os.strerror(number) if number is not None else words_of(error)
     return (f"cannot be opened as a serial port: {reason}; unplug the device and plug it in again, and try another "
             "cable or adapter if this stays")
+
+
+def wait_readable(descriptor: int, timeout_s: float) -> bool:
+    """Wait until a file has something to read, at most so long [s]; False: it has not."""
+    return bool(select.select([descriptor], [], [], timeout_s)[0])
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Clock, buses, ports, and files of the kernel.
+
+    now_us           the monotonic clock [us]
+    sleep            takes seconds
+    open_i2c         a bus by its number, as ``drivers.hardware.open_i2c``
+    open_serial      a port by its path and baud rate, as ``drivers.hardware.open_serial``
+    wait_readable    as the function above
+    root             below it lie ``sys`` and ``dev``
+    """
+
+    now_us: Callable[[], int]
+    sleep: Callable[[float], None]
+    open_i2c: Callable[[int, int | None], I2cBus] = open_i2c
+    open_serial: Callable[[str, int], BytePort] = open_serial
+    wait_readable: Callable[[int, float], bool] = wait_readable
+    root: Path = Path("/")

@@ -1,15 +1,57 @@
-"""What instruments say, after decoding: frozen readings with their time beside them.
+"""What goes between a wire and a user: bytes, readings, words of recordings that are believed, settings.
+
+What a wire brought: bytes, with their source and time.
+
+What instruments say, after decoding: frozen readings with their time beside them.
 
 Times are integer microseconds of the monotonic clock (``t_us``): the resolution of a recorded dump,
 so that a drive that was recorded and one that is replayed carry the very same times.
+
+Which words of a recording are believed.
+
+Problem. A recording comes from anybody. A word in it that is taken for a path would have a file of this machine read,
+written or, where it is Python, run. Solution. What a recording says is asked for here and nowhere else, and comes back
+as a plain number, as yes or no, or as one of the names that are registered on this machine; anything else is refused.
+No string of a recording is given out as it stands. What a recording is called may become the name of a folder, and
+never leads out of the folder that it is put into.
+
+What a setting may be, as data.
+
+Problem: an instrument's settings belong into its own file, but how a settings file is read and how a wrong value is
+refused with its line belongs to the program that reads it. Solution: an instrument declares for each key what may stand
+there; the reader knows these few kinds. Only what fits none of them brings a function of its own (``Special``), and
+that asks a ``SettingNode``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
+
+from drivers.errors import SettingsError, shortened
+
+
+class Event(NamedTuple):
+    """Bytes from one source at one time.
+
+    t_us      monotonic time [us]: when the read was made, or when the bytes arrived
+    source    name of an accelerometer, or ``GPS``
+    data      at least one byte
+    """
+
+    t_us: int
+    source: str
+    data: bytes
+
+
+GPS = "nmea"
+
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
@@ -59,3 +101,143 @@ class Fix:
     satellites: int | None
     hdop: float | None
     may_wait: bool = False
+
+
+ANYTHING = object()
+
+
+class RecordedWords:
+    """What a recording says about itself, by key. Each asking method gives ``usual`` for what it does not say, and
+    raises SettingsError for what cannot be."""
+
+    def __init__(self, said: Mapping[str, Any]) -> None:
+        self._said = said
+
+    def says(self, key: str, value: object = ANYTHING) -> bool:
+        """Whether it says this value, or anything, under a key."""
+        return key in self._said and (value is ANYTHING or self._said[key] == value)
+
+    def number(self, key: str, usual: float, least: float, most: float) -> float:
+        """A number from ``least`` to ``most``."""
+        value = self._said.get(key, usual)
+        if type(value) not in (int, float) or not least <= value <= most:
+            raise self._wrong(key, f"a number from {least:g} to {most:g}")
+        return float(value)
+
+    def number_or_none(self, key: str, usual: float | None, least: float, most: float) -> float | None:
+        """The same, or nothing, where it says ``null``."""
+        value = self._said.get(key, usual)
+        return None if value is None else self.number(key, value, least, most)
+
+    def whole(self, key: str, usual: int, least: float = -inf) -> int:
+        """A whole number of at least ``least``."""
+        value = self._said.get(key, usual)
+        if type(value) is not int or value < least:
+            limit = f" of at least {least:g}" if least > -inf else ""
+            raise self._wrong(key, f"a whole number{limit}")
+        return value
+
+    def flag(self, key: str) -> bool:
+        """Yes or no; no where nothing is said."""
+        value = self._said.get(key, False)
+        if type(value) is not bool:
+            raise self._wrong(key, "true or false")
+        return value
+
+    def name(self, key: str, usual: str, registered: Collection[str], otherwise: str = "") -> str:
+        """One of the names that are registered here. ``otherwise``: what a person can do about another one."""
+        value = self._said.get(key, usual)
+        for one in registered:
+            if one == value:
+                return one
+        raise self._wrong(key, f"{otherwise}{'one of ' if len(registered) > 1 else ''}{', '.join(registered)}")
+
+    def group(self, key: str) -> RecordedWords:
+        """An object, whose own words are asked for likewise; an empty one where nothing is said."""
+        value = self._said.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self._wrong(key, "an object")
+        return RecordedWords(value)
+
+    def _wrong(self, key: str, expected: str) -> SettingsError:
+        return SettingsError(f"expected {expected} for {key!r}, found {shortened(str(self._said.get(key)))}")
+
+
+def folder_name(word: str) -> str:
+    """What a recording is called, as the name of a folder. SettingsError for one that would lead elsewhere or can be
+    no name: ``..``, nothing, anything with a / in it."""
+    if word in ("", ".", "..") or "/" in word or "\0" in word:
+        raise SettingsError(f"expected a recording whose name can be that of a folder, found {shortened(word)}: rename "
+                            "it")
+    return word
+
+
+class SettingNode(Protocol):
+    """A value of a settings file, with its line. Each asking method raises the reader's own error when the value is
+    something else; ``wrong`` makes that error: file, line, what was expected, what was found."""
+
+    @property
+    def content(self) -> Any: ...
+    @property
+    def plain(self) -> bool: ...
+    def wrong(self, expected: str) -> Exception: ...
+    def mapping(self, required: Iterable[str] = (), optional: Iterable[str] = ()) -> Mapping[str, Self]: ...
+    def items(self) -> Sequence[Self]: ...
+    def text(self) -> str: ...
+    def number(self, low: float | None = None, high: float | None = None) -> float: ...
+    def integer(self, low: int | None = None, high: int | None = None) -> int: ...
+    def path(self, after: str = "") -> Path: ...
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from ``low`` to ``high``."""
+
+    low: int
+    high: int
+
+
+@dataclass(frozen=True)
+class Decimal:
+    """A number from ``low`` to ``high``."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """One of some whole numbers."""
+
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Flag:
+    """``true`` or ``false``."""
+
+
+@dataclass(frozen=True)
+class Text:
+    """Any text that is not empty."""
+
+
+@dataclass(frozen=True)
+class Special:
+    """What ``read`` makes of the value. ``examples``: pieces of YAML that it takes."""
+
+    read: Callable[[SettingNode], Any]
+    examples: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class OrNone:
+    """``word`` for None (``null``: any way YAML has to write nothing), or what ``kind`` says."""
+
+    word: str
+    kind: Whole | Decimal | OneOf | Flag | Text | Special
+
+
+Kind = Whole | Decimal | OneOf | Flag | Text | Special | OrNone
+
+BAUDS = OneOf((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600))

@@ -1,4 +1,17 @@
-"""Times of samples taken at even intervals, from the times at which they arrived on a serial line.
+"""The times of samples whose instrument says none, out of the times at which they arrived.
+
+The period of a sampler from the times at which some of its samples arrived at once.
+
+The problem: samples that are lost at even intervals look like a slower sensor. How many arrived in how much time does
+not distinguish one from the other.
+
+The solution: what arrives at once does so a multiple of the true period after any other such sample, however many are
+lost between them: the arrivals stand on a comb. Its period is where the periodogram of the instants is largest
+(Schuster 1898), which is the mean resultant length of their phases (Mardia and Jupp 2000, 2.3): 1 where all have one
+phase, 0.9 with a jitter of a quarter of the period, 0.64 with half of it. By chance m phases come to R or more with
+probability exp(-m R^2) (Rayleigh's test).
+
+Times of samples taken at even intervals, from the times at which they arrived on a serial line.
 
 The problem: a line delivers late and in bursts, and it says neither at which rate the samples were taken nor which of
 them were lost on the way. A rate that is taken for another one, or a lost sample that is closed up, makes a smooth road
@@ -7,17 +20,98 @@ rough without any sign of it.
 The solution: a sample arrives a latency after it was taken that is never negative and now and then small. Arrival minus
 index times period is therefore bounded below by the true time line, and the line is the lower envelope. Where samples
 are lost, the envelope makes a step up by whole periods, and stays; where the link only jams, it comes back.
+
+Decoded samples that wait for their times.
+
+Problem: where the times of samples are recovered from arrivals (``drivers.sample_clock``), they are known a second or
+so after the samples. Solution: samples are queued here beside the clock, and come out as a block with their times.
 """
 
 from __future__ import annotations
 
 from itertools import combinations, pairwise
+from math import log, sqrt
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from drivers.sampling_comb import TIMER_US, is_ticked, sampling_period
+from drivers.readings import AccelerationBlock
+
+Floats = npt.NDArray[np.float64]
+
+CHANCE = 1e-6  # of a comb where there is none: tried each 1.28 s, once in 15 days of driving
+CLEARER = 2.0  # than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without
+NEARLY = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
+TICKED = 0.7
+TIMER_US = 20_000.0  # of adapters: 16 ms, if they are left as they come
+BIN_US = 250.0  # of a period of 1 ms, the shortest, a quarter: the resultant is 10 % low there, 1 % at 3 ms
+NEXT = 1.1  # a period so much longer has, over any length that is looked at, another comb
+STEPS_PER_CYCLE = 8  # of the whole span: a comb between two of the periods tried loses 1 % at most
+
+
+def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_gap_us: float,
+                    lost_most: float) -> float | None:
+    """The period [us] of the comb on which the arrivals stand, where it says that samples are lost; else None.
+
+    instants_us      (m,) arrivals [us], those with the least latency of each piece of time
+    count            samples that came from the first of them to the last
+    slope_us         arrivals per sample [us]: the period of a sensor that loses nothing
+    longest_gap_us   usual time between two of the arrivals [us]
+    lost_most        largest share of samples that may be lost
+    """
+    if count < 2 or slope_us <= 0:  # all of them at one moment have no period
+        return None
+    step_us = slope_us / count / STEPS_PER_CYCLE
+    tried = int(slope_us * lost_most / step_us) - STEPS_PER_CYCLE
+    shorter = slope_us * (1 - lost_most) + step_us * np.arange(tried, dtype=np.float64)
+    if len(shorter) == 0:
+        return None
+    lengths = resultant(instants_us, shorter)
+    best = int(np.argmax(lengths))
+    if lengths[best] < sqrt(log(max(1.0, len(shorter) / STEPS_PER_CYCLE) / CHANCE) / len(instants_us)):
+        return None
+    near = slope_us + step_us * np.arange(-STEPS_PER_CYCLE, STEPS_PER_CYCLE + 1, dtype=np.float64)
+    if lengths[best] < CLEARER * resultant(instants_us, near).max():
+        return None
+    period_us = float(shorter[best])
+    multiples = period_us * np.arange(2, 1 + max(2, int(longest_gap_us / period_us)), dtype=np.float64)
+    coarser = max(resultant(instants_us, multiples).max(), _coarsest(instants_us, period_us))
+    if coarser >= lengths[best]:
+        return None  # the comb of an adapter's timer or of what reads the line: of the sampler's own all teeth are seen
+    return period_us
+
+
+def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
+    """Tell whether arrivals (m,) [us] stand on the ticks of a timer of nearly a multiple of the samples' period, up to
+    ``longest_us``: of the samples themselves all teeth are seen, not every second or third."""
+    step = 1.0 / (STEPS_PER_CYCLE * (instants_us[-1] - instants_us[0]))
+    frequencies = [
+        np.arange((1 - NEARLY) / multiple_us, (1 + NEARLY) / multiple_us, step)
+        for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)
+    ]
+    tried = np.concatenate([np.empty(0), *frequencies])
+    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > TICKED
+
+
+def _coarsest(instants_us: Floats, period_us: float) -> float:
+    """How far instants (m,) [us] have one phase in the longer period, up to ``TIMER_US``, where they have it most: of
+    an adapter's timer, which samples of another period fill unevenly. By the Fourier transform of their histogram; 0
+    where there is no longer period."""
+    bins = np.rint((instants_us - instants_us[0]) / BIN_US).astype(np.int64)
+    length = 1 << int(STEPS_PER_CYCLE // 2 * (bins[-1] + 1)).bit_length()
+    first, end = (int(length * BIN_US / us) for us in (TIMER_US, NEXT * period_us))
+    if end <= first:
+        return 0.0
+    lines = np.abs(np.fft.rfft(np.bincount(bins), length)[first:end])
+    return float(lines.max()) / len(instants_us)
+
+
+def resultant(instants_us: Floats, periods_us: Floats) -> Floats:
+    """(p,): how far instants (m,) have one phase in each period (p,): from 0, none, to 1, all."""
+    phases = (2j * np.pi / periods_us)[:, None] * (instants_us - instants_us[0])[None, :]
+    return np.asarray(np.abs(np.exp(phases).mean(axis=1)))
+
 
 Times = npt.NDArray[np.int64]
 
@@ -52,7 +146,7 @@ class SampleClock:
        second now and then: once in 1,000 samples.) Arrivals that stay more than ``OFF_US`` late, or that come that much
        too early, make the clock start over.
     5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
-       those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
+       those of one that loses samples on the comb of its own period (``drivers.sample_clock``): where they do, in the
        samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
        neither, nor on a line with the losses that were noticed, the profile's own rate is taken; a device of another
        rate is refused until it has kept one through ``STEADY`` findings in a row.
@@ -448,3 +542,126 @@ def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:
     slope_us = float(np.median(slopes))
     off_us = sorted(point.arrival_us - slope_us * count for point, count in zip(points, counts, strict=True))
     return slope_us, off_us[-1 - len(off_us) // 4] - off_us[0]
+
+
+WORTH_TELLING = 0.005
+"""Share of lost samples from which on a person is asked to look for the cause."""
+
+DRIFT = 0.005
+"""Share of its rate through which a clock has to drift to be reported: a quartz clock keeps to a hundredth of that."""
+
+BURSTS_S = 0.2
+"""Samples that come so much at a time are kept by something on the way: our own reading makes 0.1 s at most."""
+
+LONGEST_BURSTS_S = 0.45
+"""More at a time are late for rows: a sample is dated a second after its arrival and given up 2 s after it was taken
+(measured: the oldest of 0.4 s are dated after 1.6 s, of 0.5 s after 2.0 s, of 1 s after 3.0 s)."""
+
+JUDGED_SAMPLES = 500
+
+
+class UndatedSamples(NamedTuple):
+    """Samples without times: arrivals (n,) [us], acceleration (n, 3) [m/s2], clipped (n,), good (n,).
+
+    after_loss    others may be missing between them and those before
+    good          a bad one takes the place of a sample, and is left out in the end
+    """
+
+    after_loss: bool
+    arrivals_us: npt.NDArray[np.int64]
+    accel_mps2: npt.NDArray[np.float64]
+    clipped: npt.NDArray[np.bool_]
+    good: npt.NDArray[np.bool_]
+
+
+class DatedSamples:
+    """Samples in, blocks with times out. What comes out over time does not depend on when ``take`` is called.
+
+    good, bad    samples so far
+    undated      left out because they came at a rate that cannot be used, or too many were lost among them
+    burst_s      for so long samples are kept on the way and then come together [s], by the last
+                 ``JUDGED_SAMPLES``: twice the middle one's delay, as delays are even from none to that long
+    """
+
+    def __init__(self, rate_hz: float, tolerance: float) -> None:
+        self.clock = SampleClock(rate_hz, tolerance)
+        self._rate_hz = rate_hz
+        self._tolerance = tolerance
+        self._waiting: list[UndatedSamples] = []
+        self._times: list[npt.NDArray[np.int64]] = []
+        self._ended = False
+        self.good = 0
+        self.bad = 0
+        self.undated = 0
+        self.burst_s = 0.0
+        self._late_us = np.empty(0, dtype=np.int64)
+
+    def add(self, samples: UndatedSamples) -> None:
+        """More samples, in order."""
+        if samples.after_loss:
+            self._times.append(self.clock.restart())
+        self._times.append(self.clock.feed(samples.arrivals_us))
+        self._waiting.append(samples)
+        good = int(samples.good.sum())
+        self.good += good
+        self.bad += len(samples.good) - good
+
+    def flush(self) -> None:
+        """No more will come: the next ``take`` gives all."""
+        self._ended = True
+
+    def take(self) -> AccelerationBlock:
+        """The oldest samples, as far as their times are certain; may be none."""
+        if self._ended:
+            self._times.append(self.clock.restart())
+        t_us = np.concatenate([np.empty(0, dtype=np.int64), *self._times])
+        self._times = []
+        if len(t_us) == 0:
+            return AccelerationBlock(t_us, np.empty((0, 3)), np.empty(0, dtype=np.bool_))
+        _, arrivals, accels, clips, goods = zip(*self._waiting, strict=True)
+        arrivals_us, accel_mps2, clipped, good = (np.concatenate(part) for part in (arrivals, accels, clips, goods))
+        n = len(t_us)
+        self._waiting = [UndatedSamples(False, arrivals_us[n:], accel_mps2[n:], clipped[n:], good[n:])]
+        dated = t_us != NO_TIME
+        self.undated += int(np.count_nonzero(~dated))
+        self._late_us = np.concatenate([self._late_us, (arrivals_us[:n] - t_us)[dated]])
+        if len(self._late_us) >= JUDGED_SAMPLES:
+            self.burst_s = 2e-6 * float(np.median(self._late_us))
+            self._late_us = self._late_us[:0]
+        keep = good[:n] & dated
+        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self.clock.rate_hz)
+
+    def doubt(self, check: str) -> str:
+        """What is wrong with the samples that come, and what to ``check``; empty: nothing."""
+        if self.clock.refused_hz is not None:
+            return (f"it gives about {self.clock.refused_hz:.0f} samples a second, unsteadily or too few, where "
+                    f"{self._rate_hz:g} are expected: no rows are made of them. {check}")
+        if self.clock.too_many_lost:
+            return f"more samples are lost than can be located: no rows are made of those that come. {check}"
+        if self.clock.lost_share >= WORTH_TELLING:
+            return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
+        return self.burst_doubt
+
+    @property
+    def burst_doubt(self) -> str:
+        """That samples come too late to make rows, and what to do; empty: they do not."""
+        if self.burst_s < LONGEST_BURSTS_S:
+            return ""
+        return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them: too late "
+                "for rows, which stay empty. Have the sensor, or what brings its samples, send each as it is taken, "
+                "or three times a second")
+
+    @property
+    def note(self) -> str:
+        """How the samples come, where that is worth knowing and does no harm; empty: as they should."""
+        slow_hz, fast_hz = self.clock.rates_hz
+        if fast_hz - slow_hz > DRIFT * fast_hz:
+            return (f"its clock drifts: {slow_hz:.1f} to {fast_hz:.1f} samples a second so far. Its samples are dated "
+                    "by when they come: nothing has to be done")
+        if abs(slow_hz / self._rate_hz - 1) > self._tolerance:
+            return (f"it gives {slow_hz:.1f} samples a second where {self._rate_hz:g} are expected, and is taken at "
+                    "that rate: right if that is its own; if it has another one, samples are lost on the way")
+        if BURSTS_S <= self.burst_s < LONGEST_BURSTS_S:
+            return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them. They "
+                    "are dated by their even rate: nothing has to be done")
+        return ""

@@ -14,8 +14,8 @@ from contextlib import suppress
 from typing import Protocol
 
 from drivers.errors import DeviceError, NotPresent
-from drivers.events import Event
-from drivers.ports import BytePort, I2cBus
+from drivers.hardware import BytePort, I2cBus
+from drivers.readings import Event
 
 CHECK_EVERY_US = 60_000
 """One of a chip's registers each time: all four of a BMA220 have been seen a quarter of a second after a reading."""

@@ -19,10 +19,10 @@ import numpy.typing as npt
 from yaml import YAMLError
 from yaml.constructor import SafeConstructor
 
+from drivers.disk import open_regular
 from drivers.errors import SettingsError, shortened
 from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
 from drivers.readings import STANDARD_GRAVITY_MPS2
-from drivers.regular_file import open_regular
 
 WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
 UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}

@@ -11,6 +11,8 @@ Every change goes through ``drivers.disk``, as in the car: so a test can refuse 
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import os
 import shutil
 import stat
@@ -21,8 +23,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from drivers.disk import FileSystem
-from drivers.regular_file import open_regular
+from drivers.disk import FileSystem, open_regular
 from logger.errors import BadInput
 
 _GROWN_BYTES = 1 << 20
@@ -368,3 +369,8 @@ def _remove(path: Path | None) -> None:
     if path is not None:
         with suppress(OSError):
             path.unlink(missing_ok=True)
+
+
+def json_sha256(content: object) -> str:
+    """SHA-256 of the canonical text of plain JSON values: keys in order, no spaces, ASCII; 64 hex digits."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode("ascii")).hexdigest()

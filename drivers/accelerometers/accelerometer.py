@@ -18,10 +18,8 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from drivers.machine import Machine
-from drivers.readings import AccelerationBlock
-from drivers.recorded_words import RecordedWords
-from drivers.settings import Kind
+from drivers.hardware import Machine
+from drivers.readings import AccelerationBlock, Kind, RecordedWords
 from drivers.sources import SerialSource, Source, serial_advice
 
 SERIAL_WAIT_S = 0.5

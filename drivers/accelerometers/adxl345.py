@@ -3,7 +3,7 @@
 Problem: the chip samples by its own clock, whose rate is no more than nominal, into a buffer of 32 entries that gives
 them without times; a buffer that ran over has lost the oldest; and after a dip of its supply the chip stands by.
 Solution: the buffer (FIFO, in stream mode) is emptied some 20 times a second, its samples are dated
-(``drivers.buffered_chip``), and settings are read back in turn (``ChipSource``).
+(``drivers.chip_bus``), and settings are read back in turn (``ChipSource``).
 
 It runs in full resolution at +-16 g: one count is 3.9 mg at every range, and a smaller range would only clip sooner.
 
@@ -28,15 +28,20 @@ from typing import Any, ClassVar
 import numpy as np
 
 from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality
-from drivers.buffered_chip import BufferedChip, BufferedDecoder, BufferState, Entries, buffered_source
-from drivers.chip_bus import bus_fault, find_chip
+from drivers.chip_bus import (
+    BufferedChip,
+    BufferedDecoder,
+    BufferState,
+    Entries,
+    Register,
+    RegisterField,
+    buffered_source,
+    bus_fault,
+    find_chip,
+)
 from drivers.errors import BadReply, DeviceError, SettingsError
-from drivers.machine import Machine
-from drivers.ports import I2cBus
-from drivers.readings import STANDARD_GRAVITY_MPS2
-from drivers.recorded_words import RecordedWords
-from drivers.registers import Register, RegisterField
-from drivers.settings import Kind, OneOf, Whole
+from drivers.hardware import I2cBus, Machine
+from drivers.readings import STANDARD_GRAVITY_MPS2, Kind, OneOf, RecordedWords, Whole
 from drivers.sources import Source
 
 ADDRESSES = (0x53, 0x1D)

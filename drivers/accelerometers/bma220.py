@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers._bma220_registers import (
+from drivers.accelerometers._bma220_chip import (
     AXES,
     CHIP_ID,
     DATA_ADDRESS,
@@ -45,14 +45,21 @@ from drivers.accelerometers._bma220_registers import (
     WATCHDOG_CODE,
 )
 from drivers.accelerometers.accelerometer import Accelerometer, OtherSettings, ReadingQuality
-from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
+from drivers.chip_bus import ConfiguredChip, ToggleRegister, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
-from drivers.machine import Machine
-from drivers.ports import I2cBus
-from drivers.readings import STANDARD_GRAVITY_MPS2, UNREAD_CHIP, AccelerationBlock
-from drivers.recorded_words import RecordedWords
-from drivers.registers import ToggleRegister
-from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
+from drivers.hardware import I2cBus, Machine
+from drivers.readings import (
+    STANDARD_GRAVITY_MPS2,
+    UNREAD_CHIP,
+    AccelerationBlock,
+    Kind,
+    OneOf,
+    OrNone,
+    RecordedWords,
+    SettingNode,
+    Special,
+    Whole,
+)
 from drivers.sources import US_PER_S, ChipSource, Deadlines, Source
 
 BASE_RATE_HZ = 100

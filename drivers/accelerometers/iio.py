@@ -24,16 +24,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.accelerometers._iio_device import AUTO, POLLED_HZ, IioDevice, ScanPort
-from drivers.accelerometers._iio_layout import Integers, ScanLayout, read_description, understood
+from drivers.accelerometers._iio_device import (
+    AUTO,
+    POLLED_HZ,
+    IioDevice,
+    Integers,
+    ScanLayout,
+    ScanPort,
+    read_description,
+    understood,
+)
 from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality
-from drivers.dated_samples import DatedSamples, UndatedSamples
 from drivers.errors import BadReply, NotPresent, SettingsLost
-from drivers.events import Event
-from drivers.machine import Machine
-from drivers.readings import UNREAD_CHIP, AccelerationBlock
-from drivers.recorded_words import RecordedWords
-from drivers.settings import Decimal, Kind, OrNone, Text, Whole
+from drivers.hardware import Machine
+from drivers.readings import UNREAD_CHIP, AccelerationBlock, Decimal, Event, Kind, OrNone, RecordedWords, Text, Whole
+from drivers.sample_clock import DatedSamples, UndatedSamples
 from drivers.sources import US_PER_S, Deadlines, SerialSource, Source
 
 CHECK_US = US_PER_S

@@ -21,12 +21,21 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer
-from drivers.dated_samples import WORTH_TELLING, DatedSamples, UndatedSamples
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
-from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
-from drivers.recorded_words import RecordedWords
-from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
+from drivers.readings import (
+    BAUDS,
+    STANDARD_GRAVITY_MPS2,
+    AccelerationBlock,
+    Flag,
+    Kind,
+    OrNone,
+    RecordedWords,
+    SettingNode,
+    Special,
+    Text,
+)
+from drivers.sample_clock import WORTH_TELLING, DatedSamples, UndatedSamples
 from drivers.wire_contents import SENSOR, RecentBytes
 from drivers.wire_profiles import (
     FrameLayout,

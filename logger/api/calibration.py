@@ -156,7 +156,7 @@ class _Ask:
 def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
     """The stored calibration of this vehicle, or a new one, which is then stored."""
     from logger.estimation import rms_calibration
-    from logger.store.formats.calibration_file import find, fingerprint, keep, places
+    from logger.store.formats.vehicle_file import find, fingerprint, keep, places
     from logger.vehicle.linearise import known_vehicle
 
     kept_in = () if ask.path is None else places(ask.path)

@@ -11,8 +11,7 @@ from logger.api.extracted_runs import Fixes
 from logger.bounds import SPEED
 from logger.errors import BadInput
 from logger.service.config import Config
-from logger.store.formats.logger_csv import LoggerTable, seconds
-from logger.store.formats.logger_layouts import PLACE, SPEED_UNITS
+from logger.store.formats.logger_csv import PLACE, SPEED_UNITS, LoggerTable, seconds
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief

@@ -24,8 +24,8 @@ from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, profile_file, vehicle_file
+from logger.store.formats.drive_file import facts_beside, write_run_facts
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
-from logger.store.formats.run_file import facts_beside, write_run_facts
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart

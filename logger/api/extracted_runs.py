@@ -15,15 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.errors import SettingsError
-from drivers.recorded_words import folder_name
+from drivers.readings import folder_name
 from logger.errors import BadInput
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
+from logger.store.formats.drive_file import RUN, read_run_facts, write_run_facts
 from logger.store.formats.profile_file import Profile, read_places, read_profile
-from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief

@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from drivers.dump import DumpHeader, open_dump
 from drivers.errors import DriverError
-from drivers.events import GPS, Event
-from drivers.readings import Fix
+from drivers.readings import GPS, Event, Fix
 from logger.api.shown import Shown, table
 from logger.errors import BadInput
 from logger.printable import word

@@ -17,8 +17,8 @@ from logger.chart_data import line
 from logger.errors import BadInput
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
+from logger.store.formats.drive_file import facts_beside
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
-from logger.store.formats.run_file import facts_beside
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart

@@ -24,7 +24,7 @@ from logger.errors import BadInput
 from logger.extraction.measured_line import MeasuredLine, passes
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
-from logger.store.formats.logger_columns import named_columns
+from logger.store.formats.logger_csv import named_columns
 from logger.store.formats.vehicle_file import read_model
 
 if TYPE_CHECKING:

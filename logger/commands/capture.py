@@ -16,10 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from drivers.accelerometers import line_reader
-from drivers.board_serial_port import port_advice
 from drivers.dump import DumpHeader, DumpWriter, Event
-from drivers.hardware import open_serial
-from drivers.ports import BytePort
+from drivers.hardware import BytePort, open_serial, port_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.service.shutdown_signals import stopped_by_signals
 from logger.units import US_PER_S

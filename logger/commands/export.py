@@ -24,7 +24,7 @@ from logger.store.export.export import ExportResult, Progress, export
 from logger.store.export.pairing import OFF, PAIRED_NAME, Pairing
 from logger.store.export.stick_status import StickNote, StickState, read_note, show_on_led, stick_of, write_note
 from logger.store.formats.yaml_nodes import MAX_BYTES
-from logger.store.log.quarantine import is_taken
+from logger.store.log.atomic_file import is_taken
 
 _PULL = "it may be pulled"
 

@@ -123,7 +123,7 @@ def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
     from logger.api.extracted_runs import read_measured_profile
     from logger.commands.screen import on_screen
     from logger.service.config import load_config
-    from logger.store.formats.logger_columns import named_columns
+    from logger.store.formats.logger_csv import named_columns
 
     if args.dumps:
         raise BadInput(f"extract: expected dumps or --csv, found both ({args.dumps[0]})")

@@ -24,8 +24,8 @@ from typing import Any
 from drivers.accelerometers import accelerometers, serial_accelerometers
 from drivers.accelerometers.accelerometer import SerialAccelerometer
 from drivers.dump import DumpReader, open_dump
-from drivers.events import GPS
 from drivers.hardware import open_serial
+from drivers.readings import GPS
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord

@@ -11,11 +11,11 @@ import sys
 from pathlib import Path
 
 import logger
-from drivers.board_serial_port import port_advice
+from drivers.hardware import port_advice
 from logger.errors import EXIT_DONE, BadInput, RidelogError
 from logger.installation import CONFIG, PROGRAM, Installation, InstallationStep, hidden_from_services, run_command
 from logger.service.config import Config, load_config
-from logger.store.log.log_place import memory_notice
+from logger.store.log.disk_quota import memory_notice
 
 _THIS_MACHINE = Path("/")
 

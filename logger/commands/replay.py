@@ -108,7 +108,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service.receiver_learning import drive_fields
     from logger.service.recorded_rate import check_recorded_rate
     from logger.store.formats.vehicle_file import read_on_board
-    from logger.store.log.folder_lock import FolderLock
+    from logger.store.log.atomic_file import FolderLock
     from logger.store.log.log_writer import SegmentLog, next_session, repair
 
     with open_dump(dump) as reader:

@@ -214,7 +214,7 @@ def _road(question: SimulateCommand) -> Track:
 
 
 def _rig(path: Path) -> Excitation:
-    from logger.store.formats.excitation_file import read_excitation
+    from logger.store.formats.profile_file import read_excitation
 
     return read_excitation(path)
 

@@ -9,14 +9,14 @@ from dataclasses import asdict
 from pathlib import Path
 
 from drivers.accelerometers import accelerometers
-from drivers.board_serial_port import port_advice
+from drivers.hardware import port_advice
 from drivers.sources import serial_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
 from logger.store.export.stick_status import FOLDER, StickNote, read_notes
-from logger.store.log.quarantine import READ_ONLY
+from logger.store.log.atomic_file import READ_ONLY
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
 _JOURNAL = "See why: journalctl -u ridelog -n 50"

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from drivers.accelerometers import DEFAULT, accelerometers, line_reader
 from drivers.accelerometers.accelerometer import Accelerometer, SerialAccelerometer
 from drivers.dump import DumpHeader, DumpWriter, Event
-from drivers.events import GPS
+from drivers.readings import GPS
 from logger.demo.motion import (
     STEP_S,
     DriveMotion,

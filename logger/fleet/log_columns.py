@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drivers.regular_file import open_regular
+from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
 from logger.units import US_PER_S

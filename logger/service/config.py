@@ -19,7 +19,7 @@ from drivers.accelerometers import DEFAULT, accelerometers
 from drivers.accelerometers.accelerometer import Accelerometer
 from drivers.errors import SettingsError
 from drivers.nmea import ROLLOVERS_MAX
-from drivers.settings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
+from drivers.readings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
 from logger.store.export.pairing import MODES, NOT_PAIRED, Pairing

@@ -13,9 +13,8 @@ from typing import Protocol
 from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import Event
 from drivers.errors import BadReply
-from drivers.events import GPS
 from drivers.nmea import NmeaDecoder
-from drivers.readings import AccelerationBlock, Fix
+from drivers.readings import GPS, AccelerationBlock, Fix
 from logger.records import WindowRecord
 from logger.service.repetition import Repetition
 from logger.service.speed_check import SpeedCheck

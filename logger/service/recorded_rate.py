@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.dump import open_dump
-from drivers.events import GPS
+from drivers.readings import GPS
 from logger.errors import BadInput
 from logger.service.signal_chain import GRID_RATE_HZ
 from logger.service.wiring import Instrument

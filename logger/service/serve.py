@@ -12,8 +12,8 @@ from pathlib import Path
 
 from drivers.accelerometers.accelerometer import SERIAL_WAIT_S
 from drivers.disk import FileSystem
-from drivers.events import GPS, Event
-from drivers.machine import Machine
+from drivers.hardware import Machine
+from drivers.readings import GPS, Event
 from drivers.sources import SerialSource
 from logger.errors import BadInput
 from logger.service import noise_learning, wiring
@@ -30,9 +30,8 @@ from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.service.systemd_notify import Notifier, watchdog_interval_s
 from logger.store.formats.vehicle_file import read_on_board
-from logger.store.log.disk_quota import QuotaLimits
-from logger.store.log.folder_lock import FolderLock
-from logger.store.log.log_place import memory_notice
+from logger.store.log.atomic_file import FolderLock
+from logger.store.log.disk_quota import QuotaLimits, memory_notice
 
 LONGEST_BEAT_S = 2.0
 log = logging.getLogger(__name__)

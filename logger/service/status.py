@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from drivers.regular_file import open_regular
+from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 

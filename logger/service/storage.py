@@ -15,13 +15,12 @@ from typing import Any
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, Event
 from logger.service.status import StorageStatus
-from logger.store.export.export_marks import exported_names
+from logger.store.export.export import exported_names
 from logger.store.export.pairing import NOT_PAIRED, Pairing
+from logger.store.log.atomic_file import names_set_aside
 from logger.store.log.disk_quota import DiskQuota, QuotaLimits
 from logger.store.log.dump_recording import DumpRecording, repair_recordings
-from logger.store.log.log_writer import SegmentLog, next_session, repair
-from logger.store.log.outage_buffer import BufferedLog
-from logger.store.log.quarantine import names_set_aside
+from logger.store.log.log_writer import BufferedLog, SegmentLog, next_session, repair
 from logger.units import US_PER_S
 
 LOOK_US = 10 * US_PER_S

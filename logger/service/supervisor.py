@@ -12,8 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.dump import Event
-from drivers.errors import BadReply, DeviceError, SettingsLost, Unforeseen
-from drivers.foreign_faults import as_device_error
+from drivers.errors import BadReply, DeviceError, SettingsLost, Unforeseen, as_device_error
 from drivers.sources import Source
 from logger.service.status import SensorState
 from logger.units import US_PER_S

@@ -15,8 +15,7 @@ from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import DumpHeader
 from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
-from drivers.recorded_words import RecordedWords
-from drivers.settings import BAUDS
+from drivers.readings import BAUDS, RecordedWords
 from logger.comfort.noise_floor import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter

@@ -17,20 +17,18 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from drivers.disk import open_regular
 from drivers.dump import ACCELEROMETERS, LINE_BYTES, intact_bytes, open_dump
 from drivers.errors import DumpError
-from drivers.regular_file import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store.export import manifest
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.manifest import is_of_export, read_manifest
-from logger.store.log.intact_rows import Hole, are_in_holes
-from logger.store.log.log_folder import inside_of
-from logger.store.log.log_name import LogName, finished_path, name_before, open_path
+from logger.store.log.log_name import LogName, finished_path, inside_of, name_before, open_path
 from logger.store.log.log_reader import other_recordings
 from logger.store.log.row_format import Row, scan
-from logger.store.log.sidecar import SETTINGS_LOST, load_sidecar, repairs_of
+from logger.store.log.sidecar import SETTINGS_LOST, Hole, are_in_holes, load_sidecar, repairs_of
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")

@@ -34,8 +34,7 @@ import numpy as np
 from drivers.accelerometers import accelerometers
 from drivers.accelerometers.bma220 import Bma220Config
 from drivers.dump import DumpHeader, DumpWriter, Event
-from drivers.events import GPS
-from drivers.readings import Fix
+from drivers.readings import GPS, Fix
 from logger.units import KNOT_MPS, MPH_MPS, STANDARD_GRAVITY_MPS2, US_PER_S, WINDOW_M
 
 from ..support.command import called

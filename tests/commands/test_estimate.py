@@ -18,9 +18,8 @@ from logger.roads import iso8608
 from logger.roads.iri import iri
 from logger.runs import RecordFacts
 from logger.shipped import vehicle_file
-from logger.store.formats.drive_file import write_profile
+from logger.store.formats.drive_file import write_profile, write_run_facts
 from logger.store.formats.profile_file import read_profile
-from logger.store.formats.run_file import write_run_facts
 
 from ..support.command import called
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from logger.commands.main import main
-from logger.store.export.export_marks import exported_names
-from logger.store.export.logger_identity import HOMES_NAME, IDENTITY_NAME
+from logger.store.export.export import exported_names
+from logger.store.export.pairing import HOMES_NAME, IDENTITY_NAME
 from logger.store.log.log_reader import find_logs
 from logger.store.log.log_writer import SegmentLog
 

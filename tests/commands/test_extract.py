@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from drivers.dump import DumpWriter, open_dump
-from drivers.events import GPS, Event
+from drivers.readings import GPS, Event
 from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive

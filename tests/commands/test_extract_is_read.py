@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from drivers.events import GPS, Event
+from drivers.readings import GPS, Event
 from logger.demo.motion import RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive

@@ -15,8 +15,7 @@ import pytest
 
 from drivers.dump import open_dump
 from drivers.errors import SettingsError
-from drivers.events import GPS
-from drivers.recorded_words import RecordedWords, folder_name
+from drivers.readings import GPS, RecordedWords, folder_name
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.row_format import HEADER, format_row

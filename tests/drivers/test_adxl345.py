@@ -10,8 +10,7 @@ import pytest
 
 from drivers.accelerometers.adxl345 import ACCELEROMETER, Adxl345, Adxl345Config, Adxl345Decoder
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, WrongDevice
-from drivers.events import Event
-from drivers.readings import AccelerationBlock
+from drivers.readings import AccelerationBlock, Event
 from drivers.sources import ChipSource, Deadlines, Source
 
 from ..support.accelerometer_fakes.adxl345 import FakeAdxl345

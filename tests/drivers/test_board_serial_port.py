@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.board_serial_port import MODEL, SWITCH_ON, port_advice
+from drivers.hardware import MODEL, SWITCH_ON, port_advice
 
 ON_A_5 = "pins 8 and 10 of a Raspberry Pi 5 are /dev/ttyAMA0"
 

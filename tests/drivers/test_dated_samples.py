@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from drivers.dated_samples import DatedSamples, UndatedSamples
+from drivers.sample_clock import DatedSamples, UndatedSamples
 
 SECONDS = 60
 

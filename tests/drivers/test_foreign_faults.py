@@ -16,10 +16,8 @@ import pytest
 import serial
 import smbus2
 
-from drivers.errors import DeviceError, NotPresent, SettingsError, Unforeseen
-from drivers.foreign_faults import as_device_error
-from drivers.hardware import open_i2c, open_serial
-from drivers.machine import Machine
+from drivers.errors import DeviceError, NotPresent, SettingsError, Unforeseen, as_device_error
+from drivers.hardware import Machine, open_i2c, open_serial
 from drivers.sources import ChipSource, Deadlines
 
 TORN = (TypeError("'NoneType' object cannot be interpreted as an integer"), struct.error("unpack requires"),

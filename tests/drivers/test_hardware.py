@@ -9,8 +9,7 @@ import pytest
 import smbus2
 
 from drivers.errors import NotPresent, SettingsError
-from drivers.hardware import open_i2c, open_serial
-from drivers.ports import BytePort
+from drivers.hardware import BytePort, open_i2c, open_serial
 
 
 class Terminal:

@@ -17,12 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.accelerometers import _iio_device
-from drivers.accelerometers._iio_layout import read_description, understood
+from drivers.accelerometers._iio_device import read_description, understood
 from drivers.accelerometers.iio import IioConfig, IioDecoder, IioSource
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost
-from drivers.events import Event
-from drivers.foreign_faults import as_device_error
-from drivers.readings import AccelerationBlock
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost, as_device_error
+from drivers.readings import AccelerationBlock, Event
 
 from ..support.accelerometer_fakes.fake import Clock
 from ..support.accelerometer_fakes.iio import SCALE, FakeIio

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from drivers.line_load import LineLoad
+from drivers.nmea import LineLoad
 
 
 def watched(share: float, carries: float = 1.0, lasting_s: float = 30.0) -> LineLoad:

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.chip_bus import Register, RegisterField, ToggleRegister
 from drivers.errors import BadReply, SettingsError
-from drivers.registers import Register, RegisterField, ToggleRegister
 
 MIDDLE = RegisterField("middle", 5, 3)
 TOP = RegisterField("top", 7, 7)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.sample_clock import NO_TIME, SampleClock
-from drivers.sampling_comb import is_ticked
+from drivers.sample_clock import NO_TIME, SampleClock, is_ticked
 
 
 @pytest.mark.parametrize("timer_us", [16_003.0, 8_010.0, 15_950.0])

@@ -17,8 +17,7 @@ import yaml
 from drivers.accelerometers import DEFAULT, accelerometers, line_reader, serial_accelerometers
 from drivers.dump import DumpHeader
 from drivers.errors import BadReply
-from drivers.events import GPS
-from drivers.settings import Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
+from drivers.readings import GPS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.commands.status import advice
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput

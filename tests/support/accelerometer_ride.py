@@ -9,8 +9,7 @@ import numpy as np
 
 from drivers.accelerometers import accelerometers
 from drivers.dump import Event
-from drivers.events import GPS
-from drivers.readings import AccelerationBlock
+from drivers.readings import GPS, AccelerationBlock
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config
 from logger.service.event_core import EventCore

@@ -25,9 +25,8 @@ from drivers.accelerometers import accelerometers, line_reader, serial_accelerom
 from drivers.accelerometers.accelerometer import Decoder, SerialAccelerometer
 from drivers.dump import LATEST_US, DumpHeader, Event
 from drivers.errors import BadReply, NotPresent, SettingsError
-from drivers.ports import BytePort
-from drivers.readings import AccelerationBlock
-from drivers.recorded_words import RecordedWords
+from drivers.hardware import BytePort
+from drivers.readings import AccelerationBlock, RecordedWords
 from logger.errors import BadInput
 from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord

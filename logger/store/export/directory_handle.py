@@ -22,8 +22,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-from drivers.regular_file import check_regular
-from logger.store.log.quarantine import ENDING, numbered
+from drivers.disk import check_regular
+from logger.store.log.atomic_file import ENDING, numbered
 
 BLOCK_BYTES = 1 << 18
 LOCK_NAME = "exported.lock"

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from drivers.regular_file import open_regular
+from drivers.disk import open_regular
 from logger.files import replace_bytes
 
 FOLDER = Path("/run/ridelog-export")

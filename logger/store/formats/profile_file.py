@@ -1,4 +1,6 @@
-"""Road profiles as files: CSV of ours and ERD of the profilers, read into evenly spaced elevations.
+"""What was under the wheels, as files: profiles of roads, and excitations of rigs.
+
+Road profiles as files: CSV of ours and ERD of the profilers, read into evenly spaced elevations.
 
 Problem: a profile is long (400,000 lines for 10 km at 25 mm), comes from many hands, and everything computed from it
 assumes that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
@@ -9,6 +11,8 @@ Its unit is that of the columns' names: ``elevation_mm``, ``distance_ft``. What 
 Solution: distances must lie on an even grid, but for the rounding of their digits; anything else is refused with its
 line. Straight lines between the samples are laid through an uneven profile only
 when ``resample_m`` asks for it, and the profile says so.
+
+Excitations as files: ``excitation.csv``, what stood under the wheels of a rig over time.
 """
 
 from __future__ import annotations
@@ -23,16 +27,17 @@ import numpy.typing as npt
 from logger.bounds import DISTANCE, ELEVATION, MOST_SAMPLES
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
+from logger.profiles.excitation import Excitation
 from logger.roads.plausible import UNITS_M, unit_complaint
 from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
 from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
+from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 PLACE = ("lat_deg", "lon_deg")
 PROFILE_NAME = "profile.csv"
-MAX_BYTES = 512 * 1024 * 1024
 WIDEST_BRIDGED_M = 1.0
 """A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
 # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
@@ -198,3 +203,24 @@ def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
         distance = erd.spacing_m * np.arange(len(tracks[0]), dtype=float)
         return _resampled(distance.astype(np.float64), tracks, resample_m, file)
     return Profile(0.0, erd.spacing_m, *_pair(tracks))
+
+
+EXCITATION_COLUMNS = (TIME, "elevation_m", "elevation_rear_m")
+_FEWEST = 4
+
+
+def read_excitation(path: Path | str) -> Excitation:
+    """Read CSV ``t_s,elevation_m[,elevation_rear_m]``; it begins at the file's own time.
+
+    Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even and for
+    elevations that no rig has.
+    """
+    names, table, file = parse_columns(
+        read_bounded(path, MAX_BYTES), str(path),
+        lambda names: names if names in (EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS) else None,
+        f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}]")
+    if len(table) < _FEWEST:
+        raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
+    columns = [taken(ELEVATION, name, column, file) for name, column in zip(names[1:], table.T[1:], strict=True)]
+    heights = np.stack(columns, axis=1) if len(columns) > 1 else columns[0]
+    return Excitation(even_rate_hz(table[:, 0], file), np.ascontiguousarray(heights), float(table[0, 0]))

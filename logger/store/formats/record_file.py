@@ -17,10 +17,10 @@ from logger import bounds
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import parse_columns, place, taken
-from logger.store.formats.run_file import DRIVE_NAME
 
 Array = npt.NDArray[np.float64]
 
+DRIVE_NAME = "drive.csv"
 TIME = "t_s"
 VERTICAL = "accel_z_mps2"
 USABLE = "usable"

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
+from logger.store.log.atomic_file import Warn, disk_words, is_file, set_aside_if_possible, warn_in_journal
 from logger.store.log.log_name import OwnFile
-from logger.store.log.quarantine import Warn, disk_words, is_file, set_aside_if_possible, warn_in_journal
 from logger.units import US_PER_S
 
 ENDING = ".dump.gz"

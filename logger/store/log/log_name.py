@@ -1,15 +1,41 @@
-"""The names of a logger's files, and what they say.
+"""The names of a logger's files, how they are found, and the number of a session.
+
+Finding files in a folder of logs, in which a service may be writing, or on a stick with such folders.
+
+The names of a logger's files, and what they say.
 
 ``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
 ``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way
 of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
+
+The number of a session: never given twice, whatever is lost.
 """
 
 from __future__ import annotations
 
 import re
+import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from drivers.disk import FileSystem
+from logger.store.log.atomic_file import (
+    Warn,
+    disk_words,
+    file_words,
+    is_taken,
+    numbered,
+    replace_file,
+    set_aside_if_possible,
+    warn_in_journal,
+)
+
+
+def inside_of(folder: Path) -> Iterator[Path]:
+    """Everything in a folder at any depth but links, which are not followed."""
+    return (path for path in folder.rglob("*") if not path.is_symlink())
+
 
 PART = ".part"
 # Nine digits are more sessions and parts than any logger has; a longer number was not given by one.
@@ -91,3 +117,55 @@ def sidecar_path(log: Path) -> Path:
     if match := _ASIDE.fullmatch(log.name):
         return log.with_name(old_name(sidecar_path(Path(match[1])).name, match[2]))
     return log.with_name(log.name.partition(".")[0] + ".json")
+
+
+COUNTER_NAME = "last-session"
+_COUNTER_BYTES = 64
+COUNTER = re.compile(COUNTER_NAME + r"(-[0-9]+)?")
+
+
+def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> int:
+    """A session number that no file of the folder has or ever had, stored before it is given out.
+
+    It counts on from the counter file and from the names that are there, whichever is higher, so that neither a
+    lost counter nor logs that were moved away bring a number back. A counter that cannot be read is put aside; where it
+    cannot be replaced, another is kept. Raises ``OSError``.
+    """
+    files = files or FileSystem()
+    names = [path.name for path in directory.iterdir()]
+    counted = [_read_counter(files, directory / name, warn) for name in names if COUNTER.fullmatch(name)]
+    number = max([0, *counted, *(session_of(name) or 0 for name in names)]) + 1
+    _store_counter(files, directory / COUNTER_NAME, number, warn)
+    return number
+
+
+def _store_counter(files: FileSystem, path: Path, number: int, warn: Warn) -> None:
+    """Store it under the first name that takes it."""
+    text = str(number)
+    for counter in numbered(path):
+        is_in_the_way = is_taken(counter)
+        try:
+            replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
+        except OSError as error:
+            if not is_in_the_way:
+                raise
+            warn(f"{counter.name}: {file_words(error)}; it cannot be replaced, and another is kept")
+        else:
+            return
+
+
+def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
+    """The last number given out; 0 when the file is missing, damaged or cannot be read."""
+    try:
+        with files.open(path) as file:
+            text, _, check = file.read(_COUNTER_BYTES).decode("ascii", "replace").strip().partition(" ")
+    except FileNotFoundError:
+        return 0
+    except OSError as error:
+        set_aside_if_possible(files, path, disk_words(error), warn)
+        return 0
+    return int(text) if check == _check(text) and text.isdecimal() else 0
+
+
+def _check(text: str) -> str:
+    return f"{zlib.crc32(text.encode('ascii', 'replace')):08x}"

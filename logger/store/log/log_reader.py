@@ -18,8 +18,7 @@ from logger.errors import BadInput
 from logger.geodesy import ground_distance_m
 from logger.printable import word, words_in
 from logger.records import WindowRecord
-from logger.store.log.log_folder import inside_of
-from logger.store.log.log_name import LogName, finished_path, name_before
+from logger.store.log.log_name import LogName, finished_path, inside_of, name_before
 from logger.store.log.row_format import read_log, write_utc
 from logger.store.log.sidecar import read_sidecar
 

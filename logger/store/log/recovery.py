@@ -12,31 +12,37 @@ from typing import Any
 from drivers.disk import FileSystem
 from logger.printable import counted
 from logger.records import WindowRecord
-from logger.store.log.atomic_file import name_of_temporary, replace_file, write_temporary
-from logger.store.log.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
-from logger.store.log.log_name import LogName, OwnFile, finished_path, open_path, sidecar_path
-from logger.store.log.quarantine import (
+from logger.store.log.atomic_file import (
     Warn,
     disk_words,
     file_words,
     is_file,
     is_taken,
+    name_of_temporary,
+    replace_file,
     set_aside,
     set_aside_if_possible,
     warn_in_journal,
+    write_temporary,
 )
+from logger.store.log.log_name import COUNTER, LogName, OwnFile, finished_path, open_path, sidecar_path
 from logger.store.log.row_format import HEADER, as_now, format_row
-from logger.store.log.session_counter import COUNTER
 from logger.store.log.sidecar import (
     SETTINGS_LOST,
     UNCHECKED,
     ClockMap,
+    Hole,
+    IntactRow,
+    IntactRows,
+    Tally,
     clock_of,
     load_sidecar,
     read_sidecar,
     repairs_of,
     sidecar_or_nothing,
     store_sidecar,
+    take_tally,
+    without_utc,
 )
 
 _BLOCK_ROWS = 256

@@ -20,7 +20,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from drivers.regular_file import open_regular
+from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.units import US_PER_S

@@ -15,8 +15,7 @@ import pytest
 from logger.errors import BadInput
 from logger.store.export import directory_handle, manifest
 from logger.store.export.directory_handle import DirectoryHandle
-from logger.store.export.export import Progress, export, finished_files
-from logger.store.export.export_marks import MARKS_NAME, exported_names
+from logger.store.export.export import MARKS_NAME, Progress, export, exported_names, finished_files
 from logger.store.export.manifest import Manifest, format_manifest, read_manifest
 from logger.store.integrity import FileCheck, verify
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from logger.store.export.directory_handle import LOCK_NAME, DirectoryHandle
-from logger.store.export.export_marks import MARKS_NAME, Mark, exported_names, mark_exported
+from logger.store.export.export import MARKS_NAME, Mark, exported_names, mark_exported
 
 from ...support.faults.small_files import at_most_s
 

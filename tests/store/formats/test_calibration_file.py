@@ -10,9 +10,8 @@ import pytest
 from logger.estimation import rms_calibration
 from logger.estimation.rms_calibration import CalibrationSettings, RmsLine, SpeedCalibration
 from logger.shipped import shipped, vehicle_file
-from logger.store.formats import calibration_file
-from logger.store.formats.calibration_file import KEPT, MAX_BYTES, find, fingerprint, keep, places
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats import vehicle_file as module
+from logger.store.formats.vehicle_file import KEPT, MAX_BYTES, find, fingerprint, keep, places, read_vehicle
 from logger.vehicle.vehicle import SensorPlace
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -61,7 +60,7 @@ def test_a_file_cut_or_changed_at_any_byte_is_as_good_as_none(tmp_path: Path) ->
 
 
 def content(calibrations: object, **changes: object) -> str:
-    digest = calibration_file.json_sha256(calibrations)
+    digest = module.json_sha256(calibrations)
     return json.dumps({"format": 1, "sha256": digest, "calibrations": calibrations} | changes)
 
 
@@ -97,7 +96,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(calibration_file.os, "fsync", full)
+    monkeypatch.setattr(module.os, "fsync", full)
     assert keep([path], "b", SPEEDS) is None
     assert list(tmp_path.iterdir()) == [path]
     assert find([path], "a") is not None
@@ -117,7 +116,7 @@ def test_a_fingerprint_of_every_number(monkeypatch: pytest.MonkeyPatch) -> None:
         fingerprint(RAV4, half, CalibrationSettings(roads=121)),
         fingerprint(RAV4, half, CalibrationSettings((10.0,))),
     ]
-    monkeypatch.setattr(calibration_file, "METHOD", rms_calibration.METHOD + 1)
+    monkeypatch.setattr(module, "METHOD", rms_calibration.METHOD + 1)
     keys.append(fingerprint(RAV4, half, CalibrationSettings()))
     assert len(set(keys)) == len(keys)
     monkeypatch.undo()

@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 
 from logger.errors import BadInput
-from logger.store.formats.logger_columns import advice, named_columns, recognise
-from logger.store.formats.logger_csv import LoggerTable, read_header, read_table, recognised, seconds
-from logger.store.formats.logger_layouts import LAYOUTS, units_of
+from logger.store.formats.logger_csv import (
+    LAYOUTS,
+    LoggerTable,
+    advice,
+    named_columns,
+    read_header,
+    read_table,
+    recognise,
+    recognised,
+    seconds,
+    units_of,
+)
 
 TIME_S = np.arange(40) * 0.0097
 

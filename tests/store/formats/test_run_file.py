@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from logger.errors import BadInput
 from logger.runs import UNKNOWN, RecordFacts, Signal
-from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
+from logger.store.formats.drive_file import RUN, read_run_facts, write_run_facts
 
 SIZES = st.none() | st.floats(1e-3, 1e3).map(lambda one: float(f"{one:.6g}"))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from logger.errors import BadInput
-from logger.store.log.folder_lock import FolderLock
+from logger.store.log.atomic_file import FolderLock
 
 
 def test_a_second_writer_is_refused_until_the_first_has_gone(tmp_path: Path) -> None:

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.log.log_name import LogName, OwnFile, session_of
-from logger.store.log.session_counter import next_session
+from logger.store.log.log_name import LogName, OwnFile, next_session, session_of
 
 NINES = 200 * "9"
 

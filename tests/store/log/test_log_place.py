@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from logger.store.log import log_place
-from logger.store.log.log_place import Mount, all_mounts, are_on_one_disk, memory_notice, mount_of, why_in_memory
+from logger.store.log import disk_quota
+from logger.store.log.disk_quota import Mount, all_mounts, are_on_one_disk, memory_notice, mount_of, why_in_memory
 
 ROOT = "30 1 179:2 / / rw,noatime shared:1 - ext4 /dev/mmcblk0p2 rw"
 SIZES = {"/": (4096, 7_500_000, 1_900_000), "/big": (4096, 60_000_000, 15_000_000)}
@@ -24,12 +24,12 @@ def table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Table:
     are 4 GB of memory."""
     def write(*lines: str) -> None:
         (tmp_path / "mountinfo").write_text("\n".join((ROOT, *lines)) + "\n")
-        monkeypatch.setattr(log_place, "MOUNTS", tmp_path / "mountinfo")
+        monkeypatch.setattr(disk_quota, "MOUNTS", tmp_path / "mountinfo")
 
     def room(mount: Mount) -> tuple[int, int, int]:
         return SIZES.get(str(mount.point), TMPFS)
 
-    monkeypatch.setattr(log_place, "_room", room)
+    monkeypatch.setattr(disk_quota, "_room", room)
     monkeypatch.setattr(os, "sysconf", {"SC_PHYS_PAGES": 1_000_000, "SC_PAGE_SIZE": 4096}.__getitem__)
     return write
 
@@ -90,7 +90,7 @@ def test_parts_of_a_disk_are_on_it_and_other_disks_are_not(
     numbers = {"179:0": "mmcblk0", "179:1": "mmcblk0/mmcblk0p1", "179:2": "mmcblk0/mmcblk0p2", "8:1": "sda/sda1"}
     for number, name in numbers.items():
         (tmp_path / "block" / number).symlink_to(disks / name)
-    monkeypatch.setattr(log_place, "BLOCK_DEVICES", tmp_path / "block")
+    monkeypatch.setattr(disk_quota, "BLOCK_DEVICES", tmp_path / "block")
     table()
 
     def at(number: str) -> Path:

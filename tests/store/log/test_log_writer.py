@@ -12,7 +12,7 @@ import pytest
 
 from logger.records import WindowRecord
 from logger.store.integrity import verify
-from logger.store.log import intact_rows, row_format
+from logger.store.log import row_format, sidecar
 from logger.store.log.log_writer import (
     COUNTER_NAME,
     SIDECAR_BYTES,
@@ -501,7 +501,7 @@ def test_a_repair_reads_each_of_many_parts_a_few_times(tmp_path: Path, monkeypat
         (tmp_path / f"00001-{part:03d}.csv.part").write_text(f"{HEADER}\n")
     (tmp_path / f"00001-{count + 1:03d}.csv.part").write_text(f"{HEADER}\n{format_row(row(1))}\n")
     read = []
-    monkeypatch.setattr(intact_rows, "scan", lambda file: read.append(file.name) or row_format.scan(file))
+    monkeypatch.setattr(sidecar, "scan", lambda file: read.append(file.name) or row_format.scan(file))
     repair(tmp_path, CutFiles())
     assert sorted(texts(tmp_path)) == [f"00001-{count + 1:03d}.csv", f"00001-{count + 1:03d}.json"]
     assert len(read) <= 3 * (count + 1)

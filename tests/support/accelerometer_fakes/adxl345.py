@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drivers.accelerometers.adxl345 import Adxl345Config
-from drivers.machine import Machine
+from drivers.hardware import Machine
 
 from .fake import Clock, DataSheet, Example, Fake
 

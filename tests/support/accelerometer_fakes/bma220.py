@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.accelerometers.bma220 import Bma220Config
-from drivers.machine import Machine
+from drivers.hardware import Machine
 
 from .fake import Clock, DataSheet, Example, Fake, Vector
 

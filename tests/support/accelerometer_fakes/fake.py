@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from drivers.machine import Machine
+from drivers.hardware import Machine
 
 Vector = npt.NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from drivers.accelerometers.iio import IioConfig
-from drivers.machine import Machine
+from drivers.hardware import Machine
 
 from .fake import Clock, DataSheet, Example, Fake
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.accelerometers.pasco import PascoConfig
-from drivers.machine import Machine
+from drivers.hardware import Machine
 
 from .fake import Clock, DataSheet, Example, Fake
 

@@ -15,7 +15,7 @@ from functools import reduce
 from operator import xor
 
 from drivers.dump import DumpHeader, Event
-from drivers.events import GPS
+from drivers.readings import GPS
 from logger.records import WindowRecord
 
 LATENCY_S = 0.10

@@ -11,7 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from logger.service.storage import LOOK_US
-from logger.store.log import disk_quota, outage_buffer
+from logger.store.log import disk_quota, log_writer
 from logger.store.log.disk_quota import QuotaLimits
 
 from .crashes import ERRORS, KINDS, Service, events, outage, problems, restart, segments
@@ -38,7 +38,7 @@ def disk_never_comes_back(folder: Path, case: tuple[int, int]) -> Found:
         files.refuses = lambda kind, bad=step >= begin: bad
         service.step()
     status = service.storage.status()
-    assert outage_buffer.disk_words(OSError(error, "")) == status.trouble
+    assert log_writer.disk_words(OSError(error, "")) == status.trouble
     assert status.rows_waiting >= 20 - begin
     assert status.since_s > 0
     service.storage.close()
@@ -88,7 +88,7 @@ def outages_over_and_over(folder: Path, kind: str) -> Found:
 
 
 def outage_longer_than_memory(folder: Path, places: int) -> Found:
-    with patch.object(outage_buffer, "WAITING_ROWS", places):
+    with patch.object(log_writer, "WAITING_ROWS", places):
         files = RefusingFiles()
         service = Service(folder / "log", files)
         for _ in range(3):
@@ -179,7 +179,7 @@ def bad_from_the_start(folder: Path, error: int) -> Found:
     for _ in range(10):
         service.step()
     status = service.storage.status()
-    assert (status.trouble, status.rows_waiting) == (outage_buffer.disk_words(OSError(error, "")), 10)
+    assert (status.trouble, status.rows_waiting) == (log_writer.disk_words(OSError(error, "")), 10)
     assert service.storage.log.file_name is None
     files.refuses = lambda kind: False
     service.wait()

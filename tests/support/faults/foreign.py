@@ -25,9 +25,8 @@ import serial
 import smbus2
 
 from drivers import sources
-from drivers.accelerometers._bma220_chip import Bma220Chip
-from drivers.accelerometers._bma220_registers import REGISTER_STEP
-from drivers.machine import Machine
+from drivers.accelerometers._bma220_chip import REGISTER_STEP, Bma220Chip
+from drivers.hardware import Machine
 from logger.commands import main
 from logger.service import listener, serve, supervisor
 

@@ -19,8 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from drivers.accelerometers._bma220_chip import Bma220Chip
-from drivers.accelerometers._bma220_registers import AXES, CHIP_ID, FILTER, RANGE, WATCHDOG
+from drivers.accelerometers._bma220_chip import AXES, CHIP_ID, FILTER, RANGE, WATCHDOG, Bma220Chip
 from drivers.accelerometers.bma220 import RANGE_CODES, Bma220Config, Bma220Settings, chip_source
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent

@@ -22,11 +22,9 @@ import pytest
 from logger.errors import BadInput, CheckFailed
 from logger.store.export import directory_handle, manifest
 from logger.store.export.directory_handle import DirectoryHandle
-from logger.store.export.export import ExportResult, Progress, export
-from logger.store.export.export_marks import MARKS_NAME, Mark, exported_names, mark_exported
-from logger.store.export.logger_identity import HOMES_NAME, IDENTITY_NAME
+from logger.store.export.export import MARKS_NAME, ExportResult, Mark, Progress, export, exported_names, mark_exported
 from logger.store.export.manifest import read_manifest
-from logger.store.export.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
+from logger.store.export.pairing import FIRST_STICK, HOMES_NAME, IDENTITY_NAME, NOT_PAIRED, PAIRED_NAME, Pairing
 
 from .trials import Found, Hazard, found
 
@@ -456,7 +454,7 @@ def card_that_cannot_be_written_to(folder: Path, error: int) -> Found:
     def refuse(*_: object) -> int:
         raise OSError(error, os.strerror(error))
 
-    with (patch("logger.store.export.logger_identity.MACHINE_ID", folder / "machine-id"),
+    with (patch("logger.store.export.pairing.MACHINE_ID", folder / "machine-id"),
           patch.object(DirectoryHandle, "open_lock_file", refuse)):
         result, again = run(logs, stick), run(logs, stick)
     assert result.complete

@@ -19,24 +19,20 @@ import numpy as np
 from logger.api.csv_extraction import Asked, _recorded
 from logger.api.datasets.lira_map import ProfilerPass
 from logger.errors import BadInput
+from logger.files import json_sha256
 from logger.fleet.dataset import Dataset
 from logger.service import noise_learning, receiver_learning
 from logger.service.config import Config
 from logger.service.status import read_status
-from logger.store.export.checked_list import list_blocks
-from logger.store.export.manifest import Manifest, manifest_blocks, read_manifest
+from logger.store.export.manifest import Manifest, list_blocks, manifest_blocks, read_manifest
 from logger.store.export.stick_status import read_note
-from logger.store.formats import calibration_file, record_checks
-from logger.store.formats.checksum import json_sha256
+from logger.store.formats import record_checks, vehicle_file
 from logger.store.formats.csv_table import columns_of
-from logger.store.formats.drive_file import read_columns, read_run, read_speeds
-from logger.store.formats.excitation_file import read_excitation
+from logger.store.formats.drive_file import read_columns, read_run, read_run_facts, read_speeds
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.store.formats.profile_file import read_places, read_profile
+from logger.store.formats.profile_file import read_excitation, read_places, read_profile
 from logger.store.formats.record_file import read_columns as read_record_columns
-from logger.store.formats.road_lines import read_map_ways, read_road_lines
-from logger.store.formats.route_file import read_route
-from logger.store.formats.run_file import read_run_facts
+from logger.store.formats.road_lines import read_map_ways, read_road_lines, read_route
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.sidecar import load_sidecar
 
@@ -166,7 +162,7 @@ def phone(folder: Path) -> Target:
     columns = "t=time:s,x=ax:m/s2,y=ay:m/s2,z=az:m/s2"
 
     def read(data: bytes, rng: random.Random) -> Hashable:
-        from logger.store.formats.logger_columns import named_columns
+        from logger.store.formats.logger_csv import named_columns
 
         place.write_bytes(fields.tables()(rng, fixes) if data == one else fixes)
         alone = b"lat_deg" in data[:200]
@@ -286,7 +282,7 @@ def _small(name: str, path: Path) -> Hashable:
             promise(isfinite(manifest.trim_m), "a length that is none")
             return len(manifest.commits)
         case "car.calibration.json":
-            return calibration_file.find([path], "a" * 64) is None
+            return vehicle_file.find([path], "a" * 64) is None
         case "trip_iri_1.json":
             _finite(ProfilerPass(path).iri_m_per_km)
             return 1

@@ -17,7 +17,7 @@ from scipy.signal import lfilter, resample_poly
 
 from drivers.accelerometers import accelerometers, line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
-from drivers.events import GPS
+from drivers.readings import GPS
 
 from ..simulator.recorder import Noise
 from .random_case import Case, Recording
