@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.pass_band import in_band
+from logger.dsp.whole_record import in_band
 from logger.left_out import LeftOut, counting
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track

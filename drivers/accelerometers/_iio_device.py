@@ -236,7 +236,7 @@ class IioDevice:
             raise NotPresent(f"{self.path.name}: {error.strerror}") from error
 
     def describe(self) -> dict[str, Any]:
-        """What the kernel says of it now (see ``_iio_layout``). NotPresent where it is gone."""
+        """What the kernel says of it now (see this). NotPresent where it is gone."""
         if not self.path.exists():
             raise NotPresent(f"{self.path.name} has gone: the kernel no longer has it")
         try:

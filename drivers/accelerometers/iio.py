@@ -6,7 +6,7 @@ are recovered from when the scans came; without a buffer the raw values are read
 the time of its read. Which of these it is, the recording says, and ``status`` says where there is no buffer.
 
 What the bytes mean is only known once a device is there, and another one may be plugged in later. So the first event,
-and one every ``DESCRIBE_US``, is a description (``_iio_layout``): a JSON object. All others begin with a letter: ``s``,
+and one every ``DESCRIBE_US``, is a description (``_iio_device``): a JSON object. All others begin with a letter: ``s``,
 then scans as the kernel gave them, or ``p``, then the three raw values as text. The kernel is asked again for its
 description every ``CHECK_US``: when it is another one, the device has lost its settings. What a chip forgets without
 the kernel's notice shows nowhere but in the readings.

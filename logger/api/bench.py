@@ -113,7 +113,7 @@ class Bench:
         """
         from logger.store.formats.effect_file import effect_named
         from logger.vehicle.effect import chosen
-        from logger.vehicle.effect_sizes import sized
+        from logger.vehicle.uncertain import sized
 
         if name in self.effects:
             effect, file = self.effects[name], self.files.get(name)
@@ -258,7 +258,7 @@ def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
     on_rig    as ``sought_effects``
     """
     from logger.store.formats.effect_file import own_effect, shipped_effects
-    from logger.vehicle.effect_sizes import sized
+    from logger.vehicle.uncertain import sized
 
     effects, own = {name: sized(one, model.vehicle) for name, one in sought_effects(on_rig).items()}, {}
     for one in model.effects:

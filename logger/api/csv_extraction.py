@@ -1,8 +1,8 @@
 """CSV recordings of phones and other loggers into runs, as the lab reads them.
 
 Problem: such a recording has its own names, units and axes, an uneven clock, and was made by a phone that lay anyhow.
-Solution: columns are recognised or named (``store.formats.logger_columns``), the time is repaired
-(``extraction.even_samples``), gravity shows up and the unit (``extraction.levelling``); what is left is cut, laid on
+Solution: columns are recognised or named (``store.formats.logger_csv``), the time is repaired
+(``extraction.even_samples``), gravity shows up and the unit (``extraction.even_samples``); what is left is cut, laid on
 a profile and written as a dump is (``api.extracted_runs``). What cannot be known is refused, with the option that says
 it.
 """
@@ -37,8 +37,8 @@ from logger.left_out import LeftOut
 from logger.printable import counted, word
 from logger.runs import RecordFacts
 from logger.service.config import Config
+from logger.service.doubted_spans import MOVING_MPS
 from logger.service.drive_readings import GridReadings
-from logger.service.frozen_sensor import MOVING_MPS
 from logger.store.formats.logger_csv import (
     ACCELERATION_UNITS,
     AXES,
@@ -268,7 +268,7 @@ def _listed(table: LoggerTable) -> str:
 
 def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Array, Array, bool]:
     """Times (n,) [s], samples (n, axes) [m/s2], and whether gravity is in them."""
-    from logger.extraction.levelling import felt
+    from logger.extraction.even_samples import felt
 
     table = tables.acceleration
     roles = AXES if "x" in table.columns else ("up",)
@@ -303,7 +303,7 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
            roles: tuple[str, ...], asked: Asked, notes: list[str]) -> tuple[Array, bool]:
     """Samples in m/s2, and whether gravity is in them. A unit that is said holds; the size of gravity shows one only
     where none is. ``is_linear``: gravity was taken out, as the layout or --up says."""
-    from logger.extraction.levelling import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
+    from logger.extraction.even_samples import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
 
     path, of_g = table.header.path, ACCELERATION_UNITS["g"]
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
@@ -389,7 +389,7 @@ def _repairs(even: EvenSamples) -> list[str]:
 
 def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tuple[EvenSamples, float]:
     """Without what a sensor said that stood still from the beginning, while the car drove; and how long it did [s]."""
-    from logger.extraction.stretches import LONGEST_HOLE_S
+    from logger.extraction.even_samples import LONGEST_HOLE_S
 
     still = even.time_s <= still_until_s(even.time_s, even.samples)
     still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
@@ -401,7 +401,7 @@ def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tu
 
 def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[str]) -> GridReadings:
     """What points up, part by part where the recorder turned in its mount."""
-    from logger.extraction.levelling import turns, upwards
+    from logger.extraction.even_samples import turns, upwards
 
     time_s, present = even.time_s, even.present.copy()
     accel = np.zeros(len(time_s))

@@ -27,10 +27,8 @@ from logger.store.formats.profile_file import Profile, read_places, read_profile
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief
-    from logger.extraction.along_track import Observations, TrackMotion
+    from logger.extraction.along_track import Observations, Predict, Registered, RunGrid, TrackMotion
     from logger.extraction.measured_line import MeasuredLine, Pass
-    from logger.extraction.registration import Predict, Registered
-    from logger.extraction.run_grid import RunGrid
     from logger.service.drive_readings import GridReadings
     from logger.store.formats.vehicle_file import Model
 
@@ -241,7 +239,7 @@ class _Drive:
 
 def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:
     """The runs of a dump, and what was left out of it."""
-    from logger.extraction.stretches import stretches
+    from logger.extraction.even_samples import stretches
 
     config, fixes, readings = recorded.config, recorded.fixes, recorded.readings
     found: list[_Drive] = []
@@ -314,8 +312,7 @@ def _speeds(fixes: Fixes, config: Config) -> Observations:
 def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, measured: MeasuredProfile
                 ) -> _Drive | None:
     """A pass, laid on the profile's distance and cut to it; None for one that is too short."""
-    from logger.extraction.along_track import Observations
-    from logger.extraction.registration import GPS_PLACE_M, registered
+    from logger.extraction.along_track import GPS_PLACE_M, Observations, registered
 
     part = slice(one.first, one.last)
     fixes, along_m = fixes.part(part), along_m[part]
@@ -362,7 +359,7 @@ def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMo
 def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
     """Samples on the grid of a run, within the fixes: accelerations without gravity and offset, and how usable they
     are, (n,) each."""
-    from logger.extraction.run_grid import run_grid
+    from logger.extraction.along_track import run_grid
 
     readings = recorded.readings
     inside = (readings.time_s >= fixes.time_s[0]) & (readings.time_s <= fixes.time_s[-1])

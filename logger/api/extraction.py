@@ -55,10 +55,10 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
     from logger.estimation.receiver_delay import combined
     from logger.service import wiring
     from logger.service.drive_readings import DriveReadings
-    from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
-    from logger.service.recorded_rate import check_recorded_rate
+    from logger.service.main_loop import Player
     from logger.service.signal_chain import Axis
+    from logger.service.wiring import check_recorded_rate
     from logger.store.formats.vehicle_file import read_model
 
     with open_dump(dump) as reader:
@@ -110,7 +110,7 @@ class _NoRows:
 
 def _fixes(kept: Any, later_s: float) -> Fixes:
     """Fixes of a drive, ``later_s`` earlier than they were placed on the way [s]."""
-    from logger.extraction.fix_times import fix_times_s
+    from logger.extraction.held_fixes import fix_times_s
 
     whole = [timed for timed in kept.fixes if timed.fix.valid and timed.fix.speed_mps is not None
              and timed.fix.lat_deg is not None and timed.fix.lon_deg is not None]

@@ -120,7 +120,7 @@ def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
     from logger.lab.selection.add_effect import add
     from logger.plugins import catalogue
     from logger.store.formats.effect_file import shipped_effects
-    from logger.vehicle.effect_sizes import sized
+    from logger.vehicle.uncertain import sized
 
     families = catalogue("logger.lab.laws.families", "FAMILY")
     known = {name: sized(one, bench.model.vehicle) for name, one in shipped_effects().items()}

@@ -15,7 +15,7 @@ from logger.api.log_questions import PassesQuestion, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.roads.sections import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
 
 if TYPE_CHECKING:

@@ -120,7 +120,7 @@ class Comfort(CommandResult):
 def comfort_of(question: ComfortQuestion) -> Comfort:
     """The answer to ``ComfortQuestion``, which says what is raised."""
     from logger.api.weightings import weighting_named, weightings
-    from logger.comfort.ride_comfort import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
+    from logger.comfort.iso2631 import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
     from logger.report.comfort_text import as_json, lines
     from logger.report.record_checks_text import checks_json, checks_lines
 

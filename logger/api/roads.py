@@ -21,7 +21,7 @@ from logger.store.formats import drive_file, profile_file
 if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.roads.elevation_spectrum import BandedSpectrum
-    from logger.roads.localized_roughness import Area
+    from logger.roads.iri import Area
 
 Array = npt.NDArray[np.float64]
 
@@ -97,7 +97,7 @@ random_road = function("random_road", RandomRoadQuestion, random_road_of)
 
 def roughness_of(question: RandomRoadQuestion) -> float:
     """Gd(n0) of the road that is asked for [cm3]."""
-    from logger.roads import gd_iri, iso8608
+    from logger.roads import elevation_spectrum, iso8608
 
     if question.iso_class is not None:
         return iso8608.CLASS_GD_N0_CM3[question.iso_class]
@@ -106,7 +106,7 @@ def roughness_of(question: RandomRoadQuestion) -> float:
     assert question.iri_m_per_km is not None
     if question.waviness == iso8608.STANDARD_WAVINESS:
         return iso8608.gd_n0_from_iri(question.iri_m_per_km)
-    return gd_iri.gd_of_road(question.iri_m_per_km, question.length_m, question.waviness).value
+    return elevation_spectrum.gd_of_road(question.iri_m_per_km, question.length_m, question.waviness).value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +136,7 @@ class Iri(CommandResult):
     def charts(self) -> Sequence[Chart]:
         """The IRI of the windows along the way, the continuous one over 25 ft (AASHTO R 54), and the profile."""
         from logger.chart_data import Curves, Line
-        from logger.roads.profile_iri import continuous_iri
+        from logger.roads.iri import continuous_iri
         from logger.units import WINDOW_M
 
         road = self.profile
@@ -152,9 +152,8 @@ def iri_of(question: IriQuestion) -> Iri:
     """The answer to ``IriQuestion``, which says what is raised."""
     from logger.report.iri_text import as_json, lines
     from logger.report.localized_text import area_lines, area_values
-    from logger.roads.localized_roughness import areas
+    from logger.roads.iri import areas, continuous_iri, profile_iri
     from logger.roads.plausible import spacing_hint, unit_complaint
-    from logger.roads.profile_iri import continuous_iri, profile_iri
     from logger.units import WINDOW_M
 
     name, road = _named(question.profile, question.resample_m)
@@ -186,7 +185,7 @@ def asked_iri(question: IriCommand) -> CommandResult:
     """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
     2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
     from logger.report.iri_text import response_screen
-    from logger.roads.wavelength import sinusoid_iri, slope_gain
+    from logger.roads.iri import sinusoid_iri, slope_gain
 
     if not question.response:
         return iri_of(question)
@@ -249,8 +248,8 @@ class RoadClass(CommandResult):
 def road_class_of(question: ClassifyQuestion) -> RoadClass:
     """The answer to ``ClassifyQuestion``, which says what is raised."""
     from logger.report.road_text import as_json, lines
+    from logger.roads.elevation_spectrum import track_class
     from logger.roads.plausible import spacing_hint
-    from logger.roads.track_class import track_class
 
     name, road = _named(question.profile, question.resample_m)
     profile_file.check_road(road, name)

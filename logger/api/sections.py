@@ -102,7 +102,7 @@ sections = function("sections", SectionsQuestion, sections_of)
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
     from logger.report.drive_sections import route_sections
-    from logger.roads.linear_reference import measures, route_network
+    from logger.roads.road_matching import measures, route_network
     from logger.store.formats.road_lines import read_route
 
     route = read_route(path)

@@ -1,4 +1,6 @@
-"""How a vibration feels, by ISO 2631-1: figures of a weighted acceleration and the word that goes with it.
+"""Ride comfort and health by ISO 2631-1, of a record, and of a day.
+
+How a vibration feels, by ISO 2631-1: figures of a weighted acceleration and the word that goes with it.
 
 Problem: one number cannot say both how a road shakes and how hard it hits. The standard has several, all from
 the weighted acceleration: its r.m.s. over the stretch, the largest running r.m.s. over one second, the fourth-power
@@ -6,6 +8,20 @@ dose, and the crest factor that says which of them to believe.
 
 Solution: plain functions of the weighted samples, the standard's rule for which of them to use, and running r.m.s.
 values that work on a stream and do not drift however long the stream is.
+
+What a day of vibration does to health: daily exposure, its legal limits, and the caution zone of ISO 2631-1.
+
+Problem: the same shaking is harmless for a minute and harmful for a working life, and there is no agreement on how
+strength and duration trade: a^n t is constant (Eq 2.18 of Blum 2015) with n = 2 for one school, n = 4 for the other.
+
+Solution: both, side by side. The European directive has a value for each, of which a state chooses one: A(8) goes with
+n = 2, the vibration dose value with n = 4. The caution zone has a pair of lines for each, which lie close together
+between 4 and 8 hours a day; there the zone has most behind it.
+
+All values are those of the axis that is worst once multiplied by its health factor
+(``logger.comfort.iso2631.HEALTH_FACTORS``), for people who sit.
+
+How a recorded ride feels: its axes weighted as they belong together, and the figures of each (ISO 2631-1).
 """
 
 from __future__ import annotations
@@ -17,7 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.bounds import time_hint
 from logger.dsp.sections import BlockFilter
+from logger.dsp.weightings.weighting import Weighting
 
 Floats = npt.NDArray[np.float64]
 
@@ -184,3 +202,187 @@ class RunningRms:
                 self._tails = np.append(np.cumsum(self._squares[:0:-1])[::-1], 0.0)
                 self._filled, self._sum = 0, 0.0
         return np.sqrt(mean_square)
+
+
+HOURS_OF_REFERENCE = 8.0
+S_PER_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class ExposureLimits:
+    """A value from which to act, and one not to be exceeded."""
+
+    action: float
+    limit: float
+
+    def verdict(self, value: float) -> str:
+        """``below_action_value``, ``above_action_value`` or ``above_limit_value``; a value is exceeded, not met."""
+        if value > self.limit:
+            return "above_limit_value"
+        return "above_action_value" if value > self.action else "below_action_value"
+
+
+# Directive 2002/44/EC article 3(2): A(8) [m/s2] and VDV [m/s^1.75] of the whole body.
+A8_MPS2 = ExposureLimits(0.5, 1.15)
+VDV_MPS175 = ExposureLimits(9.1, 21.0)
+
+
+def a8(a_w_mps2: float, hours: float) -> float:
+    """Daily exposure A(8) [m/s2] of ``hours`` a day at a weighted r.m.s. [m/s2]. Directive 2002/44/EC Annex B."""
+    return a_w_mps2 * math.sqrt(hours / HOURS_OF_REFERENCE)
+
+
+def hours_to_a8(a_w_mps2: float, a8_mps2: float) -> float:
+    """Hours a day at a weighted r.m.s. [m/s2] that make the daily exposure ``a8_mps2``; inf when nothing moves."""
+    return HOURS_OF_REFERENCE * (a8_mps2 / a_w_mps2) ** 2 if a_w_mps2 > 0.0 else math.inf
+
+
+def daily_vdv(vdv_mps175: float, measured_s: float, hours: float) -> float:
+    """Dose [m/s^1.75] of ``hours`` a day like the ``measured_s`` seconds that gave ``vdv_mps175``. The fourth power of
+    the dose grows with time (ISO 2631-1 Eq 5)."""
+    return vdv_mps175 * (hours * S_PER_HOUR / measured_s) ** 0.25
+
+
+def hours_to_vdv(vdv_mps175: float, measured_s: float, wanted_mps175: float) -> float:
+    """Hours a day that make the dose ``wanted_mps175``; the inverse of ``daily_vdv``, inf when nothing moves."""
+    if vdv_mps175 == 0.0:
+        return math.inf
+    return measured_s / S_PER_HOUR * (wanted_mps175 / vdv_mps175) ** 4
+
+
+@dataclass(frozen=True)
+class CautionZone:
+    """Below it no effect on health is clearly documented; above it one is likely."""
+
+    lower: float
+    upper: float
+
+    def verdict(self, value: float) -> str:
+        """``below_zone``, ``in_zone`` (a bound belongs to it) or ``above_zone``."""
+        if value > self.upper:
+            return "above_zone"
+        return "in_zone" if value >= self.lower else "below_zone"
+
+
+# As a dose of the whole day [m/s^1.75] (ISO 2631-1 clause B.3.1): for rides with shocks.
+CAUTION_ZONE_VDV_MPS175 = CautionZone(8.5, 17.0)
+# Estimated dose of steady vibration: eVDV = 1.4 a_w T^(1/4) (ISO 2631-1 Eq B.3), and the doses that bound the zone.
+_DOSE_PER_RMS = 1.4
+# The lines for n = 2 as drawn in Figure B.1: level up to 10 minutes, then a^2 t constant (Eq B.1).
+_LEVEL_MPS2 = CautionZone(3.0, 6.0)
+_LEVEL_UNTIL_HOURS = 1.0 / 6.0
+
+
+def caution_zone(hours: float, exponent: int) -> CautionZone:
+    """The health guidance caution zone of weighted r.m.s. [m/s2] for ``hours`` a day, under a^n t constant with n =
+    ``exponent``, 2 or 4.
+
+    ISO 2631-1 Annex B, Figure B.1; Fig 2.20 of Blum (2015). The lines for n = 4 are doses of 8.5 and 17 m/s^1.75. Those
+    for n = 2 have no formula there; they are read off the figure and meet the others at 6.0 hours. Raises ValueError
+    for another exponent.
+    """
+    if exponent == 2:
+        factor = math.sqrt(_LEVEL_UNTIL_HOURS / max(hours, _LEVEL_UNTIL_HOURS))
+        return CautionZone(_LEVEL_MPS2.lower * factor, _LEVEL_MPS2.upper * factor)
+    if exponent == 4:
+        per_mps2 = _DOSE_PER_RMS * (hours * S_PER_HOUR) ** 0.25
+        return CautionZone(CAUTION_ZONE_VDV_MPS175.lower / per_mps2, CAUTION_ZONE_VDV_MPS175.upper / per_mps2)
+    raise ValueError(f"the zone is drawn for exponents 2 and 4, not {exponent}")
+
+
+Array = npt.NDArray[np.float64]
+
+LOWEST_RATE_HZ = 80.0
+LEAST_TAKEN_HZ = 40.0
+"""Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above."""
+SHORTEST_S = 1.0
+# Rounded times make an 80 Hz record look a little slower.
+_RATE_ROUNDING = 1e-3
+_STILL = 1e-12
+"""Of the level: a constant that was laid on another grid differs from itself by some parts in 1e15."""
+
+
+@dataclass(frozen=True)
+class RideComfort:
+    """Figures by axis, and what each was weighted by: ``z`` always, ``x`` and ``y`` where all three are combined.
+
+    weighted_mps2  (n,) the weighted vertical acceleration
+    daily_hours    hours a day of such riding, for the health values
+    left_out       an axis was recorded and not combined
+    taken_hz       samples a second that were taken, where they were laid on another grid; None: ``rate_hz``
+    seen_to_hz     nothing above it was recorded, as somebody says [Hz]; None: nobody does
+    """
+
+    rate_hz: float
+    daily_hours: float
+    axes: dict[str, AxisFigures]
+    by: dict[str, Weighting]
+    weighted_mps2: Array
+    left_out: bool
+    taken_hz: float | None = None
+    seen_to_hz: float | None = None
+
+    @property
+    def weighting(self) -> Weighting:
+        return self.by["z"]
+
+    @property
+    def vertical(self) -> AxisFigures:
+        return self.axes["z"]
+
+    @property
+    def health_factors(self) -> dict[str, float]:
+        """By axis (ISO 2631-1 clause 7.2.3); empty where the weighting is none of health."""
+        if self.weighting.health_factor is None:
+            return {}
+        return {axis: k for axis in "xyz" if axis in self.by and (k := self.by[axis].health_factor) is not None}
+
+    @property
+    def unseen_from_hz(self) -> float | None:
+        """Where the record ends and the weighting does not [Hz]; None when the record holds all that counts."""
+        rate_hz = self.rate_hz if self.taken_hz is None else min(self.rate_hz, self.taken_hz)
+        end_hz = rate_hz / 2 if self.seen_to_hz is None else min(rate_hz / 2, self.seen_to_hz)
+        return end_hz if end_hz < self.weighting.counts_up_to_hz else None
+
+
+def ride_comfort(
+    accel_mps2: dict[str, Array | None], rate_hz: float, weighting: Weighting, horizontal: Weighting | None,
+    daily_hours: float | None = None, taken_hz: float | None = None, seen_to_hz: float | None = None,
+) -> RideComfort:
+    """Weigh the axes of a record that belong together and take their figures.
+
+    accel_mps2     (n,) by axis, ``z``, ``x`` and ``y``; None: not recorded
+    weighting      of ``z``; ``horizontal`` that of the others beside it, None: they are not combined with it
+    daily_hours    None: as long as the record
+    taken_hz       of a record that was laid on this grid, the rate at which its samples were taken [Hz]
+    seen_to_hz     what the record's facts say [Hz]; None: nothing
+
+    ValueError for fewer than 80 samples a second, fewer than 40 that were taken, or less than 1 s.
+    """
+    vertical = accel_mps2["z"]
+    assert vertical is not None
+    duration_s = len(vertical) / rate_hz
+    if rate_hz < LOWEST_RATE_HZ * (1.0 - _RATE_ROUNDING):
+        raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
+                         f"{time_hint(rate_hz)}")
+    if taken_hz is not None and taken_hz < LEAST_TAKEN_HZ:
+        raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
+    if duration_s < SHORTEST_S:
+        raise ValueError(f"expected at least {SHORTEST_S:g} s, found {duration_s:.3g} s")
+    weighted_mps2 = _weighed(weighting, vertical, rate_hz)
+    axes, by = {"z": axis_figures(weighted_mps2, rate_hz)}, {"z": weighting}
+    others = {axis: accel for axis, accel in accel_mps2.items() if axis != "z" and accel is not None}
+    combined = horizontal is not None and len(others) == len("xy")
+    if horizontal is not None and combined:
+        for axis, accel in others.items():
+            axes[axis], by[axis] = axis_figures(_weighed(horizontal, accel, rate_hz), rate_hz), horizontal
+    hours = daily_hours if daily_hours is not None else duration_s / 3600.0
+    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz,
+                       seen_to_hz)
+
+
+def _weighed(weighting: Weighting, accel_mps2: Array, rate_hz: float) -> Array:
+    """(n,); nothing at all of an axis that stands still: what a filter makes of a constant is its rounding."""
+    if np.ptp(accel_mps2) <= _STILL * np.abs(accel_mps2).max():
+        return np.zeros(len(accel_mps2))
+    return weighting.weigh(accel_mps2, rate_hz)

@@ -19,7 +19,7 @@ from drivers.accelerometers import line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import BytePort, open_serial, port_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.service.shutdown_signals import stopped_by_signals
+from logger.service.systemd_notify import stopped_by_signals
 from logger.units import US_PER_S
 
 _CHUNK_BYTES = 4096

@@ -20,7 +20,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_text
 
 if TYPE_CHECKING:
-    from logger.dsp.fixed_scaling import FixedCascade
+    from logger.dsp.fixed_point import FixedCascade
     from logger.dsp.weightings.weighting import Sections, Weighting
 
 
@@ -118,10 +118,10 @@ def _sections(weighting: Weighting, rate_hz: int) -> Sections:
 
 def _golden_car(args: argparse.Namespace) -> _Header:
     from logger.dsp.fixed_point import FULL_SCALE_SLOPE
-    from logger.roads.golden_car import sections
+    from logger.roads.iri import golden_car_sections
 
     try:
-        rows = sections(args.spacing)
+        rows = golden_car_sections(args.spacing)
     except ValueError as error:
         raise BadInput(f"--spacing {args.spacing:g}: {error}") from None
     return _Header(
@@ -135,7 +135,7 @@ def _golden_car(args: argparse.Namespace) -> _Header:
 
 
 def _cascade(option: str, sections: Any, full_scale: float, data_bits: int) -> FixedCascade:
-    from logger.dsp.fixed_scaling import fixed_cascade
+    from logger.dsp.fixed_point import fixed_cascade
 
     try:
         return fixed_cascade(sections, full_scale, data_bits)

@@ -102,11 +102,11 @@ class Outcome:
 def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: str | None, quiet: bool) -> Outcome:
     """Play ``dump`` into logs below ``out``. Progress goes to stderr unless ``quiet``."""
     from logger.service import wiring
-    from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
+    from logger.service.main_loop import Player
     from logger.service.noise_learning import NoiseLearning
     from logger.service.receiver_learning import drive_fields
-    from logger.service.recorded_rate import check_recorded_rate
+    from logger.service.wiring import check_recorded_rate
     from logger.store.formats.vehicle_file import read_on_board
     from logger.store.log.atomic_file import FolderLock
     from logger.store.log.log_writer import SegmentLog, next_session, repair

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
 from logger.service.config import find_config, load_config
-from logger.service.shutdown_signals import Stop, stopped_by_signals
+from logger.service.systemd_notify import Stop, stopped_by_signals
 
 PAUSE_S = 30
 

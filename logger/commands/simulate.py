@@ -142,7 +142,7 @@ def _model(name: str, wanted: Sequence[str]) -> tuple[Vehicle, tuple[Chosen, ...
     from logger.store.formats.vehicle_file import read_model
     from logger.vehicle.compose import with_effect
     from logger.vehicle.effect import chosen
-    from logger.vehicle.effect_sizes import sized
+    from logger.vehicle.uncertain import sized
 
     model = read_model(vehicle_path(name))
     effects, asked = model.effects, dict[str, str]()

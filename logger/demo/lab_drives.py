@@ -20,8 +20,8 @@ import numpy as np
 
 from logger.files import make_folder, write_file
 from logger.profiles.track import Track
-from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
+from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import DRIVE, PROFILE, write_drive, write_profile
 from logger.store.formats.effect_file import shipped_effects
@@ -29,7 +29,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import changed, read
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 VEHICLE = "rav4-2009"
 EFFECT, EFFECT_VALUES = "progressive_spring", {"cubic_stiffness_n_per_m3": 2.5e6}

@@ -11,11 +11,11 @@ from scipy.signal import resample_poly
 
 from logger.profiles.track import Track
 from logger.roads import iri, iso8608
-from logger.roads.bumps import speed_bump
-from logger.vehicle import half_car
+from logger.roads.obstacles import speed_bump
 from logger.vehicle.compose import Car, recorded
-from logger.vehicle.passage import Passage
-from logger.vehicle.state_space import recursion, straight_step
+from logger.vehicle.models import half_car
+from logger.vehicle.simulate import Passage
+from logger.vehicle.structure import recursion, straight_step
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -143,7 +143,7 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: DriveMotion) -> Arra
     The half car is stepped exactly at 1 kHz with the road as it passes under each wheel, at whatever speed, and then
     band-limited as the recorder does before it samples.
     """
-    structure = half_car.structure(vehicle)
+    structure = half_car(vehicle)
     patch_m = vehicle.contact_patch_m
     under = np.stack([road.under(motion.distance_m - behind, patch_m) for behind in structure.behind_m], axis=1)
     under = under - under[0].mean()

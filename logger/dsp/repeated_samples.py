@@ -1,4 +1,14 @@
-"""Samples that were written more often than they were taken, distinguished from a coarse sensor that rightly stays on
+"""Samples that are none: repeated ones, those at the end of a range, and bursts of calls.
+
+Where samples follow each other of which something holds.
+
+Samples that come in bursts: the times are those of a buffer that was emptied, not those at which it was filled.
+
+Problem: a recorder that empties a sensor's buffer every now and then gives several samples one time, or nearly one.
+Solution: the last sample of a burst is the newest, and is no later than the burst. A sensor with a clock of its own
+takes samples evenly, so the straight line through number and time of those is the time of all.
+
+Samples that were written more often than they were taken, distinguished from a coarse sensor that rightly stays on
 one code.
 
 Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that no
@@ -18,6 +28,16 @@ That judges many short holds by their number. A few long ones are judged by thei
 steps from sample to sample right before and right after, each further sample that stands still on all axes has, by the
 same flat density, a chance of 1 in m. A car that comes to rest, or a coarse sensor on a quiet road, moves by single
 steps before it stands still, and is not meant.
+
+Samples that stand at the end of a sensor's range, where no more than the end could be read.
+
+Problem: an accelerometer that was set to 2 g reads 2 g in a pothole, and the ride reads smoother than it was. Nothing
+in the record says what the range was, and the largest value of a ride is no sign: every ride has one.
+
+Solution: at the end of its range a sensor arrives by a jump, stands for samples, and leaves by a jump. A crest that is
+passed does not: of three equal samples and those beside them the moves of any smooth crest are at most 4 steps. By
+chance each further sample that stands still where the moves are of ``JUMP`` steps has a probability of 1 in ``JUMP`` at
+most, by a flat density of moves.
 """
 
 from __future__ import annotations
@@ -29,10 +49,50 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.stretches import stretches_inside, stretches_of
+Bools = npt.NDArray[np.bool_]
+Places = npt.NDArray[np.int64]
+
+
+def stretches_of(mask: Bools) -> tuple[Places, Places]:
+    """First places and ends (k,), half open, of the stretches in which a mask (n,) holds."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    return edges[::2], edges[1::2]
+
+
+def stretches_inside(mask: Bools) -> tuple[Places, Places]:
+    """The same, without those that hold the first or the last place."""
+    first, end = stretches_of(mask)
+    inside = (first > 0) & (end < len(mask))
+    return first[inside], end[inside]
+
 
 Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+
+_WITHIN = 0.2  # of the mean step: so near to the one before only in a burst
+_SHARE = 0.3
+_LATE = 0.5  # of the usual time between bursts
+
+
+def burst_ends(t_s: Array) -> npt.NDArray[np.int64] | None:
+    """Numbers of the last samples of the bursts of a record with times (n,), not decreasing [s]; None: it has none."""
+    steps = np.diff(t_s)
+    inside = steps < _WITHIN * (t_s[-1] - t_s[0]) / max(1, len(steps))
+    if np.count_nonzero(inside) < _SHARE * len(steps):
+        return None
+    return np.flatnonzero(np.append(~inside, True))
+
+
+def spread(t_s: Array, ends: npt.NDArray[np.int64]) -> Array:
+    """Even times (n,) [s] of samples that came in bursts. ValueError where no even rate stands behind them."""
+    ends = ends[1:-1]  # those that the record cuts off
+    if len(ends) < 3:
+        raise ValueError(f"found {len(ends)} bursts of samples and no rate")
+    slope_s, start_s = np.polyfit(ends, t_s[ends], 1)
+    late_s = np.abs(t_s[ends] - start_s - slope_s * ends).max()
+    if slope_s <= 0 or late_s > _LATE * np.median(np.diff(t_s[ends])):
+        raise ValueError(f"found bursts of samples that are up to {late_s:.3g} s off an even rate")
+    return np.asarray(start_s + slope_s * np.arange(len(t_s)))
+
 
 FALSE_ALARM = 1e-6
 """Most probability with which a record without repeats is said to have some."""
@@ -229,3 +289,39 @@ def _teeth(places: list[int], period: float) -> Array:
         period += _FOLLOW**2 / 4 * (place - tooth)
         numbers.append(float(number))
     return np.array(numbers)
+
+
+END_FALSE_ALARM = 1e-4
+"""Most probability of reporting an end where there is none."""
+JUMP = 6.0  # steps
+_LEAST_SAMPLES = 3
+
+
+@dataclass(frozen=True)
+class RangeEnd:
+    """``at`` an end of the range stand ``samples``; the bound of its ``chance`` without an end."""
+
+    at: float
+    samples: int
+    chance: float
+
+
+def range_ends(values: Array) -> list[RangeEnd]:
+    """Ends of the range at which samples of an axis (n,) stand: none, one or two."""
+    step = resolution(values)
+    if step <= 0:
+        return []
+    found = [(sign, _upper_end(sign * values, step)) for sign in (1.0, -1.0)]
+    return [RangeEnd(sign * one.at, one.samples, one.chance) for sign, one in found if one is not None]
+
+
+def _upper_end(values: Array, step: float) -> RangeEnd | None:
+    top = float(values.max())
+    at_top = values > top - 0.5 * step
+    first, end = stretches_inside(at_top)
+    stands = end - first >= _LEAST_SAMPLES
+    first, end = first[stands], end[stands]
+    jumps = np.minimum(values[first] - values[first - 1], values[end - 1] - values[end]) > JUMP * step
+    stays = int((end - first - 1)[jumps].sum())
+    chance = float(JUMP ** -min(stays, 100))
+    return RangeEnd(top, int(np.count_nonzero(at_top)), chance) if chance < END_FALSE_ALARM else None

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp import kaiser
+from logger.dsp.low_pass import kaiser_half_length, low_pass_taps
 from logger.units import US_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -223,8 +223,8 @@ def decimation_taps(factor: int) -> Floats:
     amplitude at 50 Hz. h is a multiple of ``factor``.
     """
     width = 2.0 * math.pi * (STOP_HZ - PASS_HZ) / (SLOW_RATE_HZ * factor)
-    half = factor * math.ceil(kaiser.half_length(STOP_DB, width) / factor)
-    return kaiser.low_pass_taps(half, factor, 1.0, STOP_DB)
+    half = factor * math.ceil(kaiser_half_length(STOP_DB, width) / factor)
+    return low_pass_taps(half, factor, 1.0, STOP_DB)
 
 
 class Decimator:
@@ -317,3 +317,8 @@ class Decimator:
         self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
         self._new_start = False
         return run
+
+
+Array = npt.NDArray[np.float64]
+
+

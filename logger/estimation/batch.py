@@ -18,8 +18,7 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
-from logger.roads.golden_car import START_M
-from logger.roads.iri import rectified_slope, window_iri
+from logger.roads.iri import START_M, rectified_slope, window_iri
 from logger.vehicle.linearise import KnownCar
 
 Array = npt.NDArray[np.float64]

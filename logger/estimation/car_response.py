@@ -10,11 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.road_spectrum import log_waves
-from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
-from logger.vehicle.frequency_response import frequency_response
-from logger.vehicle.linear_car import LinearCar
-from logger.vehicle.quarter_car import GOLDEN_CAR
-from logger.vehicle.quarter_car import structure as quarter_car
+from logger.roads.iri import STANDARD_SPEED_MPS, TIRE_BASE_M
+from logger.vehicle.linear_car import LinearCar, frequency_response
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import suspension_travel
 
 Array = npt.NDArray[np.float64]
@@ -142,7 +140,7 @@ def golden_car_on_grid(count: int, spacing_m: float) -> ComplexArray:
 def golden_car_slope(wave_number_cpm: Array) -> ComplexArray:
     """Slope between body and wheel of the Golden Car per elevation [1/m], with its tire's 250 mm average.
 
-    As in the exact filter (``logger.roads.golden_car``) the average reaches ahead of where the value counts.
+    As in the exact filter (``logger.roads.iri``) the average reaches ahead of where the value counts.
     """
     car = quarter_car(GOLDEN_CAR)
     rate = frequency_response(car, [suspension_travel(car, 0, order=1)], wave_number_cpm * STANDARD_SPEED_MPS)[:, 0, 0]

@@ -12,8 +12,9 @@ resolved. For two Gaussian variables of variance V and correlation r
 
     cov(|a|, |b|) = 2 V / pi (sqrt(1 - r^2) + r asin(r) - 1)
 
-(as in ``logger.roads.gd_iri``), so its integral over a window gives the variance of the windows' exact IRI with the
-correlation of y, and that of the best values with the correlation resolved. The mean squared error is their difference.
+(as in ``logger.roads.elevation_spectrum``), so its integral over a window gives the variance of the windows' exact IRI
+with the correlation of y, and that of the best values with the correlation resolved. The mean squared error is their
+difference.
 
 Rounding counts as white noise of step / sqrt(12). Where the noise does not blur the steps of a coarse sensor that is
 not what rounding does, and an estimator that takes it as bounds can do a little better than this says.

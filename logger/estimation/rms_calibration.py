@@ -25,7 +25,8 @@ import numpy.typing as npt
 
 from logger.dsp.sections import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.roads import golden_car, iso8608
+from logger.roads import iso8608
+from logger.roads.iri import golden_car_sections
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import KnownCar
 from logger.vehicle.vehicle import Vehicle, with_load
@@ -125,7 +126,7 @@ def calibrate(
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
 
     The acceleration belongs to the stretch under the front wheel, as in the logs. IRI is the exact one of each road,
-    on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``.
+    on the average 0.8 % above Eq 4.39 (``elevation_spectrum``), so the slopes lie that much above ``rms_relation``.
     A car whose laws are not linear is another one on each level of road; its lines go through the middle of them.
     """
     settings = settings or CalibrationSettings()
@@ -229,4 +230,4 @@ def _golden_car_response(wave_number: Array, spacing_m: float) -> npt.NDArray[np
     """Slope of the suspension per elevation [1/m] of the IRI's car on a profile of samples: see ``rectified_slope``."""
     base_m = _TIRE_SAMPLES * spacing_m
     slope = (np.exp(2j * np.pi * wave_number * base_m) - 1) / base_m
-    return slope * frequency_response(golden_car.sections(spacing_m), wave_number, 1 / spacing_m)
+    return slope * frequency_response(golden_car_sections(spacing_m), wave_number, 1 / spacing_m)

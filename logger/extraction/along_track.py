@@ -1,4 +1,6 @@
-"""Speed and distance of a car over a whole drive, by all fixes before and after each instant.
+"""A drive along a measured line: its motion, and how it is laid on the line.
+
+Speed and distance of a car over a whole drive, by all fixes before and after each instant.
 
 Problem: a receiver gives the speed once or ten times a second, with noise, now and then wildly wrong; a model needs the
 distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its acceleration
@@ -7,15 +9,34 @@ Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much t
 the errors of the fixes are, is chosen by evidence; wild ones count less. Places along a line that are known from
 elsewhere enter as further observations, with errors by Student's t. Errors come from drawing the motion that all could
 be (G. Papandreou and A. Yuille, NIPS 2010).
+
+A pass over a measured profile, laid on the profile's own distance.
+
+Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself shows it. A
+model of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is
+found where what it should have felt and what it felt are most alike; then the two are compared window by window
+(``lab.likelihood.lag``), and where a window was felt is one more observation for the smoother of the motion.
+
+Readings of several even pieces on the one grid of a run.
+
+Problem: after a hole a recorder's readings go on at instants of their own, up to half a step beside those before it;
+a run, whose times lie on one grid, could not be read again. To interpolate them would smooth what a coarse sensor read.
+Solution: a reading keeps its value and the instant at which it was taken, where the car is looked up, and gets the
+nearest number on the grid that is free.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
+
+from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
+from logger.profiles.track import Track
+from logger.runs import RECEIVER_ERROR_LASTS_S, Run
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -270,3 +291,125 @@ def _walked(step_s: Array) -> Array:
     """Covariances (k, 3, 3) of what a walk of the acceleration of variance 1 a second adds over steps (k,)."""
     powers = step_s[:, None, None] ** np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
     return np.asarray(powers / np.array([[20.0, 8.0, 6.0], [8.0, 3.0, 2.0], [6.0, 2.0, 1.0]]))
+
+
+GPS_PLACE_M = 3.0
+"""Standard error of a receiver's positions."""
+_REACH_M = 30.0  # ten deviations of a receiver's place
+_RETRIES = 4
+_AGREE_M, _FEWEST = 0.2, 4
+"""So many windows or more were felt, and half of them lie so near to the motion: those of another road lie anywhere
+within 0.3 s, half of them 0.75 m off or more at 5 m/s and above, and no motion that fits the speeds follows them."""
+_LEAST_STD_M = 0.01  # of a window: no model of a car is exact
+
+
+@dataclass(frozen=True, eq=False)
+class Registered:
+    """A pass on the profile's distance.
+
+    motion         along the profile
+    place_std_m    r.m.s. standard error of a place [m]
+    by_road        whether the road was recognised; False: places are those of the receiver
+    speed_scale    of the receiver's speeds over those on the profile, and its standard error; None: by those speeds
+    """
+
+    motion: TrackMotion
+    place_std_m: float
+    by_road: bool
+    speed_scale: tuple[float, float] | None = None
+
+
+Predict = Callable[[Array], Array]
+"""What the sensor of a model records (n,) [m/s2] at these distances (n,) of the front tires [m]."""
+
+
+def registered(speeds: Observations, places: Observations, time_s: Array, accel_mps2: Array, rate_hz: float,
+               track: Track, predict: Predict) -> Registered:
+    """Lay a pass on its profile.
+
+    speeds, places    of the receiver: of the front tires, the latter by the profile's distance [m]
+    time_s            (n,) of the readings, at ``rate_hz``, within the times of the fixes
+    accel_mps2        (n,) what was read; 0 where nothing was
+    """
+    lasting = np.sqrt(max(1.0, RECEIVER_ERROR_LASTS_S * len(places.time_s) / max(np.ptp(places.time_s), 1.0)))
+    weak = Observations(places.time_s, places.value, places.deviation * lasting)
+    motion = motion_of(speeds, weak)
+    by_road = _by_road(motion, speeds, time_s, accel_mps2, rate_hz, track, predict)
+    motion, known = by_road or (motion, weak)
+    std_m = place_std_m(motion, speeds, known)
+    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), by_road is not None,
+                      None if by_road is None else speed_scale(motion, speeds, known))
+
+
+def _by_road(motion: TrackMotion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,
+             predict: Predict) -> tuple[TrackMotion, Observations] | None:
+    """The motion on the road as it was felt, and where that was; None where the road was not recognised."""
+    distance_m = motion.distance_m(time_s)
+    farther_m = offset_by_correlation_m(distance_m, accel_mps2, predict(distance_m), (track.start_m, track.end_m),
+                                        _REACH_M)
+    if farther_m is None:
+        return None
+    state = motion.state.copy()
+    state[:, 0] += farther_m
+    motion = TrackMotion(motion.time_s, state, motion.walk, motion.noise_mps)
+    felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
+    for _ in range(_RETRIES):
+        if len(felt.time_s) < _FEWEST:
+            return None
+        motion, known = motion_of(speeds, felt, motion), felt
+        felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
+    off_m = np.interp(known.time_s, time_s, motion.distance_m(time_s)) - known.value
+    return (motion, known) if np.median(np.abs(off_m)) < _AGREE_M else None
+
+
+def _felt(motion: TrackMotion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict
+          ) -> Observations:
+    """Where those windows of the road were felt in which the car did what the profile asks."""
+    distance_m, speed_mps = motion.distance_m(time_s), motion.speed_mps(time_s)
+    run = Run("", rate_hz, accel_mps2, distance_m, speed_mps, track)
+    found = lags([run], [predict(distance_m)])
+    at_m = distance_m[0] + found.along_m
+    kept = (found.speed_mps > SLOWEST_MPS) & np.isfinite(found.error_s) & (at_m >= track.start_m) & (
+        at_m <= track.end_m)
+    rising = distance_m + 1e-9 * np.arange(len(distance_m))
+    deviation = np.hypot(found.error_s * found.speed_mps, _LEAST_STD_M)
+    return Observations(np.interp(at_m, rising, time_s)[kept], (at_m - found.lag_m)[kept], deviation[kept])
+
+
+_OFF = 0.1
+"""Of a step, by which one between two readings of the same piece may differ: times are written in microseconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunGrid:
+    """Samples (m,) of a run, made of readings (n,).
+
+    time_s     evenly spaced, from the first reading on [s]
+    taken_s    the instants that they stand for, growing, within a step of ``time_s`` [s]
+    row        number of the reading; -1: none
+    """
+
+    time_s: Array
+    taken_s: Array
+    row: npt.NDArray[np.int64]
+
+    def laid(self, values: Array) -> Array:
+        """Values of readings (n,) as samples (m,), on straight lines where there was no reading."""
+        known = self.row >= 0
+        return np.interp(np.arange(len(self.row)), np.flatnonzero(known), values[self.row[known]])
+
+
+def run_grid(time_s: Array, rate_hz: float) -> RunGrid:
+    """Lay readings at growing times (n,) [s], even but for jumps, on a grid; without readings it is empty."""
+    if not len(time_s):
+        return RunGrid(time_s, time_s, np.empty(0, dtype=np.int64))
+    place = (time_s - time_s[0]) * rate_hz
+    begins = [0, *(np.flatnonzero(np.abs(np.diff(place) - 1.0) > _OFF) + 1), len(place)]
+    number = np.empty(len(place), dtype=np.int64)
+    for begin, end in pairwise(begins):
+        free = number[begin - 1] + 1 if begin else 0
+        number[begin:end] = max(free, round(place[begin])) + np.arange(end - begin)
+    row = np.full(number[-1] + 1, -1, dtype=np.int64)
+    row[number] = np.arange(len(number))
+    count = np.arange(len(row))
+    return RunGrid(time_s[0] + count / rate_hz, np.interp(count, number, time_s), row)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.stretches import stretches_of
+from logger.dsp.repeated_samples import stretches_of
 from logger.geodesy import EARTH_RADIUS_M
 
 Array = npt.NDArray[np.float64]

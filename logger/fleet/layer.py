@@ -11,7 +11,7 @@ from logger.fleet.dataset import DAY_US
 from logger.fleet.road_cells import SEGMENT_M
 from logger.fleet.summary import SECTION_M, RoadTable
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.roughness_words import federal_condition
+from logger.roads.sections import federal_condition
 from logger.store.log.log_reader import iso_utc
 
 _NUMBERS = ("lat_deg", "lon_deg", "heading_deg", "length_m", "passes", "iri_m_per_km", "iri_std_m_per_km",

@@ -16,7 +16,7 @@ from logger.printable import counted
 from logger.report.document import data_block, document, grid, heading, hint, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.terminal import distance_words
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI
+from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI
 from logger.store.log.log_reader import utc
 from logger.units import INCH_PER_MILE_M_PER_KM
 

@@ -17,7 +17,7 @@ from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, sect
 from logger.fleet.road_elimination import RoadPasses
 from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
 from logger.fleet.road_map import RoadPieces
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.roads.sections import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
 
 Array = npt.NDArray[np.float64]

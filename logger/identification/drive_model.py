@@ -48,8 +48,7 @@ from logger.runs import READING, Run
 from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import free_parameter_named, slope_of, steps_of
-from logger.vehicle.frequency_response import (
+from logger.vehicle.linear_car import (
     SensedCar,
     Sensitivity,
     body_acceleration_response,
@@ -57,9 +56,8 @@ from logger.vehicle.frequency_response import (
     sensitivity,
 )
 from logger.vehicle.models import structure_of
-from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
-from logger.vehicle.passage import finer, smooth_length
-from logger.vehicle.simulate import FINE_RATE_HZ, recorder_gain, recorder_taps
+from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, free_parameter_named, read, slope_of, steps_of
+from logger.vehicle.simulate import FINE_RATE_HZ, finer, recorder_gain, recorder_taps, smooth_length
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Vehicle
 

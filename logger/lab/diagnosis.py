@@ -44,7 +44,7 @@ from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
 from logger.vehicle.effect import Chosen, Effect
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
 

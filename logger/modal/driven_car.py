@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
 from logger.roads.iso8608 import HIGHEST_CPM
-from logger.vehicle.frequency_response import AxleResponse
+from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes as modes_of
 from logger.vehicle.modes import vibrating

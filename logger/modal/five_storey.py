@@ -25,7 +25,7 @@ import numpy as np
 from logger.modal.decay import Decrement, log_decrement
 from logger.modal.mode import Array, Complex
 from logger.units import STANDARD_GRAVITY_MPS2
-from logger.vehicle.state_space import driven_outputs, matrix_exponential, recursion, straight_step
+from logger.vehicle.structure import driven_outputs, matrix_exponential, recursion, straight_step
 
 _STEPS_PER_SAMPLE = 4
 

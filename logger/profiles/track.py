@@ -14,10 +14,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    pass
+
 
 Array = npt.NDArray[np.float64]
 
@@ -283,3 +287,5 @@ def _averages(
     height = np.stack([(front[1] - rear[1]) / patch_m for front, rear in edges], axis=1)
     slope = np.stack([(front[0] - rear[0]) / patch_m for front, rear in edges], axis=1)
     return height.ravel(), slope.ravel()
+
+

@@ -11,21 +11,22 @@ from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
-from logger.roads.laid_traces import lay
-from logger.roads.places_to_visit import PlaceToVisit, places_to_visit
 from logger.roads.repeated_drives import (
     Changes,
     Means,
     Passes,
+    PlaceToVisit,
     Scatter,
     Trends,
     changes,
     means,
     passes_of,
+    places_to_visit,
     scatter_of,
     trends,
     way_and_cell,
 )
+from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
 from logger.roads.window_errors import WindowErrors
 from logger.store.log.log_reader import split_drives

@@ -5,17 +5,17 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from logger.comfort import exposure
-from logger.comfort.exposure import CautionZone
+from logger.comfort import iso2631
 from logger.comfort.iso2631 import (
     COMFORT_FACTORS,
     HEALTH_FACTORS,
     AxisFigures,
+    CautionZone,
+    RideComfort,
     comfort_word,
     motion_sickness_dose,
     total,
 )
-from logger.comfort.ride_comfort import RideComfort
 from logger.report.quantities import known
 
 METHOD = "formula of the standard, magnitude and phase, by Fourier transform of the whole record"
@@ -75,20 +75,20 @@ def _health(result: RideComfort) -> dict[str, Any] | None:
     hours, seconds = result.daily_hours, result.vertical.duration_s
     a_w_mps2, a_w_axis = max((k * result.axes[axis].a_w_mps2, axis) for axis, k in factors.items())
     vdv, vdv_axis = max((k * result.axes[axis].vdv_mps175, axis) for axis, k in factors.items())
-    a8_mps2, dose = exposure.a8(a_w_mps2, hours), exposure.daily_vdv(vdv, seconds, hours)
-    a8_at, vdv_at = exposure.A8_MPS2, exposure.VDV_MPS175
+    a8_mps2, dose = iso2631.a8(a_w_mps2, hours), iso2631.daily_vdv(vdv, seconds, hours)
+    a8_at, vdv_at = iso2631.A8_MPS2, iso2631.VDV_MPS175
     return {
         "daily_hours": hours,
         "a8_mps2": a8_mps2, "a8_axis": a_w_axis, "a8_verdict": a8_at.verdict(a8_mps2),
-        "hours_to_a8_action": known(exposure.hours_to_a8(a_w_mps2, a8_at.action)),
-        "hours_to_a8_limit": known(exposure.hours_to_a8(a_w_mps2, a8_at.limit)),
+        "hours_to_a8_action": known(iso2631.hours_to_a8(a_w_mps2, a8_at.action)),
+        "hours_to_a8_limit": known(iso2631.hours_to_a8(a_w_mps2, a8_at.limit)),
         "daily_vdv_mps175": dose, "vdv_axis": vdv_axis, "vdv_verdict": vdv_at.verdict(dose),
-        "hours_to_vdv_action": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.action)),
-        "hours_to_vdv_limit": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.limit)),
+        "hours_to_vdv_action": known(iso2631.hours_to_vdv(vdv, seconds, vdv_at.action)),
+        "hours_to_vdv_limit": known(iso2631.hours_to_vdv(vdv, seconds, vdv_at.limit)),
         "caution_zone": {
-            "n2": _zone(exposure.caution_zone(hours, 2), a_w_mps2, "mps2"),
-            "n4": _zone(exposure.caution_zone(hours, 4), a_w_mps2, "mps2"),
-            "vdv": _zone(exposure.CAUTION_ZONE_VDV_MPS175, dose, "mps175"),
+            "n2": _zone(iso2631.caution_zone(hours, 2), a_w_mps2, "mps2"),
+            "n4": _zone(iso2631.caution_zone(hours, 4), a_w_mps2, "mps2"),
+            "vdv": _zone(iso2631.CAUTION_ZONE_VDV_MPS175, dose, "mps175"),
         },
     }
 

@@ -12,11 +12,10 @@ from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts, expected_square
-from logger.roads.linear_reference import ALONG, on_route
-from logger.roads.localized_roughness import Area, areas
+from logger.roads.iri import Area, areas
+from logger.roads.road_matching import ALONG, on_route
 from logger.roads.road_network import RoadNetwork
-from logger.roads.roughness_words import federal_condition
-from logger.roads.sections import Sections, Windows, even_edges, sections
+from logger.roads.sections import Sections, Windows, even_edges, federal_condition, sections
 from logger.store.log.log_reader import LoggedFile, split_drives
 
 _GAP_M = 1000.0  # between neighbours on a route: beyond it they are two passes

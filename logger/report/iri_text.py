@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from logger.roads.iri import ProfileIri
 from logger.roads.plausible import doubts_of, unit_doubt
-from logger.roads.profile_iri import ProfileIri
-from logger.roads.roughness_words import ride_words, road_kinds
+from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats.profile_file import Profile
 
 _HEADS = {"iri_m_per_km": "IRI", "iri_right_m_per_km": "IRI right", "mri_m_per_km": "MRI", "hri_m_per_km": "HRI"}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from logger.report.display_units import UNITS, DisplayUnits
 from logger.report.quantities import known
-from logger.roads.localized_roughness import Area
+from logger.roads.iri import Area
 
 
 def area_lines(found: Sequence[Area], limit_m_per_km: float, units: DisplayUnits = UNITS["si"]) -> Iterator[str]:

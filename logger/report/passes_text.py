@@ -13,8 +13,7 @@ from logger.printable import counted
 from logger.report.combined_drives import CombinedDrives
 from logger.report.quantities import known
 from logger.report.terminal import comfort_words
-from logger.roads.places_to_visit import PlaceToVisit
-from logger.roads.repeated_drives import Changes
+from logger.roads.repeated_drives import Changes, PlaceToVisit
 from logger.store.log.log_reader import iso_utc
 from logger.units import US_PER_S
 

@@ -11,8 +11,8 @@ from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.report.placed_rows import column, iri_errors, placed, trace_of
 from logger.report.summary import counts
-from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
+from logger.roads.road_matching import lay
 from logger.roads.road_network import Ints, RoadNetwork
 from logger.units import WINDOW_M
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from logger.report.summary import IRI_CLASSES
+from logger.roads.elevation_spectrum import TrackClass
 from logger.roads.iso8608 import iri_from_gd_n0
 from logger.roads.plausible import doubts_of, unit_doubt
-from logger.roads.track_class import TrackClass
 from logger.store.formats.profile_file import Profile
 
 

@@ -15,8 +15,7 @@ from logger.report.display_units import UNITS, DisplayUnits
 from logger.report.drive_sections import DriveSections, localized
 from logger.report.localized_text import area_lines, area_values
 from logger.report.quantities import known
-from logger.roads.roughness_words import FEDERAL_WORDS
-from logger.roads.sections import Sections
+from logger.roads.sections import FEDERAL_WORDS, Sections
 from logger.units import FOOT_M, MILE_M
 
 

@@ -1,4 +1,27 @@
-"""International Roughness Index of a measured profile, exactly as defined.
+"""The International Roughness Index: its reference car, of a profile, by wavelength and place by place.
+
+The IRI's reference car as a filter that runs along a road, in blocks of any size.
+
+Problem: the IRI drives a quarter car at 80 km/h over a profile, step by step and exactly (a straight line between
+samples is a constant slope over a step), and a stream must give the same numbers as the whole profile at once.
+
+Solution: driven by the road's slope, the suspension's slope z_s' - z_u' is -(kt / mu) s^2 / D(s), D the characteristic
+polynomial with two pairs of complex poles p. Its response to a slope that is held over a step has a closed form,
+
+    H(z) = (1 - 1/z) sum over p of r q / (1 - q / z),   q = exp(p dx / V),   r = -(kt / mu) p / product of (p - others),
+
+the value at the end of a step coming with the slope of that step. The residues r sum to zero, which leaves a
+numerator of second order beside the factor 1 - 1/z: two second-order sections, exact for the profile as it is sampled.
+That factor also makes a straight grade exactly smooth, which the printed coefficients of World Bank Technical Paper 46
+do not. At rest on a constant slope is the start that ASTM E1926 asks for (states: slope, slope, 0, 0).
+
+What the IRI hears: its response to each wavelength of the road (Fig 2.13 of Blum 2015).
+
+The IRI is no average of heights. It passes waves from about 1.2 to 30 m and is deaf to much shorter and longer ones;
+its gain peaks near 0.065 cycles per metre, where the body bounces, and near 0.42, where the wheel hops (the
+dissertation has these two the wrong way round).
+
+International Roughness Index of a measured profile, exactly as defined.
 
 The IRI is the mean rectified slope between body and wheel of the Golden Car at 80 km/h (Eq 2.8 of Blum 2015). A
 program that integrates it with ordinary steps gets another number; the standard says how: the profile is a straight
@@ -15,10 +38,21 @@ What is meant here, where sources differ:
   that cuts through a step takes its share of it.
 - With two wheel tracks, MRI is the mean of the tracks' IRI and HRI the IRI of the tracks' mean (the half car, which
   does not feel roll). HRI is never above MRI.
+
+The IRI of a whole profile of one or two wheel tracks, and of its windows.
+
+Areas of localized roughness: where the IRI over a base length that slides along the road is above a limit.
+
+AASHTO R 54 (Accepting Pavement Ride Quality) slides a base of 25 ft over a profile; an area begins where the sliding
+value rises above the limit and ends where it falls below again. A profile has a value at each sample. A log has one
+number for each window of 25 ft, taken as even inside: the mean over a base that lies across two windows is then their
+mean by length, so that between the windows' middles the sliding value is a straight line. It can reach no higher than
+the worst window: of a bump that lies on the limit of two windows each shows a part only, at the least half.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor
@@ -26,9 +60,100 @@ from math import ceil, floor
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.golden_car import START_M, GoldenCarFilter
+from logger.dsp.fixed_point import FixedFilter
+from logger.dsp.sections import BlockFilter
+from logger.units import KMH_MPS
+from logger.vehicle.linear_car import frequency_response
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
+from logger.vehicle.structure import suspension_travel
 
 Array = npt.NDArray[np.float64]
+
+STANDARD_SPEED_MPS = 80 * KMH_MPS
+START_M = 11.0
+TIRE_BASE_M = 0.25
+COARSEST_SPACING_M = 0.3
+
+
+def golden_car_sections(spacing_m: float) -> Array:
+    """Second-order sections, (2, 6) rows b0, b1, b2, 1, a1, a2, from road slope to suspension slope [m/m to m/m].
+
+    One sample per step of ``spacing_m`` [m] at 80 km/h; the output belongs to the end of the step. Steady slope in,
+    nothing out. ValueError unless the spacing is above 0 and at most 300 mm.
+    """
+    if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
+        raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
+    poles = np.linalg.eigvals(quarter_car(GOLDEN_CAR).state_space()[0])
+    upper = poles[poles.imag > 0]
+    stiffness_per_mass = GOLDEN_CAR.front.tire_stiffness_n_per_m / GOLDEN_CAR.front.unsprung_mass_kg
+    denominators, numerators = [], []
+    for pole in upper:
+        others = poles[poles != pole]
+        residue = -stiffness_per_mass * pole / np.prod(pole - others)
+        step = np.exp(pole * spacing_m / STANDARD_SPEED_MPS)
+        denominators.append([1.0, -2 * step.real, abs(step) ** 2])
+        numerators.append([2 * (residue * step).real, -2 * abs(step) ** 2 * residue.real])
+    summed = np.convolve(numerators[0], denominators[1]) + np.convolve(numerators[1], denominators[0])
+    return np.array([[1.0, -1.0, 0.0, *denominators[0]], [*summed[:3], *denominators[1]]])
+
+
+class GoldenCarFilter:
+    """Elevations in, rectified slopes |z_s' - z_u'| out; any split of a profile gives the same bits.
+
+    spacing_m      distance between elevations [m], above 0 and at most 300 mm (else ValueError)
+    make_filter    what runs the sections: floating point, or the integers of ``logger.dsp.fixed_point``
+
+    Value i belongs to the end of the step from elevation i to i + 1. The tire's average takes the slope to the
+    elevation 250 mm ahead, so values come that much later; the first ones come once 11 m are known.
+    """
+
+    def __init__(
+        self, spacing_m: float, make_filter: Callable[[Array], BlockFilter | FixedFilter] = BlockFilter
+    ) -> None:
+        self._filter = make_filter(golden_car_sections(spacing_m))
+        self._spacing_m = spacing_m
+        self._base = max(1, int(TIRE_BASE_M / spacing_m + 0.5))
+        self._start = int(START_M / spacing_m + 0.5)
+        self._started = False
+        self._known = np.empty(0)
+
+    def push(self, elevation_m: npt.ArrayLike) -> Array:
+        """The rectified slopes [m/m] that the next elevations (n,) [m] make known. ValueError if one is not finite."""
+        fresh = np.asarray(elevation_m, dtype=float)
+        if fresh.ndim != 1 or not np.isfinite(fresh).all():
+            raise ValueError("expected a row of finite elevations")
+        known = np.concatenate([self._known, fresh])
+        if not self._started:
+            if len(known) <= self._start:
+                self._known = known
+                return np.empty(0)
+            self._filter.reset((known[self._start] - known[0]) / (self._start * self._spacing_m))
+            self._started = True
+        self._known = known[-self._base:]
+        slope = (known[self._base:] - known[:-self._base]) / (self._base * self._spacing_m)
+        return np.abs(self._filter.process(slope))
+
+
+def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M) -> Array:
+    """Amplitude of the suspension's slope z_s' - z_u' per amplitude of the road's slope, for a sinusoidal road.
+
+    wave_number_cpm    (n,) [cycles per metre]; tire_base_m [m] of the moving average, 0 for a tire that touches in
+    a point. Fig 2.13; the Golden Car at 80 km/h as a continuous system, so for a finely sampled profile.
+    """
+    wave_number = np.asarray(wave_number_cpm, dtype=float)
+    car = quarter_car(GOLDEN_CAR)
+    travel = frequency_response(car, [suspension_travel(car, 0)], wave_number * STANDARD_SPEED_MPS)[..., 0, 0]
+    return np.abs(travel * np.sinc(wave_number * tire_base_m))
+
+
+def sinusoid_iri(amplitude_m: npt.ArrayLike, wave_number_cpm: npt.ArrayLike) -> Array:
+    """IRI [m/km] of an endless sinusoidal road of this amplitude [m] and wave number [cycles per metre].
+
+    The mean of a rectified sine is 2 / pi of its amplitude, and the road's slope has 2 pi n times that of its height.
+    """
+    wave_number = np.asarray(wave_number_cpm, dtype=float)
+    return 4000.0 * wave_number * np.asarray(amplitude_m, dtype=float) * slope_gain(wave_number)
+
 
 PER_KM = 1000.0
 _NEARLY = 1e-6
@@ -140,3 +265,92 @@ def _mean_between(slope: Array, start: float, stop: float) -> float:
     part = slope[first:last]
     total = part.sum() - (start - first) * part[0] - (last - stop) * part[-1]
     return float(total / (stop - start))
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileIri:
+    """IRI [m/km] by name, each (1 + w,): of the whole profile, then of its windows.
+
+    Of one track ``iri_m_per_km``; of two that of the left one, ``iri_right_m_per_km``, and of both together
+    ``mri_m_per_km`` and ``hri_m_per_km``. The windows' distances are from the first sample on.
+    """
+
+    windows: tuple[IriWindow, ...]
+    columns: dict[str, Array]
+
+    def row(self, number: int) -> dict[str, float]:
+        """One value of each name: 0 is the whole, 1 the first window."""
+        return {name: float(column[number]) for name, column in self.columns.items()}
+
+
+def profile_iri(elevation_m: Array, elevation_right_m: Array | None, spacing_m: float, window_m: float) -> ProfileIri:
+    """IRI of each track (n,), and MRI and HRI of two. ValueError as in ``logger.roads.iri``."""
+    left, windows = _track(elevation_m, spacing_m, window_m)
+    columns = {"iri_m_per_km": left}
+    if elevation_right_m is not None:
+        right, _ = _track(elevation_right_m, spacing_m, window_m)
+        half_car, _ = _track((elevation_m + elevation_right_m) / 2, spacing_m, window_m)
+        columns |= {"iri_right_m_per_km": right, "mri_m_per_km": (left + right) / 2, "hri_m_per_km": half_car}
+    return ProfileIri(tuple(windows), columns)
+
+
+def continuous_iri(elevation_m: Array, elevation_right_m: Array | None, spacing_m: float, base_m: float
+                   ) -> tuple[Array, Array]:
+    """The moving IRI over a base length, of two tracks their mean (AASHTO R 54: 25 ft): middles of the bases (k,) from
+    the first sample on [m], and values (k,) [m/km]. A profile that is shorter has one base, all of it."""
+    slopes = [rectified_slope(track, spacing_m) for track in (elevation_m, elevation_right_m) if track is not None]
+    slope: Array = np.asarray(np.mean(slopes, axis=0))
+    length = min(max(round(base_m / spacing_m), 1), len(slope))
+    sums = np.concatenate([[0.0], np.cumsum(slope)])
+    values: Array = PER_KM * (sums[length:] - sums[:-length]) / length
+    return np.asarray(spacing_m * (np.arange(len(values)) + length / 2)), values
+
+
+def _track(elevation_m: Array, spacing_m: float, window_m: float) -> tuple[Array, list[IriWindow]]:
+    cutter = IriWindows(spacing_m, window_m)
+    slope = rectified_slope(elevation_m, spacing_m)
+    windows = cutter.push(slope) + cutter.finish()
+    return np.array([PER_KM * slope.mean(), *(window.iri_m_per_km for window in windows)]), windows
+
+
+@dataclass(frozen=True)
+class Area:
+    """A stretch above the limit.
+
+    start_m, end_m    where the middle of the base is when the sliding value passes the limit
+    worst_m_per_km    highest sliding value, at ``worst_at_m``, with its standard error (NaN: none is known)
+    """
+
+    start_m: float
+    end_m: float
+    worst_m_per_km: float
+    worst_std_m_per_km: float
+    worst_at_m: float
+
+
+def areas(middle_m: Array, iri_m_per_km: Array, limit_m_per_km: float, iri_std_m_per_km: Array | None = None,
+          gap_m: float = np.inf) -> list[Area]:
+    """Areas of a sliding IRI, given at the middles of its bases (n,), growing; between them a straight line.
+
+    NaN ends an area where the value before it stands, and so does a step of more than ``gap_m``.
+    """
+    found: list[Area] = []
+    std = np.full(len(middle_m), np.nan) if iri_std_m_per_km is None else iri_std_m_per_km
+    above = np.nan_to_num(iri_m_per_km) > limit_m_per_km
+    joins = np.isfinite(iri_m_per_km[1:]) & np.isfinite(iri_m_per_km[:-1]) & (np.diff(middle_m) <= gap_m)
+    breaks = np.flatnonzero((above[1:] != above[:-1]) | ~joins) + 1
+    for first, end in zip([0, *breaks.tolist()], [*breaks.tolist(), len(above)], strict=True):
+        if end == first or not above[first]:
+            continue
+        worst = first + int(np.argmax(iri_m_per_km[first:end]))
+
+        def passes(inside: int, outside: int) -> float:
+            """Where the line from one to the other meets the limit; the one inside where it does not reach it."""
+            if not (0 <= outside < len(above) and joins[min(inside, outside)]):
+                return float(middle_m[inside])
+            share = (iri_m_per_km[inside] - limit_m_per_km) / (iri_m_per_km[inside] - iri_m_per_km[outside])
+            return float(middle_m[inside] + share * (middle_m[outside] - middle_m[inside]))
+
+        found.append(Area(passes(first, first - 1), passes(end - 1, end), float(iri_m_per_km[worst]),
+                          float(std[worst]), float(middle_m[worst])))
+    return found

@@ -1,4 +1,8 @@
-"""Single obstacles on a road, as elevations that are added to it.
+"""Single obstacles on a road.
+
+Speed bumps: single obstacles that no spectrum of a road describes.
+
+Single obstacles on a road, as elevations that are added to it.
 
 All are functions of distance, so that they can be laid on any profile and on each other. A track lays straight lines
 between its samples: an edge that is steep here is as steep there as one step of the track allows.
@@ -11,7 +15,21 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.bumps import speed_bump
+
+def speed_bump(
+    distance_m: npt.ArrayLike, start_m: float, height_m: float, width_m: float
+) -> npt.NDArray[np.float64]:
+    """Elevation of a speed bump at the given distances [m], zero outside of it.
+
+    One whole period of a raised cosine (Eq 4.41 of Blum 2015 with time written as distance over speed, Eq 4.42).
+    ValueError unless the width is above 0.
+    """
+    if not width_m > 0:
+        raise ValueError(f"expected a width above 0 m, found {width_m:g} m")
+    along = (np.asarray(distance_m, dtype=float) - start_m) / width_m
+    inside = (along >= 0) & (along < 1)
+    return np.where(inside, 0.5 * height_m * (1 - np.cos(2 * np.pi * along)), 0.0)
+
 
 Array = npt.NDArray[np.float64]
 

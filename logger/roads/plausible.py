@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.golden_car import COARSEST_SPACING_M, START_M
-from logger.roads.iri import iri
+from logger.roads.iri import COARSEST_SPACING_M, START_M, iri
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, KNOT_MPS, MILE_M, MPH_MPS
 

@@ -1,4 +1,6 @@
-"""Which way each window of a drive lies on, decided by the whole drive.
+"""Where on a network of roads, or along one line, a drive went.
+
+Which way each window of a drive lies on, decided by the whole drive.
 
 Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not distinguish a
 street from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error
@@ -8,6 +10,10 @@ chain is kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through nois
 the error that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely
 within seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street
 before hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
+
+Many drives laid over each other, one after the other: a network of ways that grows with what nobody drove before.
+
+Measures along a route: where on a line with kilometre posts the windows of a drive lie, and in which direction.
 """
 
 from __future__ import annotations
@@ -20,7 +26,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.road_network import SEARCH_M, Array, Candidates, Ints, RoadNetwork, Trace
+from logger.roads.road_network import (
+    MOST_TURN_DEG,
+    SEARCH_M,
+    Array,
+    Candidates,
+    Ints,
+    RoadNetwork,
+    Trace,
+    directions,
+    on_sphere,
+)
 
 NO_WAY = -1
 DOUBTFUL = -2
@@ -370,3 +386,130 @@ class _Lists:
             found.point.tolist(), (network.along_m[found.point] + found.east_m * e + found.north_m * n).tolist(),
             (found.north_m * e - found.east_m * n).tolist(), (-n).tolist(), e.tolist(), network.way, network.founder,
             network.passes)
+
+
+_APART_M = 100.0  # from which distance on a drive that comes back drives again
+_Error = tuple[float, float, float, float, float]
+
+
+def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUAL) -> list[Matched]:
+    """Lay drives over each other, one after the other: where no way is known a drive makes one, and ``network`` grows.
+
+    A drive that passes a place again is laid over itself.
+    """
+    found = []
+    for founder, trace in enumerate(traces, start=network.traces):
+        parts: list[Matched] = []
+        state: _Error | None = None
+        for start, end in _laps(trace):
+            lap = trace.part(start, end)
+            matched, state = match(network, lap, receiver, state)
+            parts.append(_learned(network, lap, matched, founder))
+        found.append(_joined(parts))
+        network.traces = founder + 1
+    return found
+
+
+def _learned(network: RoadNetwork, lap: Trace, matched: Matched, founder: int) -> Matched:
+    """What was matched moves its ways; what was not becomes ways of its own."""
+    on = np.flatnonzero(matched.way >= 0)
+    network.move(matched.point[on], matched.aside_m[on])
+    way, along_m, point = matched.way.copy(), matched.along_m.copy(), matched.point.copy()
+    off = matched.way == NO_WAY
+    breaks = np.flatnonzero((off[1:] != off[:-1]) | (np.diff(lap.distance_m) > GAP_M)) + 1
+    for start, end in zip([0, *breaks], [*breaks, len(off)], strict=True):
+        if end > start and off[start]:
+            way[start:end], along_m[start:end], point[start:end] = network.add(lap, start, end, founder)
+    return Matched(way, along_m, point, np.where(off, 0.0, matched.aside_m))
+
+
+def _laps(trace: Trace) -> list[tuple[int, int]]:
+    """Parts of a trace of which none comes back to where it has been, in its direction."""
+    from scipy.spatial import cKDTree
+
+    points = on_sphere(trace.lat_deg, trace.lon_deg)
+    heading = directions(points, trace.distance_m)
+    pairs = cKDTree(points).query_pairs(SEARCH_M, output_type="ndarray") if len(points) else np.zeros((0, 2), np.intp)
+    early, late = pairs.min(axis=1), pairs.max(axis=1)
+    alike = np.einsum("ij,ij->i", heading[early], heading[late]) > np.cos(np.radians(MOST_TURN_DEG))
+    again = alike & (trace.distance_m[late] - trace.distance_m[early] > _APART_M)
+    last = np.full(len(points), -1)
+    np.maximum.at(last, late[again], early[again])
+    cuts = [0]
+    for window in np.flatnonzero(last >= 0).tolist():
+        if last[window] >= cuts[-1]:
+            cuts.append(window)
+    return [(start, end) for start, end in zip(cuts, [*cuts[1:], len(points)], strict=True) if end > start]
+
+
+def _joined(parts: Sequence[Matched]) -> Matched:
+    return Matched(*(np.concatenate([getattr(one, name) for one in parts] or [np.zeros(0)])
+                     for name in ("way", "along_m", "point", "aside_m")))
+
+
+ALONG, AGAINST = 1, -1
+_SHORTEST_M = 1.0  # between posts
+
+
+@dataclass(frozen=True, eq=False)
+class OnRoute:
+    """Windows (n,): direction ALONG or AGAINST growing measures, 0 where they lie on another road; measure of the
+    middle [m], NaN there."""
+
+    direction: Ints
+    measure_m: Array
+
+
+def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float | None, posts: Array | None = None,
+             post_m: Array | None = None) -> Array:
+    """Measures (n,) of the corners of a line [m].
+
+    begin_m, end_m    at its ends; with neither its own length from 0 on
+    posts             (p, 2) latitudes and longitudes of kilometre posts, with measures (p,): between them they hold,
+                      and beyond the outer ones the line's own length goes on from them
+
+    ValueError where the line has no length, or posts do not follow each other along the line by growing measures.
+    """
+    corners = on_sphere(lat_deg, lon_deg)
+    length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    if not length_m[-1] > 0:
+        raise ValueError("expected a line with a length")
+    if posts is None or post_m is None or not len(post_m):
+        first = begin_m if begin_m is not None else 0.0 if end_m is None else end_m - length_m[-1]
+        last = end_m if end_m is not None else first + length_m[-1]
+        return np.asarray(first + (last - first) * length_m / length_m[-1])
+    at_m = _abreast(corners, length_m, on_sphere(posts[:, 0], posts[:, 1]))
+    order = np.argsort(at_m)
+    at_m, known_m = at_m[order], post_m[order]
+    if (np.diff(at_m) < _SHORTEST_M).any() or (np.diff(known_m) <= 0).any():
+        raise ValueError("expected kilometre posts that follow each other along the line by growing numbers")
+    measured = np.interp(length_m, at_m, known_m)
+    return measured + np.minimum(length_m - at_m[0], 0.0) + np.maximum(length_m - at_m[-1], 0.0)
+
+
+def _abreast(corners: Array, length_m: Array, points: Array) -> Array:
+    """How far along a line (n, 3) points (p, 3) lie [m]: the foot on the nearest of its parts."""
+    start, step = corners[:-1], np.diff(corners, axis=0)
+    square = np.maximum(np.einsum("ij,ij->i", step, step), 1e-12)
+    found = np.empty(len(points))
+    for number, point in enumerate(points):
+        share = np.clip(np.einsum("ij,ij->i", point - start, step) / square, 0.0, 1.0)
+        off = np.linalg.norm(start + share[:, None] * step - point, axis=1)
+        part = int(np.argmin(off))
+        found[number] = length_m[part] + share[part] * np.sqrt(square[part])
+    return found
+
+
+def route_network(lat_deg: Array, lon_deg: Array, measure_m: Array) -> RoadNetwork:
+    """A line with measures of its corners as two ways: 0 along it, 1 against it by measures below 0."""
+    network = RoadNetwork()
+    network.add_line(lat_deg, lon_deg, measure_m)
+    network.add_line(lat_deg[::-1], lon_deg[::-1], -measure_m[::-1])
+    return network
+
+
+def on_route(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL) -> OnRoute:
+    """Lay a drive on a route's two ways."""
+    found, _ = match(network, trace, receiver)
+    direction = np.where(found.way < 0, 0, np.where(found.way == 0, ALONG, AGAINST))
+    return OnRoute(direction, direction * found.along_m)

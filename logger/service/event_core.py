@@ -16,8 +16,7 @@ from drivers.errors import BadReply
 from drivers.nmea import NmeaDecoder
 from drivers.readings import GPS, AccelerationBlock, Fix
 from logger.records import WindowRecord
-from logger.service.repetition import Repetition
-from logger.service.speed_check import SpeedCheck
+from logger.service.doubted_spans import Repetition, SpeedCheck
 from logger.service.timebase import JUMP_US, Timebase
 from logger.store.log.log_writer import ClockMap
 from logger.units import US_PER_S

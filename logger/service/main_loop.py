@@ -1,6 +1,19 @@
-"""The live service: threads that listen, one loop that thinks.
+"""The loop of the service, and where its events come from: threads that listen, or a recording.
 
-Each source has a thread of its own (``logger.service.listener``) that puts what it got into a queue. The main loop
+Events of several sources, brought into order of time.
+
+A thread per source, which only looks at its device at the right moment and queues what it got, with the time.
+
+So a slow card or a slow window never delays a sample.
+
+A recorded drive through the service: its events to the core, as the live service gave them.
+
+A dump holds what the core was given while it was recorded, in that order: what a driver had made sure of, and merged
+by time. So nothing of the drivers' part is done again, and what the live service made of the drive comes out.
+
+The live service: threads that listen, one loop that thinks.
+
+Each source has a thread of its own (``logger.service.main_loop``) that puts what it got into a queue. The main loop
 empties the queue twice a second, brings the events into order of time, as far as no source holds earlier ones back,
 records them if asked to, feeds the core, and reports to systemd and the status file. A pipeline that hangs
 stops feeding the watchdog.
@@ -11,17 +24,154 @@ What was written is synced at every second round: a row is on the disk half a se
 from __future__ import annotations
 
 import gc
+import logging
 import sys
+import threading
+import time
+from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from drivers.dump import Event
 from logger.service.event_core import EventCore
-from logger.service.event_merger import EventMerger
-from logger.service.listener import Listener, monotonic_us
-from logger.service.shutdown_signals import Stop
 from logger.service.storage import Storage
+from logger.service.supervisor import Supervisor
+from logger.service.systemd_notify import Stop
 from logger.units import US_PER_S
+
+
+class EventMerger:
+    """Each source brings its events in order of time, and some of them late."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Event] = []
+
+    def add(self, events: Iterable[Event]) -> None:
+        """More events, of any source."""
+        self._waiting.extend(events)
+
+    def until(self, until_us: int) -> list[Event]:
+        """Take out the events up to ``until_us`` [us], in order; before that no source may bring any more."""
+        self._waiting.sort(key=_time_of)
+        count = bisect_right(self._waiting, until_us, key=_time_of)
+        ready, self._waiting = self._waiting[:count], self._waiting[count:]
+        return ready
+
+
+def _time_of(event: Event) -> int:
+    return event.t_us
+
+
+CLOSED_WAIT_S = 0.1
+STOP_WAIT_S = 2.0
+HANG_US = 10 * US_PER_S
+log = logging.getLogger(__name__)
+
+
+def monotonic_us() -> int:
+    """The monotonic clock in whole microseconds, the resolution of a recorded dump."""
+    return time.monotonic_ns() // 1000
+
+
+class Listener(threading.Thread):
+    """Looks at one device for ever. ``pace`` waits between two looks.
+
+    waiting_since_us    an event as early as this may still come [us]; None: none is held back
+    """
+
+    def __init__(self, supervisor: Supervisor, events: deque[Event], pace: Callable[[], None]) -> None:
+        super().__init__(name=supervisor.name, daemon=True)
+        self._supervisor = supervisor
+        self._events = events
+        self._pace = pace
+        self._stop_asked = threading.Event()
+        self.failure: BaseException | None = None
+        self.waiting_since_us: int | None = None
+        self.looked_us = monotonic_us()
+
+    def run(self) -> None:
+        """Until stopped. A fault that is not the device's ends the thread; the main loop sees it."""
+        try:
+            while not self._stop_asked.is_set():
+                self.looked_us = monotonic_us()
+                self.look()
+                if self._supervisor.retry_at_us is not None:
+                    self._stop_asked.wait(CLOSED_WAIT_S)
+                else:
+                    self._pace()
+        except BaseException as failure:  # noqa: BLE001 - handed to the main thread, which raises it
+            self.failure = failure
+        finally:
+            self._events.extend(self._supervisor.close())
+            self.waiting_since_us = None
+
+    def look(self) -> None:
+        """Once. What comes is in the queue before ``waiting_since_us`` says that it does not wait any more."""
+        self._events.extend(self._supervisor.step())
+        self.waiting_since_us = self._supervisor.waiting_since_us
+
+    def stop(self) -> None:
+        """Ask it to end and wait for it, but not for one that hangs in its device."""
+        self._stop_asked.set()
+        self.join(STOP_WAIT_S)
+        if self.is_alive():
+            log.error("%s: its device does not return; stopping without it", self.name)
+
+    def hangs(self, now_us: int) -> bool:
+        """True when the device has not returned from a look for so long that only a restart can help."""
+        return now_us - self.looked_us > HANG_US
+
+
+PROGRESS_EVERY_US = 60 * US_PER_S
+
+
+@dataclass(frozen=True)
+class Playback:
+    """How much was played: events, and the time from the first to the last [s]."""
+
+    events: int
+    duration_s: float
+
+
+class Player:
+    """Plays events into a core; those that are neither the accelerometer's nor the receiver's are counted there as bad.
+
+    rate        multiple of real time; 0: as fast as it goes
+    progress    called about once a minute of drive with the time played [s]
+    """
+
+    def __init__(self, core: EventCore, rate: float, progress: Callable[[float], None]) -> None:
+        self._core = core
+        self._rate = rate
+        self._progress = progress
+
+    def play(self, events: Iterable[Event]) -> Playback:
+        """All events, then the end of the drive."""
+        count = 0
+        first_us: int | None = None
+        t_us = shown_us = 0
+        started_s = time.monotonic()
+        for event in events:
+            t_us = event.t_us
+            if first_us is None:
+                first_us = shown_us = t_us
+            if self._rate:
+                _sleep_until(started_s + (t_us - first_us) / US_PER_S / self._rate)
+            self._core.feed(event)
+            count += 1
+            if t_us - shown_us >= PROGRESS_EVERY_US:
+                shown_us = t_us
+                self._progress((t_us - first_us) / US_PER_S)
+        self._core.finish()
+        return Playback(count, (t_us - first_us) / US_PER_S if first_us is not None else 0.0)
+
+
+def _sleep_until(monotonic_s: float) -> None:
+    wait_s = monotonic_s - time.monotonic()
+    if wait_s > 0:
+        time.sleep(wait_s)
+
 
 LOOP_S = 0.5
 HOLD_BACK_US = 60_000

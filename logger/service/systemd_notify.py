@@ -1,4 +1,21 @@
-"""Tell systemd how the service is doing, without needing systemd.
+"""The service as a process of the system: what it tells systemd, its turn, and its end.
+
+Being on time on a machine that has other things to do.
+
+Problem. A sample is taken when its thread runs, so the service wants to go before all else. systemd can see to that
+(``CPUSchedulingPolicy=rr``), but a kernel with scheduling of real-time groups refuses it, and then systemd does not
+start the service at all.
+
+Solution. The unit only permits it (``LimitRTPRIO=``), and the service asks for it itself. Refused, it goes on with the
+niceness that the unit gives it, and says so. Where nothing is permitted, as in a terminal, nothing is asked for.
+
+A wish to stop that signals utter.
+
+Problem: a handler runs in the main thread between any two steps of it. If that thread waits for a ``threading.Event``
+and just holds the event's lock, which is not reentrant, a handler that sets the event waits for its own thread for
+ever. Solution: the handler only writes a byte to a pipe, and the one who waits looks at the pipe.
+
+Tell systemd how the service is doing, without needing systemd.
 
 Problem. A service of Type=notify must say when it is ready and that it is alive, by datagrams to a socket named
 in the environment. It must do that in milliseconds, from its own loop, never wait for the other side, and be the
@@ -10,10 +27,72 @@ cannot be delivered is dropped: the watchdog exists to notice. Source: sd_notify
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
+import resource
+import select
+import signal
 import socket
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+
+PRIORITY = 10
+log = logging.getLogger(__name__)
+
+
+def go_first() -> None:
+    """Make the calling thread, and all that it starts from now on, real-time (round robin), if that is permitted."""
+    permitted, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
+    if permitted != resource.RLIM_INFINITY and permitted < PRIORITY:
+        return
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PRIORITY))
+    except OSError as error:
+        log.warning("no real-time priority (%s): on a busy machine samples can be late", error.strerror)
+
+
+class Stop:
+    """Asked for once, by a handler or another thread; from then on it is set."""
+
+    def __init__(self) -> None:
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        self._asked = False
+
+    def set(self) -> None:
+        """Ask for it."""
+        self._asked = True
+        with contextlib.suppress(BlockingIOError):  # a full pipe holds the request already
+            os.write(self._writer, b"!")
+
+    def is_set(self) -> bool:
+        """Whether it was asked for."""
+        return self._asked
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until it is asked for, but no longer than so many seconds; whether it was."""
+        select.select([self._reader], [], [], seconds)
+        return self._asked
+
+    def close(self) -> None:
+        """Give the pipe back."""
+        os.close(self._reader)
+        os.close(self._writer)
+
+
+@contextlib.contextmanager
+def stopped_by_signals() -> Iterator[Stop]:
+    """A wish that Ctrl-C and SIGTERM utter, while inside."""
+    stop = Stop()
+    wanted = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in wanted]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(wanted, before, strict=True):
+            signal.signal(number, handler)
+        stop.close()
+
 
 logger = logging.getLogger(__name__)
 

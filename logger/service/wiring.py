@@ -1,9 +1,16 @@
-"""From settings to working parts: decoders, pipeline, and what a log must carry to stand alone."""
+"""The parts of the service put together, out of settings or out of a recording.
+
+Whether a recording's readings came as often as its header says: at another rate all samples of the grid would be
+holes, and every window would be flagged for it without a word on why.
+
+From settings to working parts: decoders, pipeline, and what a log must carry to stand alone.
+"""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from datetime import date
+from itertools import islice
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -12,11 +19,11 @@ import numpy as np
 
 from drivers.accelerometers import accelerometers
 from drivers.accelerometers.accelerometer import Decoder
-from drivers.dump import DumpHeader
+from drivers.dump import DumpHeader, open_dump
 from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
-from drivers.readings import BAUDS, RecordedWords
-from logger.comfort.noise_floor import NoiseFloor
+from drivers.readings import BAUDS, GPS, RecordedWords
+from logger.comfort.uncertain_ride import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
@@ -28,19 +35,44 @@ from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.service import noise_learning
-from logger.service.comfort_columns import ComfortColumns
 from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
+from logger.service.drive_readings import RangeUse
 from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
-from logger.service.range_use import RangeUse
 from logger.service.receiver_learning import at_start, from_fields, header_fields, is_loggers
-from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
+from logger.service.signal_chain import (
+    GRID_RATE_HZ,
+    Axis,
+    ComfortColumns,
+    SignalChain,
+    recorder_gain,
+    weighted_response,
+)
 from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
 from logger.store.formats.vehicle_file import Model
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.linearise import known_car
 from logger.vehicle.uncertain import cars_off
 from logger.vehicle.vehicle import Vehicle
+
+
+def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, slower: float = 1.5) -> None:
+    """Raise BadInput where the readings of a sensor that is read several times per sample came too seldom for that.
+
+    looked_at    so many events
+    slower       as many times as long between most readings is no busy bus, but another rate
+    """
+    if sensor.oversample == 1:
+        return
+    with open_dump(dump) as reader:
+        times_us = np.array([t_us for t_us, source, _ in islice(reader, looked_at) if source != GPS], dtype=float)
+    if len(times_us) < 2:
+        return
+    rate_hz, found_us = GRID_RATE_HZ * sensor.oversample, float(np.median(np.diff(times_us)))
+    if found_us * rate_hz > slower * 1e6:
+        raise BadInput(f"{dump}:1: expected readings at {rate_hz:g} Hz, as 'oversample': {sensor.oversample} says, "
+                       f"found them at about {1e6 / found_us:.3g} Hz")
+
 
 _READS = "reads"  # how many readings per sample there are, each of which has the noise that is said
 _FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through

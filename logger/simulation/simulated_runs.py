@@ -20,8 +20,7 @@ from logger.vehicle.compose import MOST_MPS2, Car, Response, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.observe import recorded_signals
-from logger.vehicle.passage import Passage
-from logger.vehicle.simulate import FINE_RATE_HZ
+from logger.vehicle.simulate import FINE_RATE_HZ, Passage
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

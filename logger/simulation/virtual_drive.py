@@ -20,8 +20,7 @@ from logger.profiles.track import Track
 from logger.roads.obstacles import OBSTACLES
 from logger.vehicle.compose import Car, bounded, recorded
 from logger.vehicle.observe import observed, recorded_distance
-from logger.vehicle.passage import Passage
-from logger.vehicle.simulate import FINE_RATE_HZ, drive
+from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]

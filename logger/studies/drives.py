@@ -28,8 +28,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
-from logger.dsp.pass_band import in_band
 from logger.dsp.weightings.wk import WEIGHTING
+from logger.dsp.whole_record import in_band
 from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
@@ -38,10 +38,9 @@ from logger.identification.noise_models import Autoregressive, Noise, RoadNoise,
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import SPEED_SCALE, Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
-from logger.roads.bumps import speed_bump
-from logger.roads.gd_iri import iri_per_root_gd
+from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.roads.iso8608 import STANDARD_WAVINESS, gd_n0_from_iri, generate
-from logger.roads.obstacles import step
+from logger.roads.obstacles import speed_bump, step
 from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import SensorErrors, as_sensed

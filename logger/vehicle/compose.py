@@ -29,10 +29,14 @@ from logger.vehicle.effect import (
 )
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
-from logger.vehicle.passage import Passage
-from logger.vehicle.state_space import driven_outputs, straight_step
+from logger.vehicle.simulate import Passage
 from logger.vehicle.stepping import Motion, Stepper, force_input
-from logger.vehicle.structure import Structure, body_point
+from logger.vehicle.structure import (
+    Structure,
+    body_point,
+    driven_outputs,
+    straight_step,
+)
 from logger.vehicle.vehicle import Axle, Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -254,3 +258,5 @@ def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:
     """The effects with one more, or with another value of one that is there."""
     others = [other for other in effects if other.effect.name != one.effect.name]
     return (*others, one)
+
+

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from logger.runs import Signal
 from logger.vehicle.compose import Car, in_blocks, moved, recorded
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 from logger.vehicle.stepping import force_input
 from logger.vehicle.structure import Output, body_point, suspension_travel, wheel
 

@@ -1,6 +1,6 @@
 """A car with nonlinear laws at its corners, stepped through time.
 
-The linear part of the car is stepped exactly (as ``state_space`` has it). What the laws add to it are forces that
+The linear part of the car is stepped exactly (as ``structure`` has it). What the laws add to it are forces that
 depend on the motion itself; within a step they are straight lines from what they are at its beginning to what they come
 to at its end, which is found by trying twice. Dry friction takes whatever value stops the suspension at the end of the
 step, as far as it reaches, and keeps it for the step: that sticks and slips without a smallest speed (J. J. Moreau's
@@ -8,7 +8,7 @@ time stepping, in: Nonsmooth Mechanics and Applications, 1988). One that grows w
 mount in series with a damper has a state, its compression, stepped by the trapezoidal rule.
 
 Laws come as tables, so that one loop serves all of them, in whatever combination; those by more than two variables, or
-with states, as addresses of functions (``law_call``). The loop is compiled when numba is
+with states, as addresses of functions (``laws``). The loop is compiled when numba is
 installed (the ``lab`` extra) and runs as plain Python, some hundred times slower, when it is not.
 """
 
@@ -24,8 +24,7 @@ import numpy.typing as npt
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
-from logger.vehicle.state_space import straight_step
-from logger.vehicle.structure import Structure
+from logger.vehicle.structure import Structure, straight_step
 
 if TYPE_CHECKING:
     from logger.vehicle.stepping_loop import Asked
@@ -177,7 +176,7 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     """Laws by all that moves as the loop reads them; None where there are none."""
     if not any(one.motions for one in laws):
         return None
-    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_in_order
+    from logger.vehicle.laws import ANSWERS, FELT, address_of, numbers_in_order
 
     whole, numbers, memories = [], [0.0], []
     for i, corner in enumerate(laws):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.law_call import FELT, MEMORY_AT, ask
+from logger.vehicle.laws import FELT, MEMORY_AT, ask
 
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]

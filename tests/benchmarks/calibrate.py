@@ -24,7 +24,7 @@ from logger.estimation.rms_calibration import (
 )
 from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
-from logger.roads.gd_iri import iri_per_root_gd
+from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import find, fingerprint, keep, read_vehicle

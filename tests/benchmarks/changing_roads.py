@@ -47,8 +47,8 @@ from logger.roads.sections import Windows, even_edges, sections
 from logger.roads.window_errors import WindowErrors
 from logger.service.signal_chain import GRID_STEP_US
 from logger.units import FOOT_M, MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 
 from ..support.drives.measured import (
@@ -154,7 +154,7 @@ def measured_profile(path: Path) -> Road:
 def ours(sensor: Accelerometer, readings: Array, clipped: Array, travelled_m: Array, learns: bool, rides: bool
          ) -> tuple[list[WindowEstimate], float]:
     """Windows of ridelog, and its processor time per driven second."""
-    structure, known = half_car.structure(rav4()), reported(sensor)
+    structure, known = half_car(rav4()), reported(sensor)
     noise = NoiseBelief.guessed(GUESS_MPS2) if learns else None
     known = replace(known, noise_rms_mps2=GUESS_MPS2) if learns else known
     started_s = time.process_time()

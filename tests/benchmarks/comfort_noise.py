@@ -38,8 +38,8 @@ from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.service.signal_chain import GRID_STEP_US
 from logger.units import MPH_MPS, WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 
 from ..support.drives.measured import GRID_HZ, Drive, Receiver, iso_road, steady_drive
@@ -165,7 +165,7 @@ def cost(mph: int, windows: int) -> tuple[float, float]:
     road = iso_road(iri_from_gd_n0(CLASS_GD_N0_CM3["B"]), windows * WINDOW_M, FIRST_SEED)
     drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ)
     readings, _ = Chip("BMA220", ASSUMED_MPS2, step, counts=(-32, 31)).read(drive.accel_mps2, np.random.default_rng(1))
-    structure = half_car.structure(rav4())
+    structure = half_car(rav4())
     usable, nowhere = np.ones(len(readings), dtype=np.bool_), np.zeros(len(readings))
     taken = []
     for response in (None, WEIGHTING.response):

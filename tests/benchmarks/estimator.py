@@ -49,16 +49,16 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.records import WindowRecord
-from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, GpsConfig, PipelineConfig
 from logger.service.signal_chain import GRAVITY_CORNER_HZ, recorder_gain
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model, read_vehicle
 from logger.units import FOOT_M, MPH_MPS, US_PER_S, WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import known_vehicle
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import Axle, Vehicle, with_load
 
@@ -264,7 +264,7 @@ def estimates(
 ) -> dict[int, tuple[float, float]]:
     """The estimator fed as the service feeds it, with readings (n,) or (n, k): IRI and its standard error [m/km] by
     number of the window."""
-    structure = half_car.structure(rav4())
+    structure = half_car(rav4())
     started_s = time.process_time()
     estimator = RoadEstimator(LinearCar(structure, body_point(structure)), sensor, window_m,
                               reads=readings.size // len(readings))
@@ -356,7 +356,7 @@ def known_best(
     reported_by = road.spectrum_m3 * np.abs(response) ** 2 * GRID_HZ / (2 * variance * speed)
     waves = _conjugate_gradients(lambda x: x + backward(forward(x)) / variance, backward(felt) / variance,
                                  1 / (1 + np.mean(road.gain**2) * reported_by), 600 if np.ptp(road.gain) else 3)
-    golden = frequency_response(sections(SPACING_M), wave_number, 1 / SPACING_M)
+    golden = frequency_response(golden_car_sections(SPACING_M), wave_number, 1 / SPACING_M)
     golden = golden * (np.exp(2j * np.pi * wave_number * TIRE_BASE_M) - 1) / TIRE_BASE_M
     slope = np.fft.rfft(road.gain * np.fft.irfft(waves * colour, count)) / rise
     mean = np.fft.irfft(np.where(wave_number > 0, slope * golden, 0), count)
@@ -445,7 +445,7 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
 
 def reported_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
     """The product's own limit at each speed, over the levels driven."""
-    structure = half_car.structure(rav4())
+    structure = half_car(rav4())
     limits = ErrorBound(LinearCar(structure, body_point(structure)), reported(sensor), WINDOW_M)
     return [pooled_r2([limits.at(mph * MPH_MPS, RoadSpectrum.of_iri(level)) for level in extent.levels])
             for mph in extent.mph]

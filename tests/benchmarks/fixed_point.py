@@ -17,12 +17,11 @@ from scipy import signal
 
 from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, simulate_drive
-from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter
-from logger.dsp.fixed_scaling import fixed_cascade
+from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
-from logger.roads.golden_car import sections
+from logger.roads.iri import golden_car_sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
@@ -45,7 +44,7 @@ def main() -> int:
         for road_class in "AC":
             car_noise(figures, road_class, spacing_m)
     speed(figures, "Wk", WK, FULL_SCALE_MPS2)
-    speed(figures, "Golden Car, 0.05 m", sections(0.05), FULL_SCALE_SLOPE)
+    speed(figures, "Golden Car, 0.05 m", golden_car_sections(0.05), FULL_SCALE_SLOPE)
     replay_speed(figures)
     return 1 if figures.missed else 0
 
@@ -75,9 +74,9 @@ def car_noise(figures: Figures, road_class: str, spacing_m: float) -> None:
     elevation_m = iso8608.generate(iso8608.CLASS_GD_N0_CM3[road_class], 1000.0, spacing_m, 1)
     base = int(0.25 / spacing_m + 0.5)
     slope = (elevation_m[base:] - elevation_m[:-base]) / (base * spacing_m)
-    wanted = signal.sosfilt(sections(spacing_m), slope)
+    wanted = signal.sosfilt(golden_car_sections(spacing_m), slope)
     for bits in (32, 16):
-        found = FixedFilter(fixed_cascade(sections(spacing_m), FULL_SCALE_SLOPE, bits)).process(slope)
+        found = FixedFilter(fixed_cascade(golden_car_sections(spacing_m), FULL_SCALE_SLOPE, bits)).process(slope)
         snr(figures, f"Golden Car, class {road_class}, {spacing_m} m, {bits} bit", bits, wanted, found)
         off = np.abs(found).mean() / np.abs(wanted).mean() - 1
         print(f"{'  its IRI is off by':48s} {100 * off:10.2g} %")

@@ -15,10 +15,10 @@ import numpy as np
 
 from logger.commands.main import main as ridelog
 from logger.roads import iso8608
-from logger.roads.golden_car import GoldenCarFilter, sections
+from logger.roads.iri import GoldenCarFilter, golden_car_sections
 from logger.store.formats.profile_file import read_profile
-from logger.vehicle.quarter_car import GOLDEN_CAR, structure
-from logger.vehicle.state_space import straight_step
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
+from logger.vehicle.structure import straight_step
 
 from .figures import Figures
 
@@ -63,7 +63,7 @@ def plain_loop(elevation_m: np.ndarray) -> float:
     """IRI [m/km] as published programs take it: one matrix product per sample."""
     base = round(0.25 / SPACING_M)
     slope = (elevation_m[base:] - elevation_m[:-base]) / (base * SPACING_M)
-    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), SPACING_M * 3.6 / 80)
+    transition, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), SPACING_M * 3.6 / 80)
     gain = ends[0] + ends[1]  # held over the step
     state, column, total = np.zeros(4), gain[:, 0], 0.0
     for value in slope:
@@ -76,7 +76,7 @@ def sosfilt_s(elevation_m: np.ndarray) -> float:
     """The same sections by SciPy, which must have the whole record [s]."""
     from scipy.signal import sosfilt
 
-    sos, slope = sections(SPACING_M), np.diff(elevation_m) / SPACING_M
+    sos, slope = golden_car_sections(SPACING_M), np.diff(elevation_m) / SPACING_M
     return median_s(lambda: np.abs(sosfilt(sos, slope)))
 
 

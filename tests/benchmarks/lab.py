@@ -22,7 +22,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen, Effect, chosen
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 from .figures import Figures
 

@@ -20,7 +20,7 @@ from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 from ..validation.simulator.cars import Axle, Car
 from ..validation.simulator.effects import EFFECTS

@@ -17,8 +17,8 @@ from drivers.accelerometers.bma220 import NOISE_MPS2
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 
 from ..support.drives.measured import GRID_HZ, Accelerometer, measured_like_road, steady_drive
@@ -38,7 +38,7 @@ def driven(level: float, mph: float, range_g: int, reads: int, seed: int) -> np.
     drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ * reads)
     _, each, clipped = on_grid(drive, chip, np.random.default_rng([FIRST_SEED, seed, range_g]))
     place_m = drive.place_m[::reads][: len(each)]
-    structure = half_car.structure(rav4())
+    structure = half_car(rav4())
     estimator = RoadEstimator(LinearCar(structure, body_point(structure)), Sensor(noise, chip.step_mps2), WINDOW_M,
                               reads=reads)
     at_end = np.where(clipped, np.sign(each - np.median(each)), 0.0)

@@ -19,8 +19,8 @@ from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.service.receiver_learning import UNKNOWN
 from logger.units import MPH_MPS, WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 
 from ..support.drives.braking_drives import Instrument, Mounting, Receiver, drive, fed
@@ -81,7 +81,7 @@ OFF = (-1.150, -0.319, 0.319, 1.150)  # standard errors: the middles of four equ
 def windows_off(accelerometer: Accelerometer, road: Road, mph: int, off_s: float, seed: int) -> np.ndarray:
     """By how many standard errors (w,) windows are off whose places are late by ``off_s``, not known better than
     UNKNOWN.std_s."""
-    structure = half_car.structure(rav4())
+    structure = half_car(rav4())
     driven = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ)
     readings, clipped = accelerometer.read(driven.accel_mps2, np.random.default_rng(seed))
     at_end = np.where(clipped, np.sign(readings - np.median(readings)), 0.0)

@@ -12,9 +12,8 @@ import time
 
 import numpy as np
 
-from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import Passes, means, passes_of, scatter_of
-from logger.roads.road_matching import DOUBTFUL
+from logger.roads.road_matching import DOUBTFUL, lay
 from logger.roads.road_network import RoadNetwork
 from logger.roads.window_errors import WindowErrors
 

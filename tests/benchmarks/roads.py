@@ -8,7 +8,8 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads import gd_iri, iso8608
+from logger.roads import elevation_spectrum as spectrum
+from logger.roads import iso8608
 from logger.roads.elevation_spectrum import Roughness, classify
 from logger.roads.iri import iri, rectified_slope
 
@@ -124,10 +125,11 @@ def relation(figures: Figures) -> None:
     cut = [iri(one, SPACING_M) * np.sqrt(gd / 64)
            for gd, one in zip(gd_n0_cm3, stretches(64, 1000), strict=True)]
     print_fit("  stretches of one long road", gd_n0_cm3, np.array(cut))
-    print(f"  computed without roads       {gd_iri.iri_per_root_gd():.4f}  0.5     {gd_iri.relative_spread(1000):.4f}")
+    print(f"  computed without roads       {spectrum.iri_per_root_gd():.4f}  0.5     "
+          f"{spectrum.relative_spread(1000):.4f}")
     figures.at_most("exponent off 0.5", abs(exponent - 0.5), 0.005, "")
     figures.at_most("constant off 0.5386", 100 * abs(constant / iso8608.IRI_PER_ROOT_GD - 1), 1.5, "%")
-    figures.at_most("constant off the computed one", 100 * abs(constant / gd_iri.iri_per_root_gd() - 1), 0.5, "%")
+    figures.at_most("constant off the computed one", 100 * abs(constant / spectrum.iri_per_root_gd() - 1), 0.5, "%")
 
 
 def print_fit(name: str, gd_n0_cm3: Array, iri_m_per_km: Array) -> tuple[float, float]:
@@ -163,7 +165,7 @@ def spread(figures: Figures) -> None:
         for length_m in (20, 100, 500):
             size = round(length_m / SPACING_M)
             means = slope[: len(slope) // size * size].reshape(-1, size).mean(axis=1)
-            measured, computed = means.std() / means.mean(), gd_iri.relative_spread(length_m, waviness)
+            measured, computed = means.std() / means.mean(), spectrum.relative_spread(length_m, waviness)
             figures.at_most(f"waviness {waviness:g}, {length_m} m: spread {computed:.4f}, driven {measured:.4f}",
                             100 * abs(measured / computed - 1), 15, "%")
 

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import erf, ndtr, ndtri
 
 from logger.dsp.sections import frequency_response
-from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.drives.measured import SPACING_M, Road, recorder_response, road_response
@@ -72,7 +72,7 @@ class Chain:
         self._power = np.zeros(self._count // 2 + 1)  # of the acceleration's rfft, at the road's own level
         felt = road.spectrum_m3 * np.abs(self._response) ** 2 * step_cpm * self._count**2 / 2
         self._power[1: self._both] = felt[1: self._both]
-        golden = frequency_response(sections(SPACING_M), wave_number, 1 / SPACING_M)
+        golden = frequency_response(golden_car_sections(SPACING_M), wave_number, 1 / SPACING_M)
         self._golden = golden * (np.exp(2j * pi * wave_number * TIRE_BASE_M) - 1) / TIRE_BASE_M
         self._golden[0] = 0.0
         self._slope_power = np.abs(self._golden) ** 2 * road.spectrum_m3 * step_cpm

@@ -12,16 +12,14 @@ import numpy.typing as npt
 
 from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.bumps import speed_bump
-from logger.roads.obstacles import pothole, step
+from logger.roads.obstacles import pothole, speed_bump, step
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
-from logger.vehicle.passage import Passage
-from logger.vehicle.simulate import drive, recorder_taps, simulate
+from logger.vehicle.simulate import Passage, drive, recorder_taps, simulate
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
 

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from logger.service.speed_check import SpeedCheck
+from logger.service.doubted_spans import SpeedCheck
 
 from ..support.drives.receivers import town_drive
 from .figures import Figures

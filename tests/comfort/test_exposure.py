@@ -6,8 +6,8 @@ from math import inf
 
 import pytest
 
-from logger.comfort import exposure
-from logger.comfort.exposure import (
+from logger.comfort import iso2631
+from logger.comfort.iso2631 import (
     A8_MPS2,
     CAUTION_ZONE_VDV_MPS175,
     VDV_MPS175,
@@ -72,5 +72,5 @@ def test_where_a_value_stands() -> None:
 
 def test_the_limits_are_those_of_the_directive() -> None:
     """Directive 2002/44/EC, Article 3(2)."""
-    assert (exposure.A8_MPS2.action, exposure.A8_MPS2.limit) == (0.5, 1.15)
-    assert (exposure.VDV_MPS175.action, exposure.VDV_MPS175.limit) == (9.1, 21.0)
+    assert (iso2631.A8_MPS2.action, iso2631.A8_MPS2.limit) == (0.5, 1.15)
+    assert (iso2631.VDV_MPS175.action, iso2631.VDV_MPS175.limit) == (9.1, 21.0)

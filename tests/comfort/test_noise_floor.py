@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import sosfilt
 
 from logger.comfort.iso2631 import RunningRms, a_w, vdv
-from logger.comfort.noise_floor import NoiseFloor, RawFigures
+from logger.comfort.uncertain_ride import NoiseFloor, RawFigures
 from logger.dsp.weightings.wk import WEIGHTING
 
 RATE_HZ = 100

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from logger.commands.main import main
-from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter
-from logger.dsp.fixed_scaling import fixed_cascade
+from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
-from logger.roads.golden_car import sections
+from logger.roads.iri import golden_car_sections
 
 from ..support.slow import slow
 
@@ -45,7 +44,7 @@ int main(void)
 }
 """
 SOS = {"ridelog_wk": (WEIGHTING.sections[100], FULL_SCALE_MPS2),
-       "ridelog_golden_car": (sections(0.05), FULL_SCALE_SLOPE)}
+       "ridelog_golden_car": (golden_car_sections(0.05), FULL_SCALE_SLOPE)}
 
 
 def program(folder: Path, name: str, *options: str) -> Path:

@@ -15,8 +15,7 @@ from logger.chart_data import Curves, Line
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.report.charts import chart
-from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.profile_iri import continuous_iri
+from logger.roads.iri import continuous_iri, rectified_slope, window_iri
 
 
 @pytest.fixture(scope="module")

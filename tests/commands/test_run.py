@@ -13,7 +13,7 @@ from logger.commands import run as command
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.service import serve
-from logger.service.shutdown_signals import Stop
+from logger.service.systemd_notify import Stop
 
 
 @pytest.fixture(autouse=True)

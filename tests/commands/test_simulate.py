@@ -14,7 +14,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.bumps import speed_bump
+from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import DriveOnRoad, read_run, write_profile
 from logger.store.formats.effect_file import shipped_effects
@@ -22,8 +22,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
-from logger.vehicle.passage import Passage
-from logger.vehicle.simulate import FINE_RATE_HZ, drive
+from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
 from logger.vehicle.structure import body_point
 
 BUMP = "bump:start_m=20,height_m=0.08,width_m=3.6"

@@ -9,8 +9,8 @@ from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
-from logger.vehicle import half_car
-from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import body_acceleration_response
+from logger.vehicle.models import half_car
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.drives.measured import (
@@ -34,7 +34,7 @@ def car() -> Vehicle:
 
 def test_equations_written_out_agree_with_the_models(car: Vehicle) -> None:
     f_hz = np.geomspace(0.1, 45.0, 100)
-    model = body_acceleration_response(half_car.structure(car), f_hz, 11.0)
+    model = body_acceleration_response(half_car(car), f_hz, 11.0)
     assert road_response(car, f_hz / 11.0, 11.0) == pytest.approx(model, rel=1e-9)
 
 

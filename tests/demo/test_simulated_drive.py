@@ -18,7 +18,7 @@ from logger.roads import iso8608
 from logger.roads.iri import iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import half_car
+from logger.vehicle.models import half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 SHIPPED = Path(make.__file__).parent / "drive.dump.gz"
@@ -142,7 +142,7 @@ def test_body_moves_as_scipy_says() -> None:
         np.interp(12.5 * time[:, None] + place + patch, profile_m, drive.road.elevation_m).mean(axis=1)
         for place in (0.0, -2.94)
     ], axis=1)
-    a, b = half_car.structure(RAV4).state_space()
+    a, b = half_car(RAV4).state_space()
     _, accel, _ = signal.lsim(signal.StateSpace(a, b, a[4:5], b[4:5]), wheels - wheels[0], time, interp=True)
     low = signal.butter(4, 30, fs=1000, output="sos")
     mine, theirs = (signal.sosfiltfilt(low, x)[5000:-500] for x in (drive.accel_mps2, accel))

@@ -11,20 +11,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from logger.dsp.fixed_order import quiet
-from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter
-from logger.dsp.fixed_scaling import FixedCascade, FixedSection, fixed_cascade
+from logger.dsp.fixed_point import (
+    FULL_SCALE_MPS2,
+    FULL_SCALE_SLOPE,
+    FixedCascade,
+    FixedFilter,
+    FixedSection,
+    fixed_cascade,
+    quiet,
+)
 from logger.dsp.sections import butterworth_sos, frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
-from logger.roads.golden_car import sections
-from logger.roads.iri import rectified_slope
+from logger.roads.iri import golden_car_sections, rectified_slope
 
 WK = np.asarray(WEIGHTING.sections[100])
 SOS = {
     "wk": (WK, FULL_SCALE_MPS2),
-    "car-0.25": (sections(0.25), FULL_SCALE_SLOPE),
-    "car-0.05": (sections(0.05), FULL_SCALE_SLOPE),
+    "car-0.25": (golden_car_sections(0.25), FULL_SCALE_SLOPE),
+    "car-0.05": (golden_car_sections(0.05), FULL_SCALE_SLOPE),
     "gravity": (butterworth_sos("high", 0.2, 100), FULL_SCALE_MPS2),
     "low-pass": (butterworth_sos("low", 15.0, 100), FULL_SCALE_MPS2),
 }
@@ -180,8 +185,9 @@ def test_the_quarter_car_on_a_smooth_road(spacing_m: float) -> None:
     elevation_m = iso8608.generate(16.0, 250.0, spacing_m, 1)  # class A: the smallest signal
     base = max(1, int(0.25 / spacing_m + 0.5))
     slope = (elevation_m[base:] - elevation_m[:-base]) / (base * spacing_m)
-    exact = signal.sosfilt(sections(spacing_m), slope)
-    snrs_db = [snr_db(exact, FixedFilter(fixed_cascade(sections(spacing_m), FULL_SCALE_SLOPE, bits)).process(slope))
+    exact_sections = golden_car_sections(spacing_m)
+    exact = signal.sosfilt(exact_sections, slope)
+    snrs_db = [snr_db(exact, FixedFilter(fixed_cascade(exact_sections, FULL_SCALE_SLOPE, bits)).process(slope))
                for bits in (32, 16)]
     print(f"Golden Car, {spacing_m} m, class A: {snrs_db[0]:.0f} dB at 32 bit, {snrs_db[1]:.0f} dB at 16 bit")
     assert snrs_db[0] > 90
@@ -257,7 +263,7 @@ def test_inputs_are_rounded_to_even_and_clipped() -> None:
     ([[1.0, 0, 0, 1, -(2**31 - 49392 - 0.45) / 2**30, (2**30 - 49392) / 2**30]], 32, 1.0, "stable with 32-bit"),
     ([[1.0, 0, 0, 1, -(2**31 - 66572 - 1) / 2**30, (2**30 - 66572) / 2**30]], 32, 1.0, "falls silent"),
     ([[1.0, 0, 0, 1, -1.9998, 0.99980001]], 32, 1.0, "a scale fits"),
-    (sections(0.001), 32, 1.0, "wider spacing"),
+    (golden_car_sections(0.001), 32, 1.0, "wider spacing"),
     (WK, 24, 1.0, "16 or 32"),
     (WK, 32, 0.0, "full scale"),
     (WK, 32, float("nan"), "full scale"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.dsp.range_ends import range_ends
+from logger.dsp.repeated_samples import range_ends
 
 from ..support.drives.records import FINE_HZ, ride, rounded
 

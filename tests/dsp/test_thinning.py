@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.dsp.thinning import thinned
+from logger.dsp.whole_record import thinned
 
 RATE_HZ = 1000.0
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 
-from logger.dsp.bursts import burst_ends, spread
-from logger.dsp.uneven import mean_rate_hz, on_even_grid
+from logger.dsp.repeated_samples import burst_ends, spread
+from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 
 
 def jittered(rate_hz: float, jitter: float, seconds: float = 40.0) -> np.ndarray:

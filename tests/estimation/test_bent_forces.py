@@ -12,7 +12,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
 from logger.vehicle.linearise import MovedCar, known_car
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 COUNT, RATE_HZ, SPEED_MPS = 2048, 100.0, 20.0

@@ -11,11 +11,10 @@ from logger.estimation.car_response import (
     golden_car_on_grid,
     golden_car_slope,
 )
-from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linear_car import LinearCar, body_acceleration_response
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed
@@ -65,7 +64,7 @@ def test_golden_car_slope_is_that_of_the_exact_filter() -> None:
     phase = 2 * np.pi * wave_number * spacing_m
     base = round(TIRE_BASE_M / spacing_m)
     slope = (np.exp(1j * phase * base) - 1) / TIRE_BASE_M  # to the sample 250 mm ahead, counted at the end of the step
-    exact = sosfreqz(sections(spacing_m), phase)[1] * slope * np.exp(-1j * phase)
+    exact = sosfreqz(golden_car_sections(spacing_m), phase)[1] * slope * np.exp(-1j * phase)
     found = golden_car_slope(wave_number)
     assert np.abs(found - exact).max() < 0.01 * np.abs(exact).max()
     assert np.abs(found) == pytest.approx(np.abs(exact), rel=0.01)

@@ -9,7 +9,7 @@ from scipy.special import erf
 from logger.estimation.error_bound import ErrorBound, Limit, pooled_r2
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
-from logger.roads.gd_iri import iri_of_road
+from logger.roads.elevation_spectrum import iri_of_road
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle

@@ -15,11 +15,10 @@ from logger.estimation.iri_posterior import (
     window_iri,
 )
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linear_car import LinearCar, body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -133,7 +132,7 @@ def remembered_power(spacing_m: float) -> np.ndarray:
     impulse = np.zeros(round(45.0 / fine_m))
     impulse[: round(TIRE_BASE_M / fine_m)] = 1.0  # the tire's average, which reaches ahead by half of it
     ahead = round(0.5 * TIRE_BASE_M / fine_m)
-    power = sosfilt(sections(fine_m), impulse)[ahead:] ** 2
+    power = sosfilt(golden_car_sections(fine_m), impulse)[ahead:] ** 2
     by_step = np.add.reduceat(power, np.arange(0, len(power), 100))
     return by_step / by_step.sum()
 

@@ -18,8 +18,8 @@ from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.models import half_car
 from logger.vehicle.structure import body_point
 
 from ..support.drives.measured import Accelerometer, Drive, iso_road, steady_drive
@@ -42,7 +42,7 @@ def estimates(
     found = drive(level_m_per_km, windows)
     chip = Accelerometer("chip", sensor.noise_rms_mps2, sensor.step_mps2)
     readings, _ = chip.read(found.accel_mps2, np.random.default_rng(6))
-    structure = half_car.structure(read_vehicle(vehicle_file("rav4-2009")))
+    structure = half_car(read_vehicle(vehicle_file("rav4-2009")))
     estimator = RoadEstimator(LinearCar(structure, body_point(structure)), sensor, window_m,
                               ride_response=WEIGHTING.response if weighted else None)
     usable = np.ones(len(readings), dtype=np.bool_)
@@ -119,7 +119,7 @@ def test_a_ride_far_below_a_step_is_not_reported() -> None:
 
 
 def test_an_unsure_noise_widens_the_errors_and_moves_nothing() -> None:
-    structure = half_car.structure(read_vehicle(vehicle_file("rav4-2009")))
+    structure = half_car(read_vehicle(vehicle_file("rav4-2009")))
     posterior = RidePosterior(CarResponse(LinearCar(structure, body_point(structure))), WEIGHTING.response, 2048, 100.0)
     weighted = posterior.weighted(np.random.default_rng(7).standard_normal(2048))
     inside = np.zeros(2048, dtype=np.bool_)

@@ -10,14 +10,13 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.rms_calibration import SPEEDS_MPS, CalibrationSettings, SpeedCalibration, calibrate, fit, loaded
 from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
-from logger.roads.gd_iri import iri_per_root_gd
+from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import WINDOW_M
-from logger.vehicle import half_car
 from logger.vehicle.linearise import known_vehicle
-from logger.vehicle.quarter_car import GOLDEN_CAR
+from logger.vehicle.models import GOLDEN_CAR, half_car
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -36,7 +35,7 @@ def butterworth_15_hz(f_hz: np.ndarray) -> np.ndarray:
     (GOLDEN_CAR, None), (FULL_CAR, None), (loaded(RAV4, sprung_mass_factor=2.0), None),
 ])
 def test_it_agrees_with_the_computed_relation_within_its_standard_error(vehicle: Vehicle, gain: object) -> None:
-    """The integral takes IRI from Eq 4.39; on exact IRI that constant is 0.8 % low (``gd_iri``), which is known."""
+    """The integral takes IRI from Eq 4.39; on exact IRI that constant is 0.8 % low, which is known."""
     computed = rms_relation(known_vehicle(vehicle), gain, SPEEDS_MPS).iri_per_accel_rms
     exact = computed * iri_per_root_gd() / iso8608.IRI_PER_ROOT_GD
     per_root_gd = iso8608.IRI_PER_ROOT_GD / computed
@@ -90,7 +89,7 @@ def drive(elevation_m: np.ndarray, speed_mps: float) -> np.ndarray:
     front = np.convolve(elevation_m - elevation_m[0], np.full(5, 0.2), mode="same")
     behind = round(2.94 / SPACING_M)
     road = np.stack([front, np.concatenate([np.zeros(behind), front[:-behind]])], axis=1)
-    a, b = half_car.structure(RAV4).state_space()
+    a, b = half_car(RAV4).state_space()
     system = signal.StateSpace(a, b, a[4:5], b[4:5])
     _, accel, _ = signal.lsim(system, road, SPACING_M / speed_mps * np.arange(len(road)), interp=True)
     return accel

@@ -9,12 +9,11 @@ from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import half_car
 from logger.vehicle.linearise import known_vehicle
-from logger.vehicle.quarter_car import GOLDEN_CAR
+from logger.vehicle.models import GOLDEN_CAR, half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
-A, B = half_car.structure(RAV4).state_space()
+A, B = half_car(RAV4).state_space()
 SPACING_M = 0.05
 WHEELBASE_M = 2.94
 CG_M = 1.47

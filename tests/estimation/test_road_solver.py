@@ -12,8 +12,7 @@ from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, quick_fft_le
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linear_car import LinearCar, body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure, body_point
 

@@ -10,8 +10,8 @@ from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.bumps import speed_bump
 from logger.roads.iri import rectified_slope, window_iri
+from logger.roads.obstacles import speed_bump
 from logger.roads.sections import Windows, even_edges, sections
 from logger.roads.window_errors import WindowErrors
 from logger.shipped import vehicle_file

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.extraction.run_grid import run_grid
+from logger.extraction.along_track import run_grid
 
 RATE_HZ = 100.0
 

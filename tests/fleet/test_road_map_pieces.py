@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.fleet.road_map import pieces_of
-from logger.roads.linear_reference import measures
+from logger.roads.road_matching import measures
 
 
 def test_roads_without_a_length_are_refused() -> None:

@@ -12,8 +12,8 @@ from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
 from logger.identification.unknown_inputs import Bump, RoadInput, expanded, free_input
 from logger.profiles.track import Track
-from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
+from logger.roads.obstacles import speed_bump
 from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4, recorded
 from logger.vehicle.named_parameters import free

@@ -21,8 +21,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.studies.drives import rav4
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Parameter, RoadEffect, Scale, chosen
-from logger.vehicle.effect_parameters import free_number, free_parameter_named
-from logger.vehicle.named_parameters import free
+from logger.vehicle.named_parameters import free, free_number, free_parameter_named
 
 from ..support.drives.bumps import bump_record, road_record
 from ..support.drives.rubbing import FRICTION_N, rubbing_run

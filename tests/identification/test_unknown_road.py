@@ -17,7 +17,7 @@ from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
-from logger.vehicle.frequency_response import AxleResponse
+from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.named_parameters import changed, free
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 

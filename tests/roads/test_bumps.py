@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from logger.roads.bumps import speed_bump
+from logger.roads.obstacles import speed_bump
 
 
 def test_a_bump_is_a_raised_cosine() -> None:

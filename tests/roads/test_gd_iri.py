@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from logger.roads import iso8608
-from logger.roads.gd_iri import gd_of_road, iri_of_road, iri_per_root_gd, relative_spread
+from logger.roads.elevation_spectrum import gd_of_road, iri_of_road, iri_per_root_gd, relative_spread
 from logger.roads.iri import iri, rectified_slope
 
 SPACING_M = 0.05

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from logger.roads import iso8608
 from logger.roads.iri import iri, rectified_slope, window_iri
-from logger.vehicle.quarter_car import GOLDEN_CAR, structure
-from logger.vehicle.state_space import straight_step
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
+from logger.vehicle.structure import straight_step
 
 # World Bank Technical Paper 46 (Sayers, Gillespie, Paterson 1986), pages 41-42: the IRI from 0 to 0.25, 0.5, ... 30 m
 # of a triangular pulse of 20 mm.
@@ -35,7 +35,7 @@ def pulse(spacing_m: float, length_m: float = 30.0) -> np.ndarray:
 def drive(elevation: np.ndarray, spacing_m: float, base: int, start_m: float = 11.0) -> np.ndarray:
     """Rectified slopes by the textbook: the state-transition matrix, step after step."""
     slope = (elevation[base:] - elevation[:-base]) / (base * spacing_m)
-    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), spacing_m / SPEED_MPS)
+    transition, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), spacing_m / SPEED_MPS)
     gain = ends[0] + ends[1]  # held over the step
     first = int(start_m / spacing_m + 0.5)
     state = np.array([1.0, 1.0, 0.0, 0.0]) * (elevation[first] - elevation[0]) / (first * spacing_m)
@@ -63,7 +63,7 @@ def test_all_values_of_the_world_bank_check_pulse() -> None:
 
 def test_state_transition_has_the_printed_coefficients() -> None:
     """World Bank Technical Paper 46, table of coefficients at 0.25 m, for states (z_s', z_s'', z_u', z_u'')."""
-    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), 0.25 / SPEED_MPS)
+    transition, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), 0.25 / SPEED_MPS)
     gain = ends[0] + ends[1]  # held over the step
     order = [0, 2, 1, 3]
     printed = np.array([
@@ -153,7 +153,7 @@ def test_scipy_agrees_on_a_long_road(spacing_m: float) -> None:
     elevation = iso8608.generate(40.0, 300.0, spacing_m, 6)
     base = max(1, int(0.25 / spacing_m + 0.5))
     slope = (elevation[base:] - elevation[:-base]) / (base * spacing_m)
-    matrices = structure(GOLDEN_CAR).state_space()
+    matrices = quarter_car(GOLDEN_CAR).state_space()
     car = cont2discrete((*matrices, np.array([[1.0, -1, 0, 0]]), np.zeros((1, 1))), spacing_m / SPEED_MPS)
     first = int(11 / spacing_m + 0.5)
     start = (elevation[first] - elevation[0]) / (first * spacing_m) * np.array([1.0, 1, 0, 0])

@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from logger.dsp.fixed_point import FULL_SCALE_SLOPE, FixedFilter
-from logger.dsp.fixed_scaling import fixed_cascade
+from logger.dsp.fixed_point import FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
 from logger.dsp.sections import frequency_response
 from logger.roads import iso8608
-from logger.roads.golden_car import GoldenCarFilter, sections
-from logger.roads.iri import IriWindow, IriWindows, rectified_slope, window_iri
+from logger.roads.iri import GoldenCarFilter, IriWindow, IriWindows, golden_car_sections, rectified_slope, window_iri
 
 ROAD = {spacing_m: iso8608.generate(100.0, 60.0, spacing_m, 2) for spacing_m in (0.05, 0.25)}
 SLOPE = {spacing_m: rectified_slope(elevation, spacing_m) for spacing_m, elevation in ROAD.items()}
@@ -76,7 +74,7 @@ def test_windows_shorter_than_a_step_are_refused() -> None:
 
 @pytest.mark.parametrize("spacing_m", [0.001, 0.025, 0.3])
 def test_sections_are_stable_and_blind_to_a_steady_slope(spacing_m: float) -> None:
-    sos = sections(spacing_m)
+    sos = golden_car_sections(spacing_m)
     assert sos.shape == (2, 6)
     assert (np.abs([np.roots(row[3:]) for row in sos]) < 1).all()
     assert sos[0, :3].sum() == 0.0

@@ -2,8 +2,8 @@
 
 import pytest
 
-from logger.roads import roughness_words
-from logger.roads.roughness_words import RIDES, ride_words, road_kinds
+from logger.roads import sections
+from logger.roads.sections import RIDES, ride_words, road_kinds
 
 
 @pytest.mark.parametrize(("iri_m_per_km", "kinds"), [
@@ -30,5 +30,5 @@ def test_a_ride_holds_up_to_the_next_mark() -> None:
 
 
 def test_the_ranges_are_those_of_table_2_3() -> None:
-    bounds = [(lowest, highest) for lowest, highest, _ in roughness_words.ROAD_RANGES]
+    bounds = [(lowest, highest) for lowest, highest, _ in sections.ROAD_RANGES]
     assert bounds == [(0.25, 1.75), (1.5, 3.25), (2.25, 5.75), (3.25, 10.0), (4.0, 10.75), (8.0, 20.0)]

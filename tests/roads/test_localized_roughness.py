@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.roads.localized_roughness import areas
-from logger.roads.profile_iri import continuous_iri
+from logger.roads.iri import areas, continuous_iri
 
 WINDOW_M = 7.62
 

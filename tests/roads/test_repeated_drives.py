@@ -7,8 +7,6 @@ import pytest
 from scipy import stats
 
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.laid_traces import lay
-from logger.roads.linear_reference import AGAINST, ALONG, measures, on_route, route_network
 from logger.roads.repeated_drives import (
     Passes,
     Scatter,
@@ -21,7 +19,7 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import NO_WAY
+from logger.roads.road_matching import AGAINST, ALONG, NO_WAY, lay, measures, on_route, route_network
 from logger.roads.road_network import RoadNetwork, Trace
 from logger.roads.window_errors import WindowErrors
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 import ridelog
 from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.roughness_words import federal_condition
-from logger.roads.sections import Windows, even_edges, sections
+from logger.roads.sections import Windows, even_edges, federal_condition, sections
 from logger.roads.window_errors import WindowErrors
 
 NAN = float("nan")

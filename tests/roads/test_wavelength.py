@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from logger.roads.iri import iri
-from logger.roads.wavelength import sinusoid_iri, slope_gain
+from logger.roads.iri import iri, sinusoid_iri, slope_gain
 
 
 def test_gain_is_the_transfer_function_of_the_golden_car() -> None:

@@ -23,8 +23,8 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, load_config
+from logger.service.serve import ReadingProgress
 from logger.service.status import SensorStatus, ServiceStatus
-from logger.service.status_reporter import ReadingProgress
 from logger.store.formats.vehicle_file import read_model
 
 from ..support.accelerometer_fakes import fakes

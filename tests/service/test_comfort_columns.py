@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from logger.comfort.iso2631 import comfort_word
-from logger.comfort.noise_floor import NoiseFloor
-from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, Uncertain
+from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RideFigures, Uncertain
 from logger.demo.simulated_drive import Drive
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.windows import Window
@@ -18,8 +17,8 @@ from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import WindowEstimate
 from logger.records import WindowRecord
-from logger.service.comfort_columns import ComfortColumns, word_of
 from logger.service.config import Config, GpsConfig
+from logger.service.signal_chain import ComfortColumns, word_of
 
 from ..support.drives.replay import rows_of
 

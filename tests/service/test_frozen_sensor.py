@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.readings import AccelerationBlock, Fix
-from logger.service.frozen_sensor import FROZEN_S, Stillness
+from logger.service.doubted_spans import FROZEN_S, Stillness
 
 US = 1_000_000
 

@@ -12,9 +12,8 @@ import pytest
 from drivers.dump import Event
 from drivers.errors import NotPresent
 from drivers.sources import Deadlines
-from logger.service import listener as listener_module
-from logger.service.listener import Listener, monotonic_us
-from logger.service.main_loop import MainLoop
+from logger.service import main_loop
+from logger.service.main_loop import Listener, MainLoop, monotonic_us
 from logger.service.supervisor import Supervisor
 
 
@@ -43,12 +42,12 @@ class Stuck:
 
 
 def test_a_device_that_never_returns_is_noticed_and_does_not_hold_up_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listener_module, "STOP_WAIT_S", 0.05)
+    monkeypatch.setattr(main_loop, "STOP_WAIT_S", 0.05)
     device = Stuck()
     listener = Listener(Supervisor(device, monotonic_us), deque(), lambda: None)
     listener.start()
     assert not listener.hangs(monotonic_us())
-    assert listener.hangs(monotonic_us() + listener_module.HANG_US + 1_000_000)
+    assert listener.hangs(monotonic_us() + main_loop.HANG_US + 1_000_000)
     began_s = time.monotonic()
     listener.stop()
     assert time.monotonic() - began_s < 1.0

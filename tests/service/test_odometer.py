@@ -8,8 +8,7 @@ import numpy as np
 
 from drivers.readings import Fix
 from logger.geodesy import EARTH_RADIUS_M
-from logger.service.odometer import Odometer
-from logger.service.timebase import TimedFix
+from logger.service.timebase import Odometer, TimedFix
 
 NORTH_DEG_PER_M = 180.0 / (np.pi * EARTH_RADIUS_M)
 

@@ -12,7 +12,7 @@ from drivers.accelerometers import accelerometers
 from drivers.accelerometers.bma220 import Bma220Config, Bma220Settings
 from drivers.readings import AccelerationBlock, Fix
 from logger.commands.status import advice
-from logger.service.range_use import FEWEST_WINDOWS, RangeUse
+from logger.service.drive_readings import FEWEST_WINDOWS, RangeUse
 from logger.units import STANDARD_GRAVITY_MPS2
 
 from ..support.drives.logged_rows import ROW

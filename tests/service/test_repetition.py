@@ -10,7 +10,7 @@ import pytest
 
 from drivers.readings import AccelerationBlock
 from logger.commands.status import advice
-from logger.service.repetition import WINDOW, Repetition
+from logger.service.doubted_spans import WINDOW, Repetition
 
 from ..support.drives.records import ride, rounded
 from ..support.drives.replay import rows_of

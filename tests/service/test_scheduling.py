@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
-from logger.service.scheduling import PRIORITY, go_first
+from logger.service.systemd_notify import PRIORITY, go_first
 
 Asked = list[tuple[int, int, int]]
 

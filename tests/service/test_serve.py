@@ -12,9 +12,9 @@ import pytest
 from drivers.disk import FileSystem
 from logger.service import serve
 from logger.service.config import Config, LogConfig
-from logger.service.listener import HANG_US, Listener, monotonic_us
-from logger.service.shutdown_signals import Stop
+from logger.service.main_loop import HANG_US, Listener, monotonic_us
 from logger.service.storage import Storage
+from logger.service.systemd_notify import Stop
 from logger.store.export.pairing import Pairing
 from logger.store.log.disk_quota import QuotaLimits
 

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 
-from logger.service.shutdown_signals import Stop, stopped_by_signals
+from logger.service.systemd_notify import Stop, stopped_by_signals
 
 
 def test_a_signal_at_any_instant_of_waiting_is_heard() -> None:

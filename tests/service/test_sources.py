@@ -10,9 +10,7 @@ from drivers.accelerometers._bma220_chip import FILTER, RANGE, Bma220Chip
 from drivers.accelerometers.bma220 import Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.recorded_wires import RecordedBus
-from logger.service.event_merger import EventMerger
-from logger.service.listener import Listener
-from logger.service.main_loop import MainLoop
+from logger.service.main_loop import EventMerger, Listener, MainLoop
 from logger.service.supervisor import Supervisor
 
 SETTINGS = Bma220Settings(range_g=4)

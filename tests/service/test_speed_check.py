@@ -13,7 +13,7 @@ import pytest
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
 from logger.commands.status import advice, screen
-from logger.service.speed_check import SpeedCheck
+from logger.service.doubted_spans import SpeedCheck
 from logger.service.timebase import TimedFix
 
 from ..support.drives.receivers import town_drive

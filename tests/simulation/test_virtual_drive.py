@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.profiles.track import Track
-from logger.roads.bumps import speed_bump
+from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import (
     AFTER_S,

@@ -15,7 +15,7 @@ from drivers.dump import DumpWriter, open_dump
 from drivers.readings import AccelerationBlock
 from logger.service import wiring
 from logger.service.config import Config
-from logger.service.dump_player import Player
+from logger.service.main_loop import Player
 
 from .accelerometer_fakes import fakes
 from .accelerometer_fakes.fake import Vector

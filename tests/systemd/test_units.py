@@ -17,9 +17,9 @@ from logger.commands import export as export_command
 from logger.commands import run as run_command
 from logger.installation import PROGRAM, Installation
 from logger.service.config import MACHINE_CONFIG, Config
-from logger.service.listener import HANG_US
-from logger.service.scheduling import PRIORITY
+from logger.service.main_loop import HANG_US
 from logger.service.serve import LONGEST_BEAT_S
+from logger.service.systemd_notify import PRIORITY
 from logger.shipped import shipped
 from logger.store.export import stick_status
 

@@ -5,8 +5,8 @@ import pytest
 
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import half_car, quarter_car
-from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import body_acceleration_response
+from logger.vehicle.models import GOLDEN_CAR, half_car, quarter_car
 from logger.vehicle.vehicle import Axle, Vehicle
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -19,7 +19,7 @@ LOPSIDED = Vehicle(
 @pytest.mark.parametrize("vehicle", [RAV4, LOPSIDED], ids=lambda vehicle: vehicle.name)
 def test_a_half_car_lifted_as_a_whole_or_tilted_feels_no_force(vehicle: Vehicle) -> None:
     """On a road that is raised, or a straight slope, the car stands as it stood: K q = R z exactly, no damper moves."""
-    car = half_car.structure(vehicle)
+    car = half_car(vehicle)
     l1, l2 = vehicle.front.cg_distance_m, vehicle.rear.cg_distance_m
     lifted = np.array([1.0, 0.0, 1.0, 1.0])
     tilted = np.array([0.0, 1.0, l1, -l2])
@@ -59,14 +59,14 @@ def response_by_hand(vehicle: Vehicle, f_hz: float, speed_mps: float) -> complex
 def test_half_car_response_agrees_with_newtons_laws_written_out(vehicle: Vehicle) -> None:
     f_hz = np.array([0.05, 0.7, 1.16, 1.5, 4.0, 11.0, 25.0])
     for speed_mps in (4.5, 17.9, 31.3):
-        response = body_acceleration_response(half_car.structure(vehicle), f_hz, speed_mps)
+        response = body_acceleration_response(half_car(vehicle), f_hz, speed_mps)
         expected = [response_by_hand(vehicle, f, speed_mps) for f in f_hz]
         assert response == pytest.approx(np.array(expected), rel=1e-9)
 
 
 def test_a_slow_swell_lifts_the_whole_car() -> None:
     """At a wave far longer than the car and far below resonance the body follows the road."""
-    response = body_acceleration_response(half_car.structure(RAV4), 0.01, 30.0)
+    response = body_acceleration_response(half_car(RAV4), 0.01, 30.0)
     assert -response / (2 * np.pi * 0.01) ** 2 == pytest.approx(1.0, abs=0.01)
 
 
@@ -78,9 +78,9 @@ def test_quarter_car_response_at_resonance_of_a_single_mass() -> None:
     zeta = 1500.0 / (2 * np.sqrt(20e3 * 300.0))
     transmissibility = (1 + 2j * zeta * r) / (1 - r**2 + 2j * zeta * r)
     expected = -((2 * np.pi * f_hz) ** 2) * transmissibility
-    assert body_acceleration_response(quarter_car.structure(car), f_hz, 20.0) == pytest.approx(expected, rel=1e-5)
+    assert body_acceleration_response(quarter_car(car), f_hz, 20.0) == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_half_car_needs_two_axles() -> None:
     with pytest.raises(ValueError, match="rear axle"):
-        half_car.structure(quarter_car.GOLDEN_CAR)
+        half_car(GOLDEN_CAR)

@@ -9,7 +9,7 @@ import pytest
 
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
-from logger.vehicle.effect_parameters import (
+from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,
     free_number,

@@ -7,7 +7,7 @@ import pytest
 from logger.shipped import vehicle_path
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.effect_sizes import grows_with_mass, sized
+from logger.vehicle.uncertain import grows_with_mass, sized
 from logger.vehicle.vehicle import Axle, Vehicle
 
 RIG = Vehicle("bench", "quarter_car", 2.5, None, Axle(0.0, 0.4, 900.0, 12.0, 5400.0), None, 0.0)

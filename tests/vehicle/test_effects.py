@@ -25,10 +25,9 @@ from logger.vehicle import effects
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Misalignment, Scale, chosen
 from logger.vehicle.laws import CornerLaws, linear
-from logger.vehicle.own_effect import look_through, try_out
-from logger.vehicle.passage import Passage
+from logger.vehicle.own_effect import look_through, try_out, watched
+from logger.vehicle.simulate import Passage
 from logger.vehicle.vehicle import Vehicle
-from logger.vehicle.watched_effect import watched
 
 EFFECTS = shipped_effects()
 LONGEST_UNIT = 3

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import full_car, half_car, quarter_car
-from logger.vehicle.frequency_response import body_acceleration_response, frequency_response
-from logger.vehicle.models import structure_of
+from logger.vehicle.linear_car import body_acceleration_response, frequency_response
+from logger.vehicle.models import GOLDEN_CAR, full_car, half_car, quarter_car, structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle, with_load
@@ -34,7 +33,7 @@ def reduced(car: Structure, onto: np.ndarray) -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize("full", [FULL, replace(FULL, roll_inertia_kg_m2=900.0, track_width_m=2.0)])
 def test_with_both_sides_equal_it_is_two_half_cars(full: Vehicle) -> None:
     """Roll, roll inertia, track and anti-roll bars drop out to the last digits."""
-    car, half = full_car.structure(full), half_car.structure(HALF)
+    car, half = full_car(full), half_car(HALF)
     both = np.zeros((7, 4))
     both[BODY, 0] = both[PITCH, 1] = both[[3, 4], 2] = both[[5, 6], 3] = 1.0
     expected = (2 * half.mass, 2 * half.damping, 2 * half.stiffness)
@@ -51,8 +50,8 @@ def test_with_both_sides_equal_it_is_two_half_cars(full: Vehicle) -> None:
 
 def test_a_half_car_with_two_equal_ends_bounces_like_a_quarter_car_with_half_its_body() -> None:
     axle = HALF.front
-    half = half_car.structure(replace(HALF, rear=axle))
-    quarter = quarter_car.structure(Vehicle("corner", "quarter_car", 350.0, None, axle, None, 0.2))
+    half = half_car(replace(HALF, rear=axle))
+    quarter = quarter_car(Vehicle("corner", "quarter_car", 350.0, None, axle, None, 0.2))
     bounce = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
     expected = (2 * quarter.mass, 2 * quarter.damping, 2 * quarter.stiffness)
     for matrix, twice in zip(reduced(half, bounce), expected, strict=True):
@@ -69,7 +68,7 @@ def test_roll_of_a_car_with_equal_axles_against_the_roots_of_its_characteristic_
                      4 m w'' - 4 k (h phi - w) - 2 (K / h^2) (h phi - w) + 4 t w = 0.
     """
     axle = Axle(1.2, 50.0, 22e3, 1500.0, 200e3, 8e3)
-    car = full_car.structure(replace(FULL, front=axle, rear=axle))
+    car = full_car(replace(FULL, front=axle, rear=axle))
     inertia, h = 500.0, 0.75
     effective = 4 * 22e3 + 2 * 8e3 / h**2  # force per (h phi - w)
     a = inertia * 4 * 50.0
@@ -80,14 +79,14 @@ def test_roll_of_a_car_with_equal_axles_against_the_roots_of_its_characteristic_
     found = undamped_frequencies_hz(car)
     assert all(np.isclose(found, hz, rtol=1e-9).any() for hz in by_hand)
     with_rigid_tires = replace(axle, tire_stiffness_n_per_m=1e9, unsprung_mass_kg=1.0)
-    rigid = full_car.structure(replace(FULL, front=with_rigid_tires, rear=with_rigid_tires))
+    rigid = full_car(replace(FULL, front=with_rigid_tires, rear=with_rigid_tires))
     roll_hz = np.sqrt((4 * 22e3 * h**2 + 2 * 8e3) / inertia) / (2 * np.pi)  # springs and bars alone
     assert np.isclose(undamped_frequencies_hz(rigid), roll_hz, rtol=1e-4).any()
 
 
 def test_anti_roll_bars_act_on_roll_alone() -> None:
-    without = full_car.structure(replace(FULL, front=replace(FULL.front, anti_roll_stiffness_n_m_per_rad=0.0)))
-    bar = full_car.structure(FULL).stiffness - without.stiffness
+    without = full_car(replace(FULL, front=replace(FULL.front, anti_roll_stiffness_n_m_per_rad=0.0)))
+    bar = full_car(FULL).stiffness - without.stiffness
     posture = np.zeros(7)
     posture[ROLL] = 0.01  # the body rolls on standing wheels: the moment is stiffness times angle
     assert (bar @ posture)[ROLL] == pytest.approx(9e3 * 0.01)
@@ -143,14 +142,14 @@ def test_on_a_plane_however_tilted_every_car_stands_as_on_the_level(name: str) -
 
 
 def test_the_wheels_stand_where_the_tape_measure_says() -> None:
-    car = full_car.structure(FULL)
+    car = full_car(FULL)
     assert car.behind_m == pytest.approx([0.0, 0.0, 2.8, 2.8])
     assert car.left_m == pytest.approx([0.75, -0.75, 0.75, -0.75])
-    assert half_car.structure(HALF).behind_m == pytest.approx([0.0, 2.8])
+    assert half_car(HALF).behind_m == pytest.approx([0.0, 2.8])
 
 
 def test_a_bump_under_the_left_front_wheel_lifts_nose_and_left_side() -> None:
-    car = full_car.structure(FULL)
+    car = full_car(FULL)
     asked = [body_point(car, 1.0, 0.0, 0), body_point(car, 0.0, 1.0, 0), body_point(car, order=0)]
     nose, left, middle = frequency_response(car, asked, 1e-3)[:, 0].real
     assert nose > middle > 0
@@ -162,7 +161,7 @@ def test_a_bump_under_the_left_front_wheel_lifts_nose_and_left_side() -> None:
 @settings(max_examples=40)
 def test_outputs_in_time_and_in_frequency_agree(index: int, ahead_m: float, left_m: float, f_hz: float) -> None:
     """C (i w - A)^-1 B + D of the state space is the frequency response; a rate is i w times what it is the rate of."""
-    car = full_car.structure(FULL)
+    car = full_car(FULL)
     asked = [body_point(car, ahead_m, left_m, order) for order in (0, 1, 2)]
     asked += [wheel(car, index, order) for order in (0, 1, 2)]
     asked += [suspension_travel(car, index, order) for order in (0, 1, 2)] + [tire_deflection(car, index)]
@@ -177,7 +176,7 @@ def test_outputs_in_time_and_in_frequency_agree(index: int, ahead_m: float, left
 
 
 def test_travel_and_deflection_are_differences_of_heights() -> None:
-    car = full_car.structure(FULL)
+    car = full_car(FULL)
     f_hz = [0.5, 3.0, 15.0]
     for index, (ahead_m, left_m) in enumerate([(1.1, 0.75), (1.1, -0.75), (-1.7, 0.75), (-1.7, -0.75)]):
         asked = [body_point(car, ahead_m, left_m, 0), wheel(car, index, 0), suspension_travel(car, index),
@@ -188,7 +187,7 @@ def test_travel_and_deflection_are_differences_of_heights() -> None:
 
 
 def test_a_sensor_away_from_the_centre_feels_pitch_as_the_distance_times_its_acceleration() -> None:
-    car = half_car.structure(HALF)
+    car = half_car(HALF)
     f_hz, speed = np.array([0.7, 1.5, 6.0]), 15.0
     at = {place: body_acceleration_response(car, f_hz, speed, SensorPlace(place)) for place in (-0.5, 0.0, 1.0)}
     assert at[-0.5] - at[0.0] == pytest.approx(-0.5 * (at[1.0] - at[0.0]), rel=1e-9)
@@ -196,11 +195,11 @@ def test_a_sensor_away_from_the_centre_feels_pitch_as_the_distance_times_its_acc
 
 
 def test_points_that_a_model_does_not_have() -> None:
-    quarter = quarter_car.structure(quarter_car.GOLDEN_CAR)
+    quarter = quarter_car(GOLDEN_CAR)
     with pytest.raises(ValueError, match="does not pitch"):
         body_point(quarter, ahead_m=0.1)
     with pytest.raises(ValueError, match="does not roll"):
-        body_point(half_car.structure(HALF), left_m=-0.1)
+        body_point(half_car(HALF), left_m=-0.1)
     with pytest.raises(ValueError, match="only an output of order 0"):
         Output(np.zeros(2), np.ones(1), 2)
     with pytest.raises(ValueError, match="expected 0, 1 or 2"):
@@ -215,6 +214,6 @@ def test_a_full_car_needs_all_its_numbers() -> None:
 
 def test_load_adds_to_the_sprung_mass_and_to_nothing_else() -> None:
     assert with_load(HALF, 72.5) == replace(HALF, sprung_mass_kg=772.5)
-    empty, loaded = half_car.structure(HALF), half_car.structure(with_load(HALF, 700.0))
+    empty, loaded = half_car(HALF), half_car(with_load(HALF, 700.0))
     assert (loaded.mass - empty.mass)[0, 0] == 700.0
     assert np.array_equal(loaded.stiffness, empty.stiffness)

@@ -14,9 +14,9 @@ from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import known_vehicle
+from logger.vehicle.models import GOLDEN_CAR
 from logger.vehicle.modes import modes, modes_of_car
-from logger.vehicle.passage import Passage
-from logger.vehicle.quarter_car import GOLDEN_CAR
+from logger.vehicle.simulate import Passage
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 N_CPM = np.geomspace(0.004, 3.3, 300)

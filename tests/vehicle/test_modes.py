@@ -8,12 +8,11 @@ from scipy.linalg import eig, eigh, expm
 
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import quarter_car
-from logger.vehicle.models import structure_of
+from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
 from logger.vehicle.modes import modes, one_at_a_time, undamped_frequencies_hz
 from logger.vehicle.vehicle import Axle, Vehicle
 
-GOLDEN = quarter_car.structure(quarter_car.GOLDEN_CAR)
+GOLDEN = quarter_car(GOLDEN_CAR)
 SHIPPED = {name: structure_of(read_vehicle(vehicle_file(name))) for name in vehicle_names()}
 RAV4 = SHIPPED["rav4-2009"]
 

@@ -14,7 +14,7 @@ from logger.vehicle.effect import Parameter, RecordEffect, Recording, Scale, Sen
 from logger.vehicle.linearise import known_car
 from logger.vehicle.observe import recorded_signals
 from logger.vehicle.own_effect import look_through, try_out
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 from ..support.lab.runs_with_residual import rough_track
 

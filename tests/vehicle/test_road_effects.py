@@ -16,7 +16,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import Parameter, RoadEffect, Scale, chosen
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 from ..support.lab.runs_with_residual import rough_track
 from ..support.lab.secret_runs import posterior_of, secret_runs

@@ -11,11 +11,10 @@ import pytest
 
 from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.bumps import speed_bump
-from logger.roads.obstacles import pothole, step
+from logger.roads.obstacles import pothole, speed_bump, step
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive, recorder_taps, simulate
 from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel

@@ -6,10 +6,10 @@ from scipy import linalg, signal
 
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle import half_car, quarter_car
-from logger.vehicle.state_space import driven_outputs, matrix_exponential, recursion, straight_step
+from logger.vehicle.models import GOLDEN_CAR, half_car, quarter_car
+from logger.vehicle.structure import driven_outputs, matrix_exponential, recursion, straight_step
 
-A, B = half_car.structure(read_vehicle(vehicle_file("rav4-2009"))).state_space()
+A, B = half_car(read_vehicle(vehicle_file("rav4-2009"))).state_space()
 
 
 @pytest.mark.parametrize("step_s", [1e-5, 1e-3, 0.02, 0.5])
@@ -33,7 +33,7 @@ def test_steps_agree_with_scipy() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 31, 35, 36, 37, 200])
 def test_stretches_equal_single_steps(count: int) -> None:
-    transition, *_ = straight_step(*quarter_car.structure(quarter_car.GOLDEN_CAR).state_space(), 0.01)
+    transition, *_ = straight_step(*quarter_car(GOLDEN_CAR).state_space(), 0.01)
     rng = np.random.default_rng(count)
     drive, state = rng.standard_normal((count, 4)), rng.standard_normal(4)
     states = recursion(transition, drive, state)

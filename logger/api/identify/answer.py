@@ -309,8 +309,7 @@ def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: f
                  between: tuple[float, float] | None) -> Free:
     """A number of the road, of an effect or of the car. ValueError for one that none of them has."""
     from logger.identification.unknown_inputs import free_input, is_input
-    from logger.vehicle.effect_parameters import free_number, free_parameter_named
-    from logger.vehicle.named_parameters import free
+    from logger.vehicle.named_parameters import free, free_number, free_parameter_named
 
     if is_input(name):
         return free_input(road, name, start, between)
@@ -359,7 +358,7 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     from logger.identification.session import UnusableRun, drives_of
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.road_fit import fit_roads
-    from logger.vehicle.frequency_response import AxleResponse
+    from logger.vehicle.linear_car import AxleResponse
 
     options, question = _road_options(question)
     if given.effects:

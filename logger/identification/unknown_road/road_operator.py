@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scipy.fft import irfft, rfft
 
 from logger.estimation.road_solver import patch_gain
-from logger.vehicle.passage import smooth_length
+from logger.vehicle.simulate import smooth_length
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

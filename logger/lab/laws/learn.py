@@ -36,7 +36,7 @@ from logger.lab.selection.screening import Baseline, Screened, Trial, screen
 from logger.lab.selection.stepwise import Effort as Usual
 from logger.lab.selection.stepwise import Search, Selection
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
-from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, with_coordinates
+from logger.vehicle.named_parameters import FreeParameter, coordinates_of, with_coordinates
 
 
 def screen_law(base: Baseline, draft: Draft, misalignment: Misalignment) -> Screened:

@@ -20,7 +20,7 @@ from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
 from logger.lab.likelihood.whittle import Whitener
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 Array = npt.NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter
-from logger.vehicle.effect_parameters import (
+from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,
     free_parameters_of,

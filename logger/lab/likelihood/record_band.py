@@ -39,8 +39,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.butterworth import butterworth
-from logger.dsp.pass_band import in_band, reach
+from logger.dsp.low_pass import butterworth
+from logger.dsp.whole_record import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.runs import NO_READING, READING, LowPass, Run

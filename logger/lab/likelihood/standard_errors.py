@@ -15,10 +15,8 @@ import numpy.typing as npt
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, free_parameters_of, slope_of
-from logger.vehicle.effect_sizes import grows_with_mass
-from logger.vehicle.named_parameters import read
-from logger.vehicle.uncertain import NumberErrors
+from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
+from logger.vehicle.uncertain import NumberErrors, grows_with_mass
 
 Array = npt.NDArray[np.float64]
 

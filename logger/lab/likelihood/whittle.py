@@ -15,7 +15,7 @@ from itertools import count, pairwise, takewhile
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.pass_band import HALF_WIDTH_HZ
+from logger.dsp.whole_record import HALF_WIDTH_HZ
 from logger.runs import EVEN_SAMPLES, READING, Run
 
 Array = npt.NDArray[np.float64]

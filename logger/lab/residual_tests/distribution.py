@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.dsp.pass_band import HALF_WIDTH_HZ
+from logger.dsp.whole_record import HALF_WIDTH_HZ
 from logger.identification.noise_models import LAGS, autocorrelation
 from logger.lab.likelihood.whittle import BLOCK_S
 from logger.lab.residual_tests.tests import (

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.vehicle.passage import smooth_length
+from logger.vehicle.simulate import smooth_length
 from logger.vehicle.stepping import force_input
 
 Array = npt.NDArray[np.float64]

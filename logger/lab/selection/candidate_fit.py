@@ -16,7 +16,7 @@ from logger.lab.selection.evidence import probability_by_chance, probability_of_
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 
 @dataclass(frozen=True, eq=False)

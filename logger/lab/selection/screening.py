@@ -24,9 +24,8 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
-from logger.vehicle.effect_parameters import FreeParameter, coordinates_of, with_coordinates
 from logger.vehicle.effects.time_offset import EFFECT as TIME_OFFSET
-from logger.vehicle.named_parameters import read
+from logger.vehicle.named_parameters import FreeParameter, coordinates_of, read, with_coordinates
 
 Array = npt.NDArray[np.float64]
 

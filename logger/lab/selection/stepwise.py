@@ -34,7 +34,7 @@ from logger.lab.selection.screening import (
     without_effect,
 )
 from logger.vehicle.effect import Chosen, Effect, Misalignment
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
 

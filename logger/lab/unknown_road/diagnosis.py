@@ -23,7 +23,7 @@ from logger.lab.unknown_road.fit import SameRoadFit, Trial, fit, screen
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.one_road import certain_two_roads, placed_by_road, possible_two_roads, road_agreements
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, RoadEffect, chosen
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]

@@ -15,7 +15,7 @@ from logger.identification.unknown_road.marginal_likelihood import RoadsScore
 from logger.lab.selection.screening import scale_strength
 from logger.lab.unknown_road.likelihood import PROBES, RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
-from logger.vehicle.effect_parameters import (
+from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,
     free_parameters_of,

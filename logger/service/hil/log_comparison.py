@@ -31,8 +31,8 @@ from logger.comfort.iso2631 import comfort_word
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
-from logger.service.comfort_columns import LEAST_WORD
 from logger.service.pipeline import longest_wait_us
+from logger.service.signal_chain import LEAST_WORD
 from logger.store.log.log_writer import LogName
 from logger.store.log.row_format import read_log
 from logger.store.log.sidecar import sidecar_or_nothing

@@ -33,7 +33,7 @@ from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import AXES, Config
 from logger.service.event_core import EventCore
-from logger.service.event_merger import EventMerger
+from logger.service.main_loop import EventMerger
 from logger.service.noise_learning import KnownNoise
 from logger.service.receiver_learning import at_start
 from logger.service.signal_chain import Axis

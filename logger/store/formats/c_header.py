@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from string import Template
 
-from logger.dsp.fixed_scaling import FixedCascade, FixedSection
+from logger.dsp.fixed_point import FixedCascade, FixedSection
 
 _HEADER = Template("""\
 /* $title

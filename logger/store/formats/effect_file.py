@@ -19,10 +19,9 @@ from logger.errors import BadInput, did_you_mean
 from logger.plugins import blamed_on, catalogue, offered_by
 from logger.store.formats.yaml_nodes import Node
 from logger.vehicle.effect import Chosen, Effect, Parameter, VehicleEffect, chosen
-from logger.vehicle.effect_sizes import sized
-from logger.vehicle.own_effect import look_through, try_out
+from logger.vehicle.own_effect import look_through, try_out, watched
+from logger.vehicle.uncertain import sized
 from logger.vehicle.vehicle import Vehicle
-from logger.vehicle.watched_effect import watched
 
 
 @cache

@@ -3,7 +3,7 @@
 Which column of a logger's CSV file is what: recognised by a known layout, or named by the user.
 
 Problem: a column that is taken for another one, or a unit for another, gives runs that look like any others. Solution:
-only layouts that are known (``logger_layouts``) are recognised, and only if one fits; all else has to be named, and the
+only layouts that are known are recognised, and only if one fits; all else has to be named, and the
 complaint shows how.
 
 Layouts of the CSV files that known recorders write: which column is what, in which unit.
@@ -11,7 +11,7 @@ Layouts of the CSV files that known recorders write: which column is what, in wh
 Problem: a phone's recording says "Acceleration x (m/s^2)", the next one "z" in a file called TotalAcceleration.csv.
 Solution: one table of what is known, each with its source. A file is recognised by all columns that a layout needs, and
 by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the columns
-are named (``logger_columns``).
+are named.
 
 Sign: an accelerometer at rest feels gravity as a push upwards (Android), or a program writes all its axes the other way
 round (Apple's Core Motion). Both read the same along the direction in which gravity is felt, so no layout needs a sign.
@@ -20,7 +20,7 @@ CSV files of phones and other loggers as columns by role.
 
 Problem: such files have columns of many names and units, cells that are empty where a sensor said nothing, times in
 units that nobody wrote down. Solution: the table is read as any other (``csv_table``); its columns are recognised or
-named (``logger_columns``); what is empty is NaN, and a time shows its unit by its size.
+named; what is empty is NaN, and a time shows its unit by its size.
 """
 
 from __future__ import annotations

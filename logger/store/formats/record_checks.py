@@ -16,10 +16,17 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import STANDARD_GRAVITY_MPS2
-from logger.dsp.bursts import burst_ends, spread
-from logger.dsp.range_ends import range_ends
-from logger.dsp.repeated_samples import RepeatedSamples, find_holds, find_repeats, fresh_times, still_until_s
-from logger.dsp.stretches import stretches_of
+from logger.dsp.repeated_samples import (
+    RepeatedSamples,
+    burst_ends,
+    find_holds,
+    find_repeats,
+    fresh_times,
+    range_ends,
+    spread,
+    still_until_s,
+    stretches_of,
+)
 from logger.errors import BadInput
 from logger.left_out import LeftOut, counting
 from logger.printable import counted
@@ -204,7 +211,7 @@ def _resampled(
     t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
     repeats: RepeatedSamples | None, held: Bools, file: str, rate_hz: float, doubts: list[Doubt],
 ) -> EvenRecord:
-    from logger.dsp.uneven import mean_rate_hz, on_even_grid
+    from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 
     times_s = even_times_of(t_s, file)
     taken_s, taken = times_s, samples

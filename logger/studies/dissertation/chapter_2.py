@@ -25,7 +25,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.comfort.exposure import S_PER_HOUR, caution_zone
+from logger.comfort.iso2631 import S_PER_HOUR, caution_zone
 from logger.dsp.weightings.wc import WEIGHTING as WC
 from logger.dsp.weightings.wd import WEIGHTING as WD
 from logger.dsp.weightings.we import WEIGHTING as WE
@@ -34,10 +34,9 @@ from logger.dsp.weightings.wf import WEIGHTING as WF
 from logger.dsp.weightings.wj import WEIGHTING as WJ
 from logger.dsp.weightings.wk import WEIGHTING as WK
 from logger.roads.elevation_spectrum import band_edges, classify, smooth, spectrum
-from logger.roads.golden_car import STANDARD_SPEED_MPS
+from logger.roads.iri import STANDARD_SPEED_MPS, slope_gain
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, HIGHEST_CPM, LOWEST_CPM, displacement_psd, generate, road_class
-from logger.roads.roughness_words import federal_condition, ride_words, road_kinds
-from logger.roads.wavelength import slope_gain
+from logger.roads.sections import federal_condition, ride_words, road_kinds
 from logger.studies.study import (
     Cell,
     Column,
@@ -53,8 +52,8 @@ from logger.studies.study import (
     about,
     alike,
 )
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.modes import undamped_frequencies_hz
-from logger.vehicle.quarter_car import GOLDEN_CAR, structure
 
 PRINTED_T2_2 = (("A", None, 16, 32), ("B", 32, 64, 128), ("C", 128, 256, 512), ("D", 512, 1_024, 2_048),
            ("E", 2_048, 4_096, 8_192), ("F", 8_192, 16_384, 32_768), ("G", 32_768, 65_536, 131_072),
@@ -294,7 +293,7 @@ def _f2_13(effort: Effort) -> Result:
     gain = slope_gain(wave_number, 0.0)
     slow = wave_number < _BETWEEN_CPM
     peaks = [int(np.flatnonzero(part)[gain[part].argmax()]) for part in (slow, ~slow)]
-    body_cpm, wheel_cpm = undamped_frequencies_hz(structure(GOLDEN_CAR)) / STANDARD_SPEED_MPS
+    body_cpm, wheel_cpm = undamped_frequencies_hz(quarter_car(GOLDEN_CAR)) / STANDARD_SPEED_MPS
     nearest = [float(wave_number[min(peaks, key=lambda peak: abs(np.log(wave_number[peak] / of)))])
                for of in (wheel_cpm, body_cpm)]
     rows = tuple((words, printed, float(wave_number[peak]), 1 / float(wave_number[peak]), float(gain[peak]))

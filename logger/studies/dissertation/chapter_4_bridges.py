@@ -20,7 +20,7 @@ from logger.chart_data import Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, a_w, comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.identification.unknown_inputs import RoadInput, RoadStep
-from logger.roads.gd_iri import relative_spread
+from logger.roads.elevation_spectrum import relative_spread
 from logger.roads.iri import iri
 from logger.roads.iso8608 import gd_n0_from_iri, generate
 from logger.runs import Run

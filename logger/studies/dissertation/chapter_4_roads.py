@@ -16,8 +16,7 @@ Fig 4.18: roads generated for an IRI, and the IRI that they have (4.3.4).
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.roads.elevation_spectrum import classify
-from logger.roads.gd_iri import iri_of_road, relative_spread
+from logger.roads.elevation_spectrum import classify, iri_of_road, relative_spread
 from logger.roads.iri import iri
 from logger.roads.iso8608 import (
     CM3_M3,
@@ -46,9 +45,8 @@ from logger.studies.study import (
     about,
     alike,
 )
-from logger.vehicle.models import structure_of
+from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz
-from logger.vehicle.quarter_car import GOLDEN_CAR, structure
 from logger.vehicle.structure import Structure
 
 PRINTED_HZ_T4_1, PRINTED_DAMPING_T4_1 = (1.2, 11.0), 0.40
@@ -58,7 +56,7 @@ COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, co
 
 
 def _t4_1(effort: Effort) -> Result:
-    car = structure(GOLDEN_CAR)
+    car = quarter_car(GOLDEN_CAR)
     (rows,) = (quoted(car, ("body", "wheel"), PRINTED_HZ_T4_1, (PRINTED_DAMPING_T4_1, None)) for _
                in effort.each(range(1)))
     verdict = ("The printed frequencies are those of the coupled car without its damper, to their last figure. The "

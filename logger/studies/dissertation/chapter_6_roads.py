@@ -27,7 +27,7 @@ from logger.estimation.rms_relation import rms_relation
 from logger.profiles.track import Track
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD
-from logger.roads.roughness_words import ROAD_RANGES
+from logger.roads.sections import ROAD_RANGES
 from logger.runs import Run
 from logger.studies.dissertation.chapter_2 import PRINTED_RANGES
 from logger.studies.drives import (

@@ -58,7 +58,7 @@ from logger.studies.drives import (
 )
 from logger.studies.study import Cell, Column, Effort, Item, Picture, Result, Statement, Study, Table, Word
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
-from logger.vehicle.frequency_response import AxleResponse
+from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz

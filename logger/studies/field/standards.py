@@ -16,12 +16,10 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.dsp.weightings.wd import WEIGHTING as WD
 from logger.dsp.weightings.wk import WEIGHTING as WK
-from logger.roads.golden_car import STANDARD_SPEED_MPS
-from logger.roads.iri import rectified_slope
-from logger.roads.wavelength import slope_gain
+from logger.roads.iri import STANDARD_SPEED_MPS, rectified_slope, slope_gain
 from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Value, Word, about
-from logger.vehicle.quarter_car import GOLDEN_CAR, structure
-from logger.vehicle.state_space import straight_step
+from logger.vehicle.models import GOLDEN_CAR, quarter_car
+from logger.vehicle.structure import straight_step
 
 _SPACING_M, _LENGTH_M = 0.25, 30.0
 PRINTED_IRI_CHECK_PROFILE = ((2.0, 3.77380), (4.75, 7.84294), (10.0, 5.08670), (20.0, 2.95143), (30.0, 2.04955))
@@ -38,7 +36,7 @@ def _iri_check_profile(effort: Effort) -> Result:
     values = [*about("IRI check profile", [Value(f"IRI from 0 to {where:g} m [m/km]", printed,
                                                  float(running[round(where / _SPACING_M) - 1]),
                     _ATTAINED) for where, printed in effort.each(PRINTED_IRI_CHECK_PROFILE)])]
-    _, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), _SPACING_M / STANDARD_SPEED_MPS)
+    _, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), _SPACING_M / STANDARD_SPEED_MPS)
     exact = float((ends[0] + ends[1])[0, 0])  # held over the step, as in the print
     values += about("IRI input coefficient", [
         Value("first input coefficient at 0.25 m", PRINTED_COEFFICIENT, exact, _ROUNDING_IRI_CHECK_PROFILE,

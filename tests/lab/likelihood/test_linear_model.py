@@ -17,7 +17,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import effect_slopes
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import free_parameters_of
+from logger.vehicle.named_parameters import free_parameters_of
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.secret_runs import EFFECTS

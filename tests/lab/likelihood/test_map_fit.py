@@ -13,8 +13,7 @@ from logger.lab.likelihood.map_fit import CONVERGED, align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.vehicle.effect import Chosen, chosen
-from logger.vehicle.effect_parameters import coordinates_of, free_parameters_of, with_coordinates
-from logger.vehicle.named_parameters import changed, read
+from logger.vehicle.named_parameters import changed, coordinates_of, free_parameters_of, read, with_coordinates
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.runs_with_residual import CAR

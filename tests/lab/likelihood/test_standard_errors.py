@@ -16,8 +16,8 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors, with_standard_errors
 from logger.vehicle.effect import Chosen, Complex, Parameter, Scale, SensorEffect, chosen
-from logger.vehicle.effect_parameters import free_parameters_of
-from logger.vehicle.effect_sizes import grows_with_mass
+from logger.vehicle.named_parameters import free_parameters_of
+from logger.vehicle.uncertain import grows_with_mass
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.secret_runs import EFFECTS, hidden

@@ -16,7 +16,7 @@ from logger.lab.likelihood.signals import deviance
 from logger.lab.selection.holdout import cross_validate, folds
 from logger.runs import Run, normalised_rms
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import coordinates_of, free_parameters_of, with_coordinates
+from logger.vehicle.named_parameters import coordinates_of, free_parameters_of, with_coordinates
 
 from ...support.lab.secret_runs import hidden, posterior_of, secret_runs
 

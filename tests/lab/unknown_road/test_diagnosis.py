@@ -34,7 +34,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.linearise import is_linear
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 Array = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from logger.store.formats.effect_file import own_effect
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import Chosen, chosen
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 from ...support.lab.runs_with_residual import rough_track
 

@@ -12,7 +12,7 @@ import pytest
 
 from logger.service import serve
 from logger.service.config import Config, LogConfig
-from logger.service.shutdown_signals import Stop
+from logger.service.systemd_notify import Stop
 from logger.store.log.log_writer import SegmentLog, next_session
 
 from ...support.faults.crashes import window

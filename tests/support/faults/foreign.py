@@ -28,7 +28,7 @@ from drivers import sources
 from drivers.accelerometers._bma220_chip import REGISTER_STEP, Bma220Chip
 from drivers.hardware import Machine
 from logger.commands import main
-from logger.service import listener, serve, supervisor
+from logger.service import main_loop, serve, supervisor
 
 NUMBERS = sorted(errno.errorcode)
 ROOT_VARIABLE = "RIDELOG_TEST_ROOT"
@@ -160,7 +160,7 @@ def iio_devices() -> None:
 
 if __name__ == "__main__":
     supervisor.FIRST_WAIT_US = supervisor.LONGEST_WAIT_US = 1000
-    listener.CLOSED_WAIT_S = sources.GATHER_S = 0.002
+    main_loop.CLOSED_WAIT_S = sources.GATHER_S = 0.002
     {"serial": serial_ports, "i2c": i2c_buses, "iio": iio_devices}[sys.argv.pop(1)]()
     try:
         main.run()

@@ -29,12 +29,11 @@ from logger.commands.status import advice
 from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config
+from logger.service.doubted_spans import FROZEN_S
 from logger.service.event_core import EventCore
-from logger.service.frozen_sensor import FROZEN_S
-from logger.service.listener import HANG_US, Listener, monotonic_us
-from logger.service.main_loop import MainLoop
+from logger.service.main_loop import HANG_US, Listener, MainLoop, monotonic_us
+from logger.service.serve import StatusReporter
 from logger.service.status import ServiceStatus
-from logger.service.status_reporter import StatusReporter
 from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import LASTING_US

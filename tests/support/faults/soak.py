@@ -20,8 +20,8 @@ from drivers.dump import Event, open_dump
 from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import Config, LogConfig
-from logger.service.dump_player import Player
 from logger.service.event_core import EventCore
+from logger.service.main_loop import Player
 from logger.service.storage import Storage
 from logger.store.formats.vehicle_file import read_model
 from logger.store.integrity import FileCheck, verify

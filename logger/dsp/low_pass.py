@@ -1,4 +1,14 @@
-"""Only what lies below a frequency: a low-pass filter that also lowers the rate.
+"""Low-pass filters: Butterworth's, a sinc in a Kaiser window, and one that lowers the rate.
+
+Butterworth's low-pass (S. Butterworth, On the Theory of Filter Amplifiers, 1930), of any order.
+
+Low-pass filters of linear phase: a sinc in a Kaiser window, by Kaiser's two rules.
+
+J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function (1974); Oppenheim and Schafer,
+Discrete-Time Signal Processing, 7.6. A transition of width w [rad/sample] that ends A dB down takes (A - 7.95) / (2.285
+w) steps and a window of beta = 0.1102 (A - 8.7), for A above 50.
+
+Only what lies below a frequency: a low-pass filter that also lowers the rate.
 
 Problem: a filter alone (the 20 Hz of 6.2.1 of Blum 2015) leaves samples that hardly differ from their neighbours, and
 whatever weighs residuals afterwards takes the emptied band for certainty. Solution: behind the filter only as many
@@ -14,12 +24,57 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp import kaiser
+Complex = npt.NDArray[np.complex128]
+
+_NYQUIST = 0.4999
+
+
+def butterworth(order: int, s: Complex, cutoff_hz: float, sampled_hz: float = 0.0) -> Complex:
+    """What an oscillation exp(s t) is multiplied by, s (...) [1/s]: with x = s / (2 pi cutoff) the product of
+    1 / (1 + 2 sin((2 k - 1) pi / (2 n)) x + x^2) over k = 1 ... n / 2, and of 1 / (1 + x) where the order n is odd.
+
+    sampled_hz    samples a second that the filter is run on: x = tanh(s / 2 r) / tan(pi cutoff / r), the bilinear
+                  transform (A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2); a cut-off beyond half
+                  of them passes all. 0: it is none that is run on samples
+    """
+    x = s / (2 * np.pi * cutoff_hz)
+    if sampled_hz:
+        x = np.tanh(s / (2 * sampled_hz)) / np.tan(np.pi * min(cutoff_hz / sampled_hz, _NYQUIST))
+    result = 1 / (1 + x) if order % 2 else np.ones_like(x)
+    for k in range(1, order // 2 + 1):
+        result = result / (1 + 2 * np.sin((2 * k - 1) * np.pi / (2 * order)) * x + x * x)
+    return np.asarray(result)
+
 
 Array = npt.NDArray[np.float64]
 
+
 _SAMPLES_PER_PERIOD = 2.5
 _STOP_DB = 60.0
+
+
+def kaiser_half_length(stop_db: float, width: float) -> float:
+    """Samples, not rounded, on either side of the middle of a filter whose transition is ``width`` wide [rad/sample]
+    and ends so many dB down."""
+    return (stop_db - 7.95) / (2.285 * width) / 2
+
+
+def beta(stop_db: float) -> float:
+    """Shape of the window whose side lobes are so many dB down."""
+    return 0.1102 * (stop_db - 8.7)
+
+
+def low_pass_taps(half: int, steps: int, cutoff: float, stop_db: float) -> Array:
+    """Filter (2 half + 1,), symmetric, its sum 1, for taking one sample in ``steps``: half the amplitude at ``cutoff``
+    [of half the rate that is left]."""
+    taps = np.sinc(cutoff * (np.arange(-half, half + 1) / steps)) * np.kaiser(2 * half + 1, beta(stop_db))
+    return np.asarray(taps / taps.sum())
+
+
+def kaiser_window(offset: Array, half: float, stop_db: float) -> Array:
+    """The Kaiser window at any offsets from its middle, 0 beyond ``half``."""
+    inside = np.clip(1 - (offset / half) ** 2, 0.0, None)
+    return np.asarray(np.i0(beta(stop_db) * np.sqrt(inside)) / np.i0(beta(stop_db)))
 
 
 @dataclass(frozen=True)
@@ -84,9 +139,9 @@ class DecimatingLowPass:
     @property
     def _half(self) -> int:
         pass_hz, stop_hz = self._edges
-        return ceil(kaiser.half_length(_STOP_DB, 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz))
+        return ceil(kaiser_half_length(_STOP_DB, 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz))
 
     def _kernel(self, place: Array) -> Array:
         """The filter at places counted in samples from its middle."""
-        window = kaiser.window(place, self._half + 1, _STOP_DB)
+        window = kaiser_window(place, self._half + 1, _STOP_DB)
         return np.asarray(np.sinc(sum(self._edges) / self.rate_hz * place) * window)

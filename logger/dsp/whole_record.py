@@ -1,4 +1,18 @@
-"""Samples at uneven times, laid on an even grid through an anti-alias filter.
+"""Whole records through filters without delay: thinned, cut to a band, or of uneven times.
+
+A whole record thinned: fewer samples a second of the same motion.
+
+Problem: what a program looks at lies far below what a fast recorder took, and bands, noise and work grow with the rate.
+Solution: all that lies above half the lower rate is taken out at once, by the record's transform (streams are thinned
+by ``resample.Decimator``), so that white noise stays white up to there.
+
+A record without what lies outside of a band of frequencies, and without delay.
+
+A filter of linear phase whose delay is taken out: a sinc in a Kaiser window. Its gain is one half at an
+end of the band and is 60 dB down a hertz beyond it, so that what is compared inside is hardly touched by what is
+outside.
+
+Samples at uneven times, laid on an even grid through an anti-alias filter.
 
 Problem: a recorder whose steps vary gives no record that a filter could read, and straight lines between its samples
 lose what is fast: a tenth at a fifth of the rate. Taking every so many of them folds what is faster into the record.
@@ -6,18 +20,19 @@ lose what is fast: a tenth at a fifth of the rate. Taking every so many of them 
 Solution: first the samples of an even grid of the record's own mean rate that explain the readings best, between which
 a windowed sinc runs (least squares; K. Groechenig and T. Strohmer, in F. Marvasti, Nonuniform Sampling, 2001, ch. 6).
 They are sought as a correction of straight lines, so that what a hole leaves open stays a straight line. Then another
-windowed sinc (``logger.dsp.kaiser``) to the rate that is wanted: of a lower one it passes all up to 0.45 of the rate.
+windowed sinc (``low_pass``) to the rate that is wanted: of a lower one it passes all up to 0.45 of the rate.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from math import ceil
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp import kaiser
+from logger.dsp.low_pass import kaiser_half_length, kaiser_window, low_pass_taps
 
 Array = npt.NDArray[np.float64]
 
@@ -39,7 +54,7 @@ class _Kernel:
     def __init__(self, offsets: npt.NDArray[np.floating[Any]], half: float, cutoff: float) -> None:
         self._phases = ceil(_PHASES * cutoff)
         apart = np.arange(self._phases + 1)[:, None] / self._phases + offsets
-        self._table = np.sinc(cutoff * apart) * kaiser.window(apart, half, _STOP_DB)
+        self._table = np.sinc(cutoff * apart) * kaiser_window(apart, half, _STOP_DB)
         self._steps = np.diff(self._table, axis=0)
 
     def at(self, share: Array) -> Array:
@@ -121,3 +136,61 @@ def _band_limited(even: Array, at: Array, cutoff: float) -> Array:
         weights /= weights.sum(axis=1, keepdims=True)
         found[start : start + rows] = np.einsum("mk,mka->ma", weights, around[nearest[:, None] + offsets + half + 1])
     return found
+
+
+_MIRRORED = 100  # thinned samples, at each end
+
+
+def thinned(samples: Array, factor: int) -> Array:
+    """Every ``factor``-th of samples (n,), the first among them, of what lies below half of the lower rate.
+
+    Both ends are continued by their mirror image about the last sample, as a transform takes a record for a circle.
+    ValueError for a factor below 1.
+    """
+    from scipy.signal import resample
+
+    if factor < 1:
+        raise ValueError(f"cannot thin by {factor}")
+    if factor == 1 or len(samples) <= factor:
+        return samples[::factor]
+    count = len(samples)
+    before = min(_MIRRORED, (count - 1) // factor) * factor
+    after = before + -(count + 2 * before) % factor
+    around = np.pad(samples, (before, after), mode="reflect", reflect_type="odd")
+    found = np.asarray(resample(around, len(around) // factor), float)
+    return found[before // factor :][: -(-count // factor)]
+
+
+_BAND_STOP_DB = 60.0
+HALF_WIDTH_HZ = 1.0
+"""From an end of the band to where the filter passes all, and to where it passes nothing. It costs 0.9 s of record on
+either side (``reach``): in front of it half of the 2 s that are left out of every run."""
+
+
+def in_band(samples: Array, rate_hz: float, low_hz: float, high_hz: float) -> Array:
+    """Samples (n,) without what lies below ``low_hz`` and above ``high_hz``; an end at 0, or at half the rate, is
+    none. Before and after the record its ends are held."""
+    found = np.asarray(samples, float)
+    if high_hz < rate_hz / 2:
+        found = _through(found, _taps(high_hz, HALF_WIDTH_HZ, rate_hz))
+    if low_hz > 0:
+        found = found - _through(found, _taps(low_hz, min(HALF_WIDTH_HZ, 0.5 * low_hz), rate_hz))
+    return found
+
+
+def reach(rate_hz: float) -> int:
+    """How many samples at an end of a record are not what they would be, had it gone on, where its band is cut."""
+    return ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * HALF_WIDTH_HZ / rate_hz))
+
+
+@cache
+def _taps(cutoff_hz: float, half_width_hz: float, rate_hz: float) -> Array:
+    half = ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * half_width_hz / rate_hz))
+    return low_pass_taps(half, 1, 2 * cutoff_hz / rate_hz, _BAND_STOP_DB)
+
+
+def _through(samples: Array, taps: Array) -> Array:
+    from scipy.signal import fftconvolve
+
+    half = len(taps) // 2
+    return np.asarray(fftconvolve(np.pad(samples, half, mode="edge"), taps, mode="valid"))
