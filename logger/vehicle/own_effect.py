@@ -241,7 +241,7 @@ _TRIED = np.vstack([np.zeros(10), np.random.default_rng(1).uniform(-1, 1, (30, 1
 
 def _check_motion(law: MotionLaw) -> None:
     """ValueError for a law by all that moves that gives no numbers, or that a simulation could not ask."""
-    from logger.vehicle.laws import address_of, functions_of  # loads the compiler, if there is one
+    from logger.vehicle.stepping_loop import address_of, functions_of  # loads the compiler, if there is one
 
     if not isinstance(law.between, Between):
         raise ValueError(f"expected with_law to get one of {', '.join(map(str, Between))}, found {law.between!r}")

@@ -8,7 +8,7 @@ time stepping, in: Nonsmooth Mechanics and Applications, 1988). One that grows w
 mount in series with a damper has a state, its compression, stepped by the trapezoidal rule.
 
 Laws come as tables, so that one loop serves all of them, in whatever combination; those by more than two variables, or
-with states, as addresses of functions (``laws``). The loop is compiled when numba is
+with states, as addresses of functions (``stepping_loop``). The loop is compiled when numba is
 installed (the ``lab`` extra) and runs as plain Python, some hundred times slower, when it is not.
 """
 
@@ -176,7 +176,7 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     """Laws by all that moves as the loop reads them; None where there are none."""
     if not any(one.motions for one in laws):
         return None
-    from logger.vehicle.laws import ANSWERS, FELT, address_of, numbers_in_order
+    from logger.vehicle.stepping_loop import ANSWERS, FELT, address_of, numbers_in_order
 
     whole, numbers, memories = [], [0.0], []
     for i, corner in enumerate(laws):

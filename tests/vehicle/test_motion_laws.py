@@ -17,7 +17,7 @@ from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import own_effect, shipped_effects
 from logger.store.formats.vehicle_file import Model, read_vehicle
-from logger.vehicle import laws
+from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effects.hysteresis import force, rates
@@ -263,16 +263,16 @@ def test_two_states_are_stepped_with_the_car(tmp_path: Path, plain: np.ndarray) 
 def test_a_compiled_law_answers_as_it_is_written() -> None:
     values = SimpleNamespace(yield_force_n=7.0, yield_travel_m=0.5, sharpness_ratio=1.5)
     law = MotionLaw(Between.BODY_AND_WHEEL, force, values, rates, (0.0,))
-    felt = np.linspace(-0.4, 0.6, laws.FELT)
-    seen = Seen(*felt[: laws.MEMORY_AT], (felt[laws.MEMORY_AT],))
-    answers = np.zeros(laws.ANSWERS)
-    given = np.array([9.0, *laws.numbers_in_order(law)])
-    laws.ask(laws.address_of(law), given, 1, felt, answers)
+    felt = np.linspace(-0.4, 0.6, stepping_loop.FELT)
+    seen = Seen(*felt[: stepping_loop.MEMORY_AT], (felt[stepping_loop.MEMORY_AT],))
+    answers = np.zeros(stepping_loop.ANSWERS)
+    given = np.array([9.0, *stepping_loop.numbers_in_order(law)])
+    stepping_loop.ask(stepping_loop.address_of(law), given, 1, felt, answers)
     expected = force(values, seen), rates(values, seen)[0]
     assert answers[:2] == pytest.approx(expected, rel=1e-12)
-    written = np.zeros(laws.ANSWERS)
+    written = np.zeros(stepping_loop.ANSWERS)
     numbers = namedtuple("numbers", sorted(vars(values)))
-    laws._plain(force, rates, numbers, 1)(given[1:], felt, written)  # as it is asked without a compiler
+    stepping_loop._plain(force, rates, numbers, 1)(given[1:], felt, written)  # as it is asked without a compiler
     assert written == pytest.approx(answers, rel=1e-12)
 
 
