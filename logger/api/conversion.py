@@ -1,23 +1,37 @@
-"""Logs as files for other programs."""
+"""Logs as files for other programs.
+
+Suggestions of OpenStreetMap's ``smoothness`` per way, as a layer to be reviewed by a person.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from logger.api.log_questions import ConvertQuestion
-from logger.api.outputs import check_out
 from logger.api.question import function
-from logger.api.shown import CommandResult
+from logger.api.shown import CommandResult, check_out
 from logger.errors import BadInput
+from logger.exchange.layer import Feature, Field, Kind, Layer, cut
 from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
-from logger.report.left_rows import damaged
+from logger.records import WindowRecord
+from logger.report.placed import column, damaged, iri_errors, placed, trace_of
+from logger.report.summary import counts
+from logger.roads.iso8608 import iri_class
+from logger.roads.repeated_drives import passes_of, scatter_of
+from logger.roads.road_matching import match
+from logger.roads.road_network import Array, RoadNetwork, on_sphere
+from logger.roads.smoothness import LEAST_COVERED, suggestion, way_means
+from logger.roads.window_errors import WindowErrors
+from logger.store.formats.road_lines import MapWay
+from logger.store.log.log_reader import split_drives
 
 if TYPE_CHECKING:
-    from logger.exchange.layer import Layer
     from logger.store.log.log_reader import LoggedFile
 
 
@@ -42,7 +56,7 @@ class Conversion(CommandResult):
 def converted(question: ConvertQuestion) -> Conversion:
     """The answer to ``ConvertQuestion``, which says what is raised."""
     from logger.exchange.format import format_of, write_layer
-    from logger.exchange.windows import windows_layer
+    from logger.exchange.layer import windows_layer
     from logger.store.log.log_reader import find_logs_in, read_found
 
     path, smoothness = Path(question.to), question.smoothness
@@ -66,10 +80,76 @@ convert = function("convert", ConvertQuestion, converted)
 
 
 def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
-    from logger.report.smoothness_layer import smoothness_layer
     from logger.store.formats.road_lines import read_map_ways
 
     layer = smoothness_layer([one for file in files for one in file.records], read_map_ways(roads))
     if not layer.features:
         raise BadInput(f"{roads}: expected ways that these logs passed with an IRI, found none")
     return layer
+
+
+_CELL_M = 25.0
+_TAGS = ("name", "highway", "surface")
+_FIELDS = (Field("osm_way", Kind.COUNT), *(Field(name, Kind.WORDS) for name in _TAGS),
+           Field("smoothness_tagged", Kind.WORDS), Field("smoothness_suggested", Kind.WORDS),
+           Field("confidence", Kind.NUMBER), Field("iri_m_per_km", Kind.NUMBER), Field("iri_std_m_per_km", Kind.NUMBER),
+           Field("covered_m", Kind.NUMBER), Field("length_m", Kind.NUMBER), Field("drives", Kind.COUNT))
+
+
+def smoothness_layer(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Layer:
+    """Each way that a row with an IRI lies on, with what is tagged and what the drives suggest. The suggestion is empty
+    where less than half of the way is known."""
+    return Layer("smoothness", _FIELDS, tuple(_features(records, ways)))
+
+
+def _features(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Iterator[Feature]:
+    network = RoadNetwork()
+    usable: list[MapWay] = []
+    lengths: list[float] = []
+    for way in ways:
+        try:
+            network.add_line(way.lat_deg, way.lon_deg)
+        except ValueError:  # without length
+            continue
+        network.add_line(way.lat_deg[::-1], way.lon_deg[::-1])
+        usable.append(way)
+        corners = on_sphere(way.lat_deg, way.lon_deg)
+        lengths.append(float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()))
+    if not usable:
+        return
+    parts: list[tuple[Array, ...]] = []
+    for number, drive in enumerate(split_drives(records)):
+        rows = [one for one in drive if placed(one)]
+        if len(rows) < 2:
+            continue
+        found, _ = match(network, trace_of(rows))
+        on = found.way >= 0
+        number_on, against = np.divmod(np.maximum(found.way, 0), 2)
+        length_m = np.array(lengths)[number_on]
+        at_m = np.where(against == 1, length_m - found.along_m, found.along_m)
+        half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
+        start_m, end_m = np.maximum(at_m - half_m, 0.0), np.minimum(at_m + half_m, length_m)
+        parts.append((np.where(on, number_on, -1.0), start_m, end_m, np.full(len(rows), float(number)),
+                      column(rows, lambda one: one.iri_m_per_km if counts(one) else None),
+                      *astuple(iri_errors(rows))))
+    if not parts:
+        return
+    on_way, start_m, end_m, driven, iri, *errors = (np.concatenate(one) for one in zip(*parts, strict=True))
+    passes = passes_of(on_way.astype(np.intp), start_m, end_m, driven.astype(np.intp), np.zeros(len(on_way)), iri,
+                       WindowErrors(*errors), _CELL_M)
+    mean = way_means(passes, scatter_of(passes), _CELL_M)
+    for index, number in enumerate(mean.way.tolist()):
+        yield _feature(usable[number], lengths[number], float(mean.covered_m[index]), int(mean.drives[index]),
+                       float(mean.iri_m_per_km[index]), float(mean.iri_std_m_per_km[index]))
+
+
+def _feature(way: MapWay, length_m: float, covered_m: float, drives: int, iri: float, std: float) -> Feature:
+    known = covered_m >= LEAST_COVERED * length_m
+    word, confidence = suggestion(iri, std) if known else (None, None)
+    if drives < 2:  # what one drive has of its car, its load and its tires is not known
+        confidence = None
+    places = tuple(zip(way.lon_deg.tolist(), way.lat_deg.tolist(), strict=True))
+    title = f"way {way.osm_id}: smoothness={word}" if word else f"way {way.osm_id}: too little of it is known"
+    return Feature(f"way {way.osm_id}", title, (
+        way.osm_id, *(way.tags.get(name) for name in _TAGS), way.tags.get("smoothness"), word, confidence, iri, std,
+        covered_m, length_m, drives), cut(places), places[len(places) // 2], None, False, iri_class(iri))

@@ -1,39 +1,67 @@
-"""What the verbs about a record, a drive or a car alone are asked: comfort, estimate, calibrate and modes."""
+"""What the verbs about a record, a drive or a car alone are asked: comfort, estimate, calibrate and modes.
+
+What ``ridelog simulate`` is asked.
+
+What the verbs about measured profiles and random ones are asked: iri, road classify, road generate.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from drivers.catalogue import names
-from logger.api.question import PICTURES, Argument, LongQuestion, Option, Out, Question, Verb
-from logger.api.ranges import (
+from logger.api.question import (
     ADDED,
     AUTO,
     COMMON_IRI,
     COMMON_SPEED_MPS,
     DAILY_HOURS,
     IRI,
+    LENGTH,
     LOW_PASS,
     MASS_FACTOR,
     MODAL_METHODS,
     MODAL_METHODS_GONE,
+    MOST_ROAD_SAMPLES,
     NOISE,
     PASSENGERS,
+    PICTURES,
+    RATE,
     RESPONSES,
+    ROAD_WAVINESS,
+    ROUGHNESS,
     SEED,
+    SPACING,
     SPEED,
     WINDOW,
+    Anyway,
+    Argument,
+    Localized,
+    LongQuestion,
+    Option,
+    Out,
+    Question,
+    Range,
+    ResampleHz,
+    ResampleM,
+    Unit,
+    Vehicle,
+    VehicleName,
+    Verb,
+    files_of,
 )
-from logger.api.terms import Anyway, ResampleHz, Unit, Vehicle, VehicleName
+from logger.api.question import IRI as IRI_RANGE
 from logger.errors import BadInput
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.store.formats.channel_file import ChannelRecord
     from logger.store.formats.drive_file import Drive
+    from logger.store.formats.profile_file import Profile
     from logger.store.formats.record_file import AccelerationRecord
+
 
 _WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
 
@@ -129,7 +157,6 @@ class EstimateQuestion(LongQuestion):
     anyway: Anyway = False
 
     def files_read(self) -> Sequence[Path]:
-        from logger.api.bench import files_of
         from logger.store.formats.drive_file import DRIVE, PROFILE
 
         given = super().files_read()
@@ -185,8 +212,6 @@ class CalibrateQuestion(LongQuestion):
     stays: ClassVar[bool] = True
 
     def files_read(self) -> Sequence[Path]:
-        from logger.api.bench import files_of
-
         return files_of(self.vehicle)
 
 
@@ -311,3 +336,224 @@ ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
 MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (
     Out("write the poles of all orders, for a stabilisation diagram", "--diagram", "FILE.csv", ("*",), many=False,
         is_drawn=False), PICTURES))
+
+
+_OBSTACLES = ("add one to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; step: "
+              "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; pothole: start_m, "
+              'depth_m, length_m[, edge_m]. In Python: {"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}')
+
+
+@dataclass(frozen=True)
+class SimulateQuestion(Question):
+    """What a vehicle's accelerometer would record on a road: a drive, simulated.
+
+      ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
+      ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --effect wheel_lift \\
+          --effect tire_damping:tire_damping_n_s_per_m=200 --out drive.csv
+      ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
+          --out run/drive.csv --profile-out run/profile.csv
+      ridelog simulate --vehicle ./rig.yaml --excitation run/excitation.csv --rate 500 --out run/drive.csv
+
+    The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires
+    at the start of the profile, after a flat road, ends a second after the last wheel has left it, and is sampled as a
+    recorder does it, behind a filter that is flat up to 0.38 of the sample rate. A folder that holds a drive.csv and
+    the profile.csv it was driven on is a run. A rig that is driven by time (--excitation) has no speed and no distance;
+    its drive.csv lasts as long as the excitation.csv beside it.
+
+    Physical effects are those of the vehicle's file, then those of --effect; --list-effects lists them. The speed
+    asked for is the true one: with speed_scale the drive's own columns say something else.
+
+    In Python: a run. Raises BadInput for what no car can do, obstacles that do not lie on the road, and as
+    ``read_vehicle`` and ``read_profile``.
+
+    >>> run = simulate("rav4-2009", random_road(iso_class="B", length_m=100.0), speed_mps=10.0)
+    >>> run.accel_z_mps2.shape, round(float(run.accel_z_mps2.std()), 2)
+    ((1130,), 0.27)
+    >>> braking = simulate("rav4-2009", run.profile, ([0.0, 5.0, 10.0], [12.0, 12.0, 0.0]))
+    >>> round(float(braking.distance_m[-1]), 2)
+    90.0
+    """
+
+    vehicle: VehicleName
+    profile: Annotated[Union["Profile", Path, str], "the road [m]; of two tracks a full car uses both, others the left"]
+    speed_mps: Annotated[float | tuple[Any, Any], "the same all the way, 0.1 to 100 m/s; or times (k,) [s], growing, "
+                                                  "and speeds (k,) [m/s] with straight lines between them"]
+    _: KW_ONLY
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | Sequence[str] | None, Option(
+        _OBSTACLES, metavar="NAME:PARAM=VALUE,...", read=str, many=list, flag="--obstacle")] = None
+    rate_hz: Annotated[float, Option("samples a second", RATE, "HZ")] = 100.0
+    noise_mps2: Annotated[float, Option("r.m.s. of the sensor's noise [m/s2]", ADDED, "MPS2")] = 0.0
+    step_mps2: Annotated[float, Option("the sensor gives whole multiples of this only [m/s2]", ADDED, "MPS2")] = 0.0
+    seed: Annotated[int, Option("another number, another noise (default: 1)", Range(0, float("inf")), "N")] = 1
+    name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.speed_mps, int | float) and (words := SPEED.fault(self.speed_mps)):
+            raise self.wrong("speed_mps", words)
+
+
+@dataclass(frozen=True)
+class SimulateCommand(SimulateQuestion):
+    """At the terminal files stand for roads, and more can be asked for."""
+
+    vehicle: Annotated[Vehicle | None, Option(
+        "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)", metavar="NAME|FILE",
+        read=str)] = None  # type: ignore[assignment]
+    profile: Annotated[Path | None, Option(
+        "CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
+        "left one", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
+    speed_mps: Annotated[float | None, Option(
+        "the same all the way [m/s]", SPEED, "MPS")] = None  # type: ignore[assignment]
+    _: KW_ONLY
+    excitation: Annotated[Path | None, Option(
+        "what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m[,elevation_rear_m]); without "
+        "--speed", metavar="FILE", read=Path)] = None
+    flat_m: Annotated[float | None, Option(
+        "a flat road of this length instead [m]", Range(1.0, 10_000.0, "m"), "M")] = None
+    speed_file: Annotated[Path | None, Option(
+        "CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file", metavar="FILE",
+        read=Path)] = None
+    effects: Annotated[Sequence[str], Option(
+        "a physical effect, or the path of a Python file with one of your own; may repeat. What is not said is at its "
+        "usual value; takes the place of the vehicle's own effect of that name", metavar="NAME[:PARAM=VALUE,...]",
+        read=str, many=list, flag="--effect")] = ()
+    outputs: Annotated[Sequence[str], Option(
+        "further columns; may repeat. wheels: their acceleration; travel: extension of the suspensions; tires: height "
+        "of the wheels over the road; body:ahead_m=X,left_m=Y: acceleration of another point of the body, from the "
+        "centre of gravity", metavar="WHAT", read=str, many=list, flag="--output")] = ()
+    list_effects: Annotated[bool, Option(
+        "print the effects there are, with their parameters, and do nothing else")] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for ones in (("profile", "excitation", "flat_m"), ("speed_mps", "speed_file")):
+            if len(given := [one for one in ones if getattr(self, one) is not None]) > 1:
+                raise self.wrong(given[1], f": expected no `{given[0]}` with it")
+        beside = [one for one in ("speed_mps", "speed_file", "obstacles") if getattr(self, one) not in (None, [])]
+        if self.excitation is not None and beside:
+            raise self.wrong(beside[0], ": expected none of it with `excitation`: a rig stands, and has no road")
+
+
+SIMULATE = Verb(SimulateCommand, "", (
+    Out("drive to write; DIR/drive.csv beside DIR/profile.csv makes a run. FILE.html, .png, .svg or .pdf: pictures; "
+        "may repeat", metavar="FILE", others=("*",)),
+    Out("write the road that was driven as well, with its obstacles", "--profile-out", "FILE", ("*",), many=False,
+        is_drawn=False)))
+
+
+ProfileFile = Annotated[Union["Profile", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
+
+
+@dataclass(frozen=True)
+class ProfileQuestion(Question):
+    """One about a ``profile``, or its file."""
+
+    profile: ProfileFile
+
+
+@dataclass(frozen=True)
+class IriQuestion(ProfileQuestion):
+    """Exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
+
+    PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]) or ERD, evenly spaced by 300 mm or less and at least
+    11 m long. With two wheel tracks: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
+
+    In Python: raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
+
+    >>> found = iri(random_road(iso_class="B", length_m=400.0, seed=3))
+    >>> round(found.iri_m_per_km, 2), found.windows_m_per_km.round(2).tolist()
+    (4.44, [4.3, 4.69, 4.44, 4.32])
+    """
+
+    window_m: Annotated[float, Option(
+        "length of a window [m] (default: 100, as road agencies report; a tenth of a mile is 160.9344, the service's "
+        "25 ft are 7.62)", metavar="M")] = 100.0
+    resample_m: ResampleM = None
+    localized_m_per_km: Localized = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.window_m > 0:
+            raise self.wrong("window_m", f" {self.window_m:g}: expected a length above 0 m")
+
+
+@dataclass(frozen=True)
+class IriCommand(IriQuestion):
+    __doc__ = IriQuestion.__doc__    # at the terminal the response of the IRI itself can be asked for as well
+
+    profile: Annotated[Union["Profile", Path, str, None], Argument(
+        "CSV or ERD file", metavar="PROFILE", read=Path)] = None  # type: ignore[assignment]
+    _: KW_ONLY
+    response: Annotated[bool, Option(
+        "without a profile: how strongly the IRI responds to each wavelength, as a table")] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.response and (self.profile is not None or self.localized_m_per_km is not None):
+            raise self.wrong("response", ": expected no PROFILE and no `localized_m_per_km`, it is the response of the "
+                                         "IRI itself")
+        if not self.response and self.profile is None:
+            raise self.complaint("expected a PROFILE, or `response`")
+
+
+@dataclass(frozen=True)
+class ClassifyQuestion(ProfileQuestion):
+    """Class, degree of roughness and waviness of a profile of at least 100 m (ISO 8608).
+
+    In Python: raises BadInput for one that is too short or too odd, and as ``read_profile``.
+
+    >>> found = classify(random_road(iso_class="C", length_m=500.0))
+    >>> found.road_class, abs(found.waviness - 2.0) < 3 * found.waviness_std
+    ('C', True)
+    """
+
+    resample_m: ResampleM = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomRoadQuestion(Question):
+    """Make a random road with the spectrum of ISO 8608: Gd(n) = Gd(n0) (n / n0)^-w (Eq 4.1, 4.2 of Blum 2015). Same
+    numbers, same road.
+
+    In Python: raises BadInput for what is none of this.
+
+    >>> random_road(iso_class="B", length_m=20.0)
+    Profile
+      length                               20  m
+      begins at                             0  m
+      spacing                            0.05  m
+      samples                             401
+      wheel tracks                          1
+      elevation, standard deviation  0.005887  m
+    """
+
+    iso_class: Annotated[str | None, Option(
+        "class; the road gets the geometric mean of its degrees of roughness", metavar="A-H", read=str.upper,
+        choices="ABCDEFGH", flag="--class")] = None
+    gd_n0_cm3: Annotated[float | None, Option(
+        "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS, "CM3", flag="--gd")] = None
+    iri_m_per_km: Annotated[float | None, Option(
+        "IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation", IRI_RANGE,
+        "M_PER_KM")] = None
+    length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
+    spacing_m: Annotated[float, Option("between samples [m]", SPACING, "M")] = 0.05
+    seed: Annotated[int, Option("another number, another road (default: 1)", Range(0, float("inf")), "N")] = 1
+    waviness: Annotated[float, Option("w", ROAD_WAVINESS, "W")] = 2.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if sum(one is not None for one in (self.iso_class, self.gd_n0_cm3, self.iri_m_per_km)) != 1:
+            raise self.complaint("expected one of `iso_class`, `gd_n0_cm3` and `iri_m_per_km`")
+        both = f"`length_m` {self.length_m:g} `spacing_m` {self.spacing_m:g}: expected"
+        if self.length_m / self.spacing_m > MOST_ROAD_SAMPLES:
+            raise self.complaint(f"{both} at most {MOST_ROAD_SAMPLES} samples")
+        last_m = int(self.length_m / self.spacing_m + 1e-9) * self.spacing_m
+        if last_m < LENGTH.low:
+            raise self.complaint(f"{both} the last sample at {LENGTH.low:g} m or more, it lies at {last_m:g} m")
+
+
+EXACT_IRI = Verb(IriCommand, "logger.api.roads:asked_iri", (PICTURES,))
+CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (
+    Out("write the smoothed spectrum of the (left) track as CSV", "--psd", "FILE", ("*",), False, False), PICTURES))
+GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road_of")

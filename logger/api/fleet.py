@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.fleet_questions import IngestQuestion, ReportQuestion, SummariseQuestion
+from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
@@ -18,8 +18,8 @@ from logger.fleet.dataset import EXTRA, Dataset, existing
 
 if TYPE_CHECKING:
     from logger.exchange.layer import Layer
-    from logger.fleet.drive_rows import Keyed
-    from logger.fleet.engine import Engine
+    from logger.fleet.dataset import Engine
+    from logger.fleet.ingest import Keyed
     from logger.fleet.road_map import RoadPieces
     from logger.fleet.summary import FleetFigures
 
@@ -43,7 +43,7 @@ class FleetSummary(CommandResult):
 
     def as_json(self) -> dict[str, Any]:
         """The object that the command prints with ``--json``; made now, as it may be long."""
-        from logger.fleet.words import figures_json
+        from logger.fleet.page import figures_json
 
         return figures_json(self.found)
 
@@ -55,7 +55,7 @@ class FleetSummary(CommandResult):
 
     def layer(self) -> Layer:
         """Roads with their places, for the formats of ``convert``."""
-        from logger.fleet.layer import roads_layer
+        from logger.fleet.page import roads_layer
 
         return roads_layer(self.found.roads)
 
@@ -63,9 +63,8 @@ class FleetSummary(CommandResult):
 def ingested(question: IngestQuestion) -> Ingested:
     """The answer to ``IngestQuestion``, which says what is raised."""
     from logger.files import note
-    from logger.fleet.ingest import ingest_sessions, sessions_of
-    from logger.fleet.pseudonyms import keep_names, own_key, pseudonym
-    from logger.fleet.words import ingest_json, ingest_words
+    from logger.fleet.ingest import ingest_sessions, keep_names, own_key, pseudonym, sessions_of
+    from logger.fleet.page import ingest_json, ingest_words
     from logger.store.log.log_reader import find_logs_in
 
     _needs_arrow()
@@ -92,7 +91,7 @@ fleet_ingest = function("fleet_ingest", IngestQuestion, ingested)
 
 def summarised(question: SummariseQuestion) -> FleetSummary:
     """The answer to ``SummariseQuestion``, which says what is raised."""
-    from logger.fleet.words import figures_words
+    from logger.fleet.page import figures_words
 
     with _summarised(question, question.by) as (figures, _, _):
         return FleetSummary(figures_words(figures), {}, figures)
@@ -111,7 +110,7 @@ class FleetReport(CommandResult):
 
 def reported(question: ReportQuestion) -> FleetReport:
     """The answer to ``ReportQuestion``, which says what is raised."""
-    from logger.fleet.report import INDEX, check_folder, history_of, write_report
+    from logger.fleet.page import INDEX, check_folder, history_of, write_report
 
     place = Path(question.out)
     check_folder(place)
@@ -133,8 +132,8 @@ fleet_report = function("fleet_report", ReportQuestion, reported)
 def _summarised(question: SummariseQuestion | ReportQuestion, by: str
                 ) -> Iterator[tuple[FleetFigures, Engine, RoadPieces | None]]:
     """Figures, the engine that made them, and the map of the dataset."""
-    from logger.fleet.engine import opened
-    from logger.fleet.pseudonyms import names_of, shown_car
+    from logger.fleet.dataset import opened
+    from logger.fleet.ingest import names_of, shown_car
     from logger.fleet.summary import summarise
 
     _needs_arrow()
@@ -175,8 +174,7 @@ def _pieces(dataset: Dataset) -> RoadPieces | None:
 def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     """How keys are made, and the SHA-256 of the map."""
     from logger.files import read_bounded, replace_bytes
-    from logger.fleet.road_cells import cell_keys
-    from logger.fleet.road_map import RoadMap, pieces_of
+    from logger.fleet.road_map import RoadMap, cell_keys, pieces_of
     from logger.store.formats.road_lines import MAX_BYTES, read_road_lines
 
     if roads is None and not dataset.manifest.roads:

@@ -89,8 +89,7 @@ def read_log(path: Path | str) -> Log:
     True
     >>> moving = ~log.flagged("stationary", "slow")
     """
-    from logger.report.summary import summarise
-    from logger.report.terminal import screen
+    from logger.report.summary import screen, summarise
     from logger.store.log.log_reader import find_logs, read_logged
 
     place = Path(path)

@@ -1,28 +1,46 @@
-"""The modes of the structure, or the vehicle, that a record was made on."""
+"""The modes of the structure, or the vehicle, that a record was made on.
+
+Modes of a car out of a drive: its file, its speed and the vehicle, put before the fit.
+
+Vibration records of many sensors, and what is asked of them.
+
+Modes of a vibration record, for a person and for a program.
+
+The model building of the reference dissertation: its modes out of its matrices, and out of simulated records.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from cmath import phase
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import degrees, floor, isfinite, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.api.drive_questions import ModesCommand, ModesQuestion
-from logger.api.question import function
-from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED
-from logger.api.shown import CommandResult
+from logger.api.drives import read_run
+from logger.api.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
+from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
-from logger.api.vibration_records import Channels, Found, name_of, read_channels
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.files import write_text
+from logger.modal.mode import FoundMode, ModalResult
+from logger.report.quantities import known
+from logger.runs import READING, SKIP_S
 from logger.store.formats import channel_file
+from logger.store.formats.channel_file import SPEED as SPEED_COLUMN
+from logger.store.formats.channel_file import ChannelRecord
+from logger.store.formats.drive_file import header_of
+from logger.store.formats.record_file import VERTICAL
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.modal.mode import ModalResult
+
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -84,8 +102,6 @@ modes = function("modes", ModesQuestion, modes_of)
 
 def asked_modes(question: ModesCommand) -> CommandResult:
     """What the terminal asked: modes of a record, of a vehicle alone, or of the example."""
-    from logger.report.five_storey_text import example_lines, five_storey
-
     if question.example is not None:
         example = five_storey()
         return CommandResult("\n".join(example_lines(example)), example)
@@ -98,7 +114,6 @@ def asked_modes(question: ModesCommand) -> CommandResult:
 def _modes_by(found: Found, name: str) -> Modes:
     """What was found of a record of this name, to be shown."""
     from logger.modal.mode import pole_rows
-    from logger.report.modal_text import as_json, lines
 
     result, kept, many = found.result, found.record, found.result.modes
     frequency_hz, frequency_std_hz, damping_ratio, damping_std = (
@@ -141,7 +156,6 @@ def vehicle_modes(
     """
     from logger.estimation.car_response import WAVE_NUMBERS_CPM
     from logger.estimation.road_spectrum import RoadSpectrum
-    from logger.report.modal_text import vehicle_json, vehicle_lines
     from logger.vehicle.linearise import known_vehicle
     from logger.vehicle.modes import mode_errors
     from logger.vehicle.uncertain import cars_off
@@ -166,8 +180,6 @@ def vehicle_modes(
 
 def found_modes(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
     """The modes of a record or of a file. BadInput as ``modes``."""
-    from logger.api.driven_modes import modes_of_drive
-
     if question.vehicle is not None:
         return modes_of_drive(given, question)
     if question.speed_mps is not None:
@@ -266,3 +278,261 @@ def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tu
         raise ValueError(f"expected an order of 2 or more, found {question.order}")
     found = find_modes(record.samples, record.rate_hz, inputs, question.order, decay)
     return found, "era" if decay else "ssi" if inputs is None else "n4sid"
+
+
+METHOD = "vehicle"
+_UNUSED = ("order", "response", "input_column")
+
+
+def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -> Found:
+    """The modes of the vehicle near the one of the question that was driven. BadInput as ``logger.api.modal.modes``."""
+    from logger.modal.driven_car import car_modes
+
+    assert question.vehicle is not None
+    model = model_of(question.vehicle)
+    if model.effects:
+        raise BadInput(f"{model.vehicle.name}: expected a car without effects where the road was not measured, found "
+                       f"{', '.join(one.effect.name for one in model.effects)}")
+    for option in _UNUSED:
+        if getattr(question, option) is not None:
+            raise question.wrong(option, ": expected a record without `vehicle`")
+    if question.method is not None:
+        raise question.wrong("method", f" {question.method}: expected none with `vehicle`, whose "
+                                       "numbers are fitted to the spectrum")
+    name, start_s, rate_hz, samples, speed_mps, usable = _record(given, question)
+    time_s = start_s + np.arange(len(samples)) / rate_hz
+    first_s = time_s[0] + SKIP_S if question.from_s is None else question.from_s
+    inside = (time_s >= first_s) & (time_s <= (time_s[-1] if question.to_s is None else question.to_s))
+    if not inside.any():
+        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within "
+                       f"{time_s[0]:g} to {time_s[-1]:g} s")
+    if not np.ptp(samples[inside]) > 0:
+        raise BadInput(f"{name}: expected an acceleration that moves, found {samples[inside][0]:g} m/s2 all along")
+    try:
+        found = car_modes(model.vehicle, samples[inside], speed_mps[inside], usable[inside], rate_hz)
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    return Found(found, METHOD, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
+
+
+def _record(given: ChannelRecord | Path | str, question: ModesQuestion
+            ) -> tuple[str, float, float, Array, Array, npt.NDArray[np.bool_]]:
+    """Name, start [s], rate [Hz], readings, speeds [m/s] and whether each is a reading."""
+    path = given if isinstance(given, Path | str) else None
+    if path is not None and (Path(path).is_dir() or SPEED_COLUMN in header_of(Path(path))):
+        drive = read_run(path)
+        if question.speed_mps is not None:
+            raise question.wrong("speed_mps", f": expected a record without speeds, {drive.path} has them")
+        if question.columns is not None and tuple(question.columns) != (VERTICAL,):
+            raise question.wrong("columns", f" {','.join(question.columns)}: expected {VERTICAL} of a drive")
+        if drive.speed_mps.max() == 0:
+            raise BadInput(f"{drive.path}: expected a drive, found a car that stands")
+        usable = np.ones(len(drive.time_s), bool) if drive.usable is None else drive.usable == READING
+        return (str(drive.path), float(drive.time_s[0]), drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, usable)
+    name = name_of(given)
+    if question.speed_mps is None:
+        raise question.complaint(f"{name}: expected a column {SPEED_COLUMN}, or `speed_mps` M/S")
+    record = read_channels(path, question.columns or (VERTICAL,)) if path is not None else given
+    assert isinstance(record, ChannelRecord)
+    if len(record.names) != 1:
+        raise question.complaint(f"{name}: expected one sensor (`columns`)")
+    count = len(record.samples)
+    return (name, record.start_s, record.rate_hz, record.samples[:, 0], np.full(count, question.speed_mps),
+            np.ones(count, bool))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Channels(channel_file.ChannelRecord, Shown):
+    """A record of c sensors, evenly sampled.
+
+    names      of the channels
+    start_s    time of the first sample [s]; ``rate_hz`` samples a second
+    samples    (n, c), in any unit
+    """
+
+    def __repr__(self) -> str:
+        deviations = self.samples.std(axis=0).tolist()
+        return table("Channels", [
+            ("time", len(self.samples) / self.rate_hz, "s"), ("rate", self.rate_hz, "Hz"),
+            ("samples", len(self.samples), ""),
+            *((f"{name}, standard deviation", one, "") for name, one in zip(self.names, deviations, strict=True))])
+
+    def charts(self) -> Sequence[Chart]:
+        """The channels over time."""
+        from logger.chart_data import Curves
+
+        time_s = self.start_s + np.arange(len(self.samples)) / self.rate_hz
+        return [Curves("Channels", "time [s]", "reading", tuple(
+            line(name, time_s, one) for name, one in zip(self.names, self.samples.T, strict=True)))]
+
+
+def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
+    """Read a CSV record with ``t_s`` and one column per sensor: these columns, or all.
+
+    Raises BadInput (``file:line: expected ..., found ...``) for anything else, and for a column that never moves.
+
+    >>> read_channels(folder / "drive.csv", ["accel_z_mps2"]).samples.shape
+    (1115, 1)
+    """
+    return Channels(**vars(channel_file.read_channels(path, columns)))
+
+
+def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
+    """A record out of arrays (n,) by the names of their channels.
+
+    rate_hz    samples a second; the first was taken at ``start_s`` [s]
+
+    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
+
+    >>> make_channels({"top": [0.0, 1.0, 0.0], "middle": [0.0, 0.5, 0.0]}, rate_hz=100.0).samples.shape
+    (3, 2)
+    """
+    arrays = [np.asarray(one, dtype=np.float64) for one in samples.values()]
+    if not arrays or arrays[0].ndim != 1 or any(one.shape != arrays[0].shape for one in arrays):
+        raise BadInput("channels: expected arrays of one length and one axis")
+    if not (len(arrays[0]) > 1 and rate_hz > 0 and np.isfinite(start_s) and np.isfinite(arrays).all()):
+        raise BadInput("channels: expected two finite values or more in each, and a rate above 0 Hz")
+    return Channels(tuple(samples), start_s, rate_hz, np.stack(arrays, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found, by which method; ``record``: of the sensors alone, the stretch that was looked at."""
+
+    result: ModalResult
+    method: str
+    record: Channels
+
+
+def name_of(given: channel_file.ChannelRecord | Path | str) -> str:
+    """How a complaint names a record."""
+    return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+
+
+_REJECTED_SHOWN = 12
+_IN_STEP = 0.02  # a shape whose parts are nearer to in step than this is shown with signs alone
+
+
+def as_json(result: ModalResult, record: ChannelRecord, method: str) -> dict[str, Any]:
+    """The agreed fields of each mode first, then its shape; null where the method cannot tell."""
+    return {
+        "modes": [mode_json(mode, record.names) for mode in result.modes],
+        "rejected": [{"frequency_hz": one.frequency_hz, "damping_ratio": known(one.damping_ratio),
+                      "reason": one.reason} for one in result.rejected],
+        "method": method, "how": result.how, "order": result.order, "rate_hz": record.rate_hz,
+        "samples": len(record.samples),
+    }
+
+
+def mode_json(mode: FoundMode, names: tuple[str, ...]) -> dict[str, Any]:
+    """One mode; ``names`` of the channels."""
+    return {
+        "frequency_hz": mode.frequency_hz, "damping_ratio": known(mode.damping_ratio),
+        "frequency_std_hz": mode.frequency_std_hz, "damping_std": known(mode.damping_std),
+        "shape": [{"channel": name, "amplitude": float(abs(part)), "phase_deg": degrees(phase(part))}
+                  for name, part in zip(names, mode.shape.tolist(), strict=True)],
+    }
+
+
+def vehicle_json(frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
+                 ) -> dict[str, Any]:
+    """Modes (m,) of a vehicle's file; null where a standard deviation is not known."""
+    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, damping_ratio, damping_std)), strict=True)
+    return {"modes": [{"frequency_hz": hz, "damping_ratio": ratio, "frequency_std_hz": known(hz_std),
+                       "damping_std": known(ratio_std)} for hz, hz_std, ratio, ratio_std in rows]}
+
+
+def vehicle_lines(title: str, frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
+                  ) -> list[str]:
+    """The same for a person."""
+    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, 100 * damping_ratio, 100 * damping_std)),
+               strict=True)
+    return [title, "mode   frequency Hz           damping %",
+            *(f"{number:4}   {with_error(hz, hz_std):22} {with_error(percent, percent_std)}"
+              for number, (hz, hz_std, percent, percent_std) in enumerate(rows, start=1))]
+
+
+def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
+    """What a person reads; ``name`` is that of the file."""
+    seconds = len(record.samples) / record.rate_hz
+    order = f", order {result.order}" if result.order else ""
+    shown = [f"{name}: {seconds:.4g} s at {record.rate_hz:.6g} Hz, {len(record.names)} channels",
+             f"{result.how}{order}", ""]
+    if result.modes:
+        shown.append("mode   frequency Hz           damping %             shape")
+        shown += [f"{number:4}   {with_error(mode.frequency_hz, mode.frequency_std_hz):22} "
+                  f"{with_error(100 * mode.damping_ratio, 100 * mode.damping_std):21} {_shape_words(mode)}"
+                  for number, mode in enumerate(result.modes, start=1)]
+        shown += ["", f"+- is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
+    else:
+        shown.append("No mode: nothing in this record stands out of what noise would do.")
+    if result.rejected:
+        shown += ["", "Found and not believed:"]
+        shown += [f"  {one.frequency_hz:9.4g} Hz  {one.reason}" for one in result.rejected[:_REJECTED_SHOWN]]
+        if len(result.rejected) > _REJECTED_SHOWN:
+            shown.append(f"  and {len(result.rejected) - _REJECTED_SHOWN} more")
+    return shown
+
+
+def with_error(value: float, std: float) -> str:
+    """A value with as many decimals as its error allows."""
+    if not isfinite(value):
+        return "not known"
+    if not isfinite(std) or std <= 0:
+        return f"{value:.4g}"
+    decimals = min(9, max(0, 1 - floor(log10(std))))
+    return f"{value:.{decimals}f} +- {std:.{decimals}f}"
+
+
+def _shape_words(mode: FoundMode) -> str:
+    if max(abs(part.imag) for part in mode.shape.tolist()) < _IN_STEP * len(mode.shape):
+        return " ".join(f"{part.real:6.3f}" for part in mode.shape.tolist())
+    return " ".join(f"{abs(part):.3f}@{degrees(phase(part)):.0f}°" for part in mode.shape.tolist())
+
+
+def five_storey() -> dict[str, Any]:
+    """What the matrices and simulated records have, beside what is printed."""
+    import numpy as np
+
+    from logger.modal import five_storey
+    from logger.modal.decay import decay_modes, proposals
+
+    building = five_storey.structure()
+    released = five_storey.released(building)
+    sensor = five_storey.SENSORS[0]
+    floors = np.stack([five_storey.recorded(released[:, floor], sensor, 10 + floor) for floor in range(5)], axis=1)
+    found = decay_modes(floors, five_storey.RATE_HZ, proposals, "free decay")
+    compared = five_storey.compare_sensors()
+    return {
+        "masses_kg": np.diag(building.mass).tolist(), "stiffness_n_per_m": -float(building.stiffness[0, 1]),
+        "frequencies_hz": five_storey.frequencies_hz(building).tolist(),
+        "printed_model_hz": list(five_storey.PRINTED_MODEL_HZ),
+        "printed_measured_hz": list(five_storey.PRINTED_MEASURED_HZ),
+        "modes": [mode_json(mode, tuple(f"floor {n}" for n in range(1, 6))) for mode in found.modes],
+        "sensors": [{"name": one.sensor.name, "rms_g": one.rms_g, "peaks_hz": list(one.peaks_hz),
+                     "damping_ratio": one.decrement.damping_ratio, "damping_std": one.decrement.damping_std}
+                    for one in compared],
+        "rms_difference": abs(compared[1].rms_g - compared[0].rms_g) / compared[0].rms_g,
+    }
+
+
+def example_lines(example: dict[str, Any]) -> list[str]:
+    """The same for a person."""
+    lines = ["Five-storey model building (section 5.3). The records were never published: simulated, 75 s at 100 Hz,",
+             f"damping 1.34 %, first peak 0.198 g at the top. Storey stiffness {example['stiffness_n_per_m']:.1f} N/m, "
+             "half way between 3 EI/h^3 and 12 EI/h^3.", "",
+             "mode  matrices Hz  printed model  printed measured   from a simulated record of five PS-2119"]
+    printed = [*zip(example["printed_model_hz"], example["printed_measured_hz"], strict=True), *[(None, None)] * 2]
+    for number, (frequency, (model, measured)) in enumerate(zip(example["frequencies_hz"], printed, strict=True), 1):
+        near = [mode for mode in example["modes"] if abs(mode["frequency_hz"] / frequency - 1) < 0.05]
+        found = "not there" if not near else (
+            f"{with_error(near[0]['frequency_hz'], near[0]['frequency_std_hz'])} Hz, "
+            f"{with_error(100 * near[0]['damping_ratio'], 100 * near[0]['damping_std'])} %")
+        texts = [f"{value:.4f}" if value else "-" for value in (model, measured)]
+        lines.append(f"{number:4}  {frequency:11.4f}  {texts[0]:>13}  {texts[1]:>16}   {found}")
+    lines += ["The printed 2.500 Hz is a misprint of 2.600: these matrices have it at 3.488 times the first whatever",
+              "the stiffness, and the other two fit.", "",
+              "sensor           r.m.s. g   FFT peaks Hz             damping by decrement %"]
+    lines += [f"{one['name']:15}  {one['rms_g']:8.4f}   {', '.join(f'{peak:.3f}' for peak in one['peaks_hz']):23}  "
+              f"{with_error(100 * one['damping_ratio'], 100 * one['damping_std'])}" for one in example["sensors"]]
+    return [*lines, f"r.m.s. differs by {example['rms_difference']:.2%} (printed: 0.0458 and 0.0445, 2.85 %; 1.34 %)"]

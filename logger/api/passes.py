@@ -1,12 +1,23 @@
-"""Repeated drives of logs, combined by place and direction."""
+"""Repeated drives of logs, combined by place and direction.
+
+Repeated drives of logs, combined: means of cells of the road, what changed, and places to visit.
+
+Repeated drives in words, and as JSON.
+
+Repeated drives as layers for other programs: the means of cells as lines, places to visit as points.
+
+Repeated drives as a page: the report's map and curves of the means, and the places to visit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import pairwise
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,17 +25,43 @@ import numpy.typing as npt
 from logger.api.log_questions import PassesQuestion, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
+from logger.chart_data import Array
+from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.roads.sections import FAIR_TO_IN_PER_MI
+from logger.exchange.layer import Feature, Field, Kind, Layer, cut, half_way, iri_title
+from logger.printable import counted
+from logger.records import WindowRecord
+from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
+from logger.report.page import number_button, page
+from logger.report.placed import column, iri_errors, placed, trace_of
+from logger.report.quantities import known
+from logger.report.summary import comfort_words, counts
+from logger.roads.iso8608 import iri_class
+from logger.roads.laid_traces import lay
+from logger.roads.places_to_visit import PlaceToVisit, places_to_visit
+from logger.roads.repeated_drives import (
+    Changes,
+    Means,
+    Passes,
+    Scatter,
+    Trends,
+    changes,
+    means,
+    passes_of,
+    scatter_of,
+    trends,
+    way_and_cell,
+)
+from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.roads.window_errors import WindowErrors
+from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives, utc
 from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.exchange.layer import Layer
-    from logger.report.combined_drives import CombinedDrives
-    from logger.report.html import Html
 
-Array = npt.NDArray[np.float64]
+
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,7 +89,6 @@ class RepeatedDrives(CommandResult):
     def charts(self) -> Sequence[Chart]:
         """The IRI of the way that most cells lie on."""
         from logger.chart_data import Curves, Line
-        from logger.report.combined_drives import chains
 
         longest = max(chains(self._found), key=len, default=None)
         if longest is None:
@@ -69,20 +105,14 @@ class RepeatedDrives(CommandResult):
 
     def layer(self) -> Layer:
         """Cells as lines, for the formats of ``convert``."""
-        from logger.report.passes_layer import cells_layer
-
         return cells_layer(self._found)
 
     def visits(self) -> Layer:
         """Places to visit as points, the most urgent first, for the formats of ``convert``; waypoints in GPX."""
-        from logger.report.passes_layer import visits_layer
-
         return visits_layer(self._found)
 
     def as_page(self, of: str) -> Html:
         """Map, curves and tables as one page."""
-        from logger.report.passes_page import passes_page
-
         return passes_page(self._found)
 
 
@@ -94,9 +124,7 @@ def _day_s(day: str) -> float:
 def combined(question: PassesQuestion) -> RepeatedDrives:
     """The answer to ``PassesQuestion``, which says what is raised."""
     from logger.left_out import left_out_json, left_out_paragraph
-    from logger.report.combined_drives import combined_drives
-    from logger.report.left_rows import of_passes
-    from logger.report.passes_text import as_json, lines
+    from logger.report.placed import of_passes
     from logger.store.log.log_reader import find_logs_in, read_found
 
     since, until, places = question.since, question.until, question.places
@@ -119,3 +147,404 @@ def combined(question: PassesQuestion) -> RepeatedDrives:
 
 
 passes = function("passes", PassesQuestion, combined)
+
+
+@dataclass(frozen=True, eq=False)
+class CombinedDrives:
+    """What the drives of some logs say together, in cells (k,) by way and measure.
+
+    drives, windows       how many there are, and ``placed`` windows of a known place
+    length_m              of a cell
+    above_m_per_km        from which IRI a place is rough
+    passes, scatter       of the IRI, drive by drive
+    iri                   means [m/km]
+    a_w_mps2, a_w_std_mps2    mean of the passes, NaN: not known
+    speed_mps             mean of the passes, NaN: not known
+    lat_deg, lon_deg      where the middle of the passes lay
+    heading_deg           in which direction they went, clockwise from north
+    change                between two periods, where a date between them was given
+    trend                 where passes are a month apart at least
+    visits                the most urgent first
+    """
+
+    drives: int
+    windows: int
+    placed: int
+    length_m: float
+    above_m_per_km: float
+    passes: Passes
+    scatter: Scatter
+    iri: Means
+    a_w_mps2: Array
+    a_w_std_mps2: Array
+    speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+    heading_deg: Array
+    change: Changes | None
+    trend: Trends
+    visits: tuple[PlaceToVisit, ...]
+
+
+def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km: float,
+                split_s: float | None = None) -> CombinedDrives:
+    """Combine the drives of rows by place and direction.
+
+    length_m          of a cell
+    above_m_per_km    from which IRI a place is rough
+    split_s           an instant between two periods to compare [s since 1970]
+    """
+    drives = [[one for one in drive if placed(one)] for drive in split_drives(records)]
+    drives = [drive for drive in drives if len(drive) > 1]
+    rows = [one for drive in drives for one in drive]
+    number = np.repeat(np.arange(len(drives)), [len(drive) for drive in drives])
+    found = lay(RoadNetwork(), [trace_of(drive) for drive in drives])
+    way, middle_m = (np.concatenate([getattr(one, name) for one in found] or [np.zeros(0)])
+                     for name in ("way", "along_m"))
+    half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
+
+    def cells(values: Array, errors: WindowErrors) -> Passes:
+        return passes_of(way.astype(np.intp), middle_m - half_m, middle_m + half_m, number, time_s, values, errors,
+                         length_m)
+
+    time_s = column(rows, lambda one: None if one.utc_us is None else one.utc_us / US_PER_S)
+    iri = column(rows, lambda one: one.iri_m_per_km if counts(one) else None)
+    errors = iri_errors(rows)
+    passes = cells(iri, errors)
+    scatter = scatter_of(passes)
+    mean = means(passes, scatter)
+    felt = cells(column(rows, lambda one: one.a_w_mps2 if counts(one) else None),
+                 WindowErrors.undivided(column(rows, lambda one: one.a_w_std_mps2 or 0.0)))
+    comfort = means(felt, scatter_of(felt))
+    a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
+    driven = cells(column(rows, lambda one: one.speed_mps), WindowErrors.undivided(np.zeros(len(rows))))
+    speed = means(driven, scatter_of(driven))
+    place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(errors.std), 0.0, np.nan), cells, mean)
+    visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
+    return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
+                          a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
+                          None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter),
+                          visits)
+
+
+def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
+    """Values of keys, NaN for a key that is not there."""
+    where = np.searchsorted(among, key)
+    where[where == len(among)] = 0
+    found = np.full(len(key), np.nan)
+    here = among[where] == key if len(among) else np.zeros(len(key), bool)
+    found[here] = values[where[here]]
+    return found
+
+
+def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord]], usable: Array,
+            cells: Callable[[Array, WindowErrors], Passes], mean: Means) -> tuple[Array, Array, Array]:
+    """Latitudes, longitudes and headings of cells, as means of points of the sphere and of directions."""
+    traces = [trace_of(drive) for drive in drives]
+    points = [on_sphere(one.lat_deg, one.lon_deg) for one in traces]
+    heads = [np.nan_to_num(directions(point, one.distance_m)) for point, one in zip(points, traces, strict=True)]
+    exact = WindowErrors.undivided(usable)
+    _, cell = np.unique(cells(usable, exact).key, return_inverse=True)
+
+    def mean_of(parts: Sequence[Array]) -> Array:
+        columns = np.concatenate([*parts, np.zeros((0, 3))])
+        return np.column_stack([
+            np.bincount(cell, cells(columns[:, axis] + usable, exact).iri_m_per_km, len(mean.key))
+            / np.maximum(np.bincount(cell, minlength=len(mean.key)), 1) for axis in range(3)])
+
+    point, head = mean_of(points), mean_of(heads)
+    east, north = east_and_north(point)
+    heading = np.degrees(np.arctan2(np.einsum("ij,ij->i", head, east), np.einsum("ij,ij->i", head, north))) % 360.0
+    return (np.degrees(np.arctan2(point[:, 2], np.hypot(point[:, 0], point[:, 1]))),
+            np.degrees(np.arctan2(point[:, 1], point[:, 0])), heading)
+
+
+def chains(found: CombinedDrives) -> list[np.ndarray]:
+    """Numbers of cells that follow each other on one way."""
+    if not len(found.iri.key):
+        return []
+    way, cell = way_and_cell(found.iri.key)
+    breaks = np.flatnonzero((np.diff(way) != 0) | (np.diff(cell) != 1)) + 1
+    return np.split(np.arange(len(way)), breaks)
+
+
+SIGNIFICANT = 0.05
+"""Share of false finds among the cells that are said to have changed."""
+MOST_VISITS, MOST_CHANGES = 20, 20
+
+
+def lines(found: CombinedDrives) -> list[str]:
+    """For a person."""
+    cells = len(found.iri.key)
+    if not cells:
+        return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
+    changes = change_lines(found)
+    return [*_summary(found), *_passes_visits(found), *([""] if changes else []), *changes]
+
+
+def _summary(found: CombinedDrives) -> Iterator[str]:
+    drives, cells = found.iri.drives, len(found.iri.key)
+    several = int((drives > 1).sum())
+    yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
+           f"{counted(cells, 'cell')} of {found.length_m:g} m by place and direction")
+    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells; median {np.median(drives):g}, "
+           f"{drives.max()} at most")
+    mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
+    yield f"IRI of the cells {mean:.2f} m/km on the mean, standard error of one cell {std:.2f}"
+    if isfinite(found.scatter.drive):
+        yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
+               f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
+        if found.scatter.alike > 0:
+            yield (f"Of the variance of their own errors {found.scatter.alike:.0%} is alike in all drives over a "
+                   "place: more drives do not make that part smaller")
+    else:
+        yield ("No cell was passed by two drives: how far a drive differs as a whole (tires, load, temperature) is not "
+               "known, and not in the standard errors")
+
+
+def _passes_visits(found: CombinedDrives) -> Iterator[str]:
+    yield ""
+    if not found.visits:
+        yield "No place lies above a limit with enough confidence: nothing to visit."
+        return
+    yield f"Places to visit: {len(found.visits)}"
+    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w m/s2':>8}  "
+           f"{'perception':25} {'sure':>4} drives")
+    for number, one in enumerate(found.visits[:MOST_VISITS], start=1):
+        values = visit_values(found, one)
+        iri = f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}"
+        a_w = values["a_w_mps2"]
+        yield (f"{number:3} {values['lat_deg']:10.5f},{values['lon_deg']:10.5f} {compass(values['heading_deg']):7} "
+               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>8}  "
+               f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:4.0%} "
+               f"{one.drives:6}")
+    if len(found.visits) > MOST_VISITS:
+        yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
+
+
+def change_lines(found: CombinedDrives) -> list[str]:
+    """What changed between two periods: how much of the road, and the largest changes, a line each."""
+    return [] if found.change is None else list(_passes_changes(found, found.change))
+
+
+def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
+    if not len(change.key):
+        yield "No cell was passed in both periods: no change can be measured."
+        return
+    words = [changed(change, one) for one in range(len(change.key))]
+    worse, better = words.count("worse"), words.count("better")
+    yield (f"Changed between the two periods: {worse} of {counted(len(change.key), 'cell')} got worse, {better} better "
+           f"(at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
+    cell = np.searchsorted(found.iri.key, change.key)
+    for one in largest_changes(change):
+        at = int(cell[one])
+        yield (f"{place_number(found, at):>3} {changed(change, one):6} {found.lat_deg[at]:10.5f},"
+               f"{found.lon_deg[at]:10.5f} {compass(found.heading_deg[at]):2}  {change.change_m_per_km[one]:+6.2f} ± "
+               f"{change.change_std_m_per_km[one]:.2f} m/km, p {change.p_value[one]:.1e}, "
+               f"{counted(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
+
+
+def changed(change: Changes, one: int) -> str:
+    """``worse`` or ``better``; nothing where no change is sure."""
+    if not change.false_share[one] <= SIGNIFICANT:
+        return ""
+    return "worse" if change.change_m_per_km[one] > 0 else "better"
+
+
+def largest_changes(change: Changes) -> list[int]:
+    """The largest of those that are sure, worse or better."""
+    sure = np.flatnonzero(change.false_share <= SIGNIFICANT)
+    order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
+    return list(map(int, order[:MOST_CHANGES]))
+
+
+def place_number(found: CombinedDrives, cell: int) -> str:
+    """The number of the place to visit that a cell belongs to; nothing where there is none."""
+    return next((str(number) for number, one in enumerate(found.visits, start=1) if cell in one.cells), "")
+
+
+def compass(heading_deg: float) -> str:
+    """A heading clockwise from north in one of eight words."""
+    return ("N", "NE", "E", "SE", "S", "SW", "W", "NW")[round(heading_deg / 45.0) % 8]
+
+
+# --- for programs ---
+
+
+def as_json(found: CombinedDrives) -> dict[str, Any]:
+    """The figures; null where nothing is known."""
+    return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
+            "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
+            "errors_alike": found.scatter.alike,
+            "cells": [cell_values(found, index) for index in range(len(found.iri.key))],
+            "visits": [visit_values(found, one) for one in found.visits]}
+
+
+def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
+    """A cell by the names of its columns."""
+    key = found.iri.key[index]
+    change, trend = found.change, found.trend
+    values = {
+        "cell": int(key), "drives": int(found.iri.drives[index]), "iri_m_per_km": float(found.iri.iri_m_per_km[index]),
+        "iri_std_m_per_km": float(found.iri.iri_std_m_per_km[index]), "a_w_mps2": known(found.a_w_mps2[index]),
+        "lat_deg": float(found.lat_deg[index]), "lon_deg": float(found.lon_deg[index]),
+        "heading_deg": float(found.heading_deg[index]), "first_utc": _utc(found.iri.first_s[index]),
+        "last_utc": _utc(found.iri.last_s[index])}
+    row = np.searchsorted(trend.key, key)
+    there = row < len(trend.key) and trend.key[row] == key
+    for name, by_cell in (("trend_m_per_km_year", trend.per_year_m_per_km),
+                         ("trend_std_m_per_km_year", trend.per_year_std_m_per_km), ("trend_p_value", trend.p_value)):
+        values[name] = float(by_cell[row]) if there else None
+    row = 0 if change is None else int(np.searchsorted(change.key, key))
+    there = change is not None and row < len(change.key) and change.key[row] == key
+    for name in ("change_m_per_km", "change_std_m_per_km", "p_value", "false_share"):
+        values[name if name.startswith("change") else f"change_{name}"] = (
+            float(getattr(change, name)[row]) if there else None)
+    values["changed"] = changed(change, row) or None if change is not None and there else None
+    return values
+
+
+def visit_values(found: CombinedDrives, one: PlaceToVisit) -> dict[str, Any]:
+    """A place to visit by the names of its columns: where its worst cell is, and the figures of that."""
+    values = cell_values(found, one.worst)
+    a_w = values["a_w_mps2"]
+    return {"what": one.kind, "length_m": one.length_m, "confidence": one.confidence,
+            "comfort": None if a_w is None else comfort_word(a_w),
+            **{name: values[name] for name in ("drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "lat_deg",
+                                               "lon_deg", "heading_deg", "first_utc", "last_utc")}}
+
+
+def _utc(time_s: float) -> str | None:
+    return iso_utc(round(time_s * US_PER_S)) if isfinite(time_s) else None
+
+
+_KINDS = {"cell": Kind.COUNT, "drives": Kind.COUNT, "first_utc": Kind.TIME, "last_utc": Kind.TIME, "what": Kind.WORDS,
+          "comfort": Kind.WORDS, "changed": Kind.WORDS}
+_CELL = ("cell", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "lat_deg", "lon_deg", "heading_deg",
+         "first_utc", "last_utc", "trend_m_per_km_year", "trend_std_m_per_km_year", "trend_p_value", "change_m_per_km",
+         "change_std_m_per_km", "change_p_value", "change_false_share", "changed")
+_VISIT = ("what", "length_m", "confidence", "comfort", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2",
+          "lat_deg", "lon_deg", "heading_deg", "first_utc", "last_utc")
+
+
+def _fields(names: tuple[str, ...]) -> tuple[Field, ...]:
+    return tuple(Field(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
+
+
+def cells_layer(found: CombinedDrives) -> Layer:
+    """The cells way by way: each a line half-way to its neighbours."""
+    return Layer("passes", _fields(_CELL), tuple(_cells(found)))
+
+
+def _cells(found: CombinedDrives) -> Iterator[Feature]:
+    ways, _ = way_and_cell(found.iri.key)
+    for chain in chains(found):
+        places = [(float(found.lon_deg[cell]), float(found.lat_deg[cell])) for cell in chain]
+        ends = [half_way(one, other) for one, other in pairwise(places)]
+        for index, cell in enumerate(chain.tolist()):
+            values = cell_values(found, cell)
+            geometry = cut((*ends[max(index - 1, 0):index], places[index], *ends[index:index + 1]))
+            yield Feature(f"way {ways[cell] + 1}", iri_title(values["iri_m_per_km"]),
+                          tuple(values[name] for name in _CELL), geometry, places[index], values["last_utc"], index > 0,
+                          iri_class(values["iri_m_per_km"]))
+
+
+def visits_layer(found: CombinedDrives) -> Layer:
+    """The places to visit, the most urgent first."""
+    return Layer("visits", _fields(_VISIT), tuple(_layer_visits(found)), points=True)
+
+
+def _layer_visits(found: CombinedDrives) -> Iterator[Feature]:
+    for number, one in enumerate(found.visits, start=1):
+        values = visit_values(found, one)
+        place = (values["lon_deg"], values["lat_deg"])
+        title = (f"{number} {one.kind}, {one.length_m:.0f} m towards {compass(values['heading_deg'])}, "
+                 f"{iri_title(values['iri_m_per_km'])}")
+        yield Feature("places to visit", title, tuple(values[name] for name in _VISIT), ((place,),), place,
+                      values["last_utc"], False, iri_class(values["iri_m_per_km"]))
+
+
+_GAP_M = 1.0
+
+
+def passes_page(found: CombinedDrives) -> Html:
+    """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
+    title = f"Road roughness, mean of {counted(found.drives, 'drive')}", _days(found)
+    order = [cell for chain in chains(found) for cell in chain.tolist()]
+    rows = [order.index(one.worst) for one in found.visits[:MOST_VISITS]]
+    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, marked=rows or None, first=(
+        section("Repeated drives combined", paragraphs(lines(found)[:4]) + hint(
+            "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
+            "last drive, its speed their mean.")), section("Places to visit", _page_visits(found, rows)),
+        section("What changed between the two periods", _page_changes(found))))
+
+
+def _days(found: CombinedDrives) -> str:
+    if not np.isfinite(found.iri.first_s).any():
+        return "dates not known"
+    first, last = (utc(round(one * US_PER_S)) for one in (np.nanmin(found.iri.first_s), np.nanmax(found.iri.last_s)))
+    return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
+
+
+def _page_changes(found: CombinedDrives) -> Html:
+    if found.change is None:
+        return EMPTY
+    change, cells = found.change, np.searchsorted(found.iri.key, found.change.key)
+    rows = []
+    for one in largest_changes(change):
+        cell = int(cells[one])
+        lat_deg, lon_deg = float(found.lat_deg[cell]), float(found.lon_deg[cell])
+        rows.append((
+            place_number(found, cell), changed(change, one), _link(lat_deg, lon_deg),
+            compass(float(found.heading_deg[cell])),
+            f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
+            str(change.before[one]), str(change.after[one])))
+    heads = ("#", "It got", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
+    return paragraphs(change_lines(found)[:1]) + (grid(heads, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
+
+
+def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:
+    if not found.visits:
+        return paragraphs(["No place lies above a limit with enough confidence."])
+    rows = []
+    for number, one in enumerate(found.visits, start=1):
+        values = visit_values(found, one)
+        lat_deg, lon_deg = values["lat_deg"], values["lon_deg"]
+        a_w = values["a_w_mps2"]
+        rows.append((
+            number_button(marked[number - 1], number) if number <= len(marked) else str(number), one.kind,
+            _link(lat_deg, lon_deg),
+            compass(values["heading_deg"]), f"{one.length_m:.0f}",
+            f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
+            "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
+    heads = ("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+             "Perception", "Sure", "Drives")
+    return html('<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 7))) + hint(
+        f"Rough: above {found.above_m_per_km:.2f} m/km. A place has its number in all tables, on the map and in the "
+        "curves.")
+
+
+def _link(lat_deg: float, lon_deg: float) -> Html:
+    return map_links(lat_deg, lon_deg, f"{lat_deg:.6f}, {lon_deg:.6f}")
+
+
+def _rows(found: CombinedDrives) -> Iterator[WindowRecord]:
+    """Cells as rows of a log, for the views that show those."""
+    length_m, at_m, segment = found.length_m, 0.0, 0
+    for chain in chains(found):
+        for cell in chain.tolist():
+            segment += 1
+            a_w = found.a_w_mps2[cell]
+            known = bool(np.isfinite(a_w))
+            last_s = found.iri.last_s[cell]
+            iri, speed_mps = float(found.iri.iri_m_per_km[cell]), float(found.speed_mps[cell])
+            drives = speed_mps > 0
+            yield WindowRecord(
+                segment, 1, segment * US_PER_S, round(last_s * US_PER_S) if np.isfinite(last_s) else None,
+                length_m / speed_mps if drives else 0.0, at_m, at_m + length_m, float(found.lat_deg[cell]),
+                float(found.lon_deg[cell]), speed_mps if drives else None, iri,
+                float(found.iri.iri_std_m_per_km[cell]), None, float(a_w) if known else None, None, None, None,
+                comfort_word(float(a_w)) if known else "", iri_class(iri), None, 0, 0, (),
+                float(found.a_w_std_mps2[cell]) if known else None)
+            at_m += length_m
+        at_m += _GAP_M

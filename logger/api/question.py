@@ -1,4 +1,11 @@
-"""What a verb is asked, declared once.
+"""Ranges of what may be asked, at a terminal and in Python alike.
+
+What the annotation of a field lets a value be, and the complaint about another one.
+
+Annotations name classes that are not loaded (``Union["Model", Path, str]``): an object of one is known by the names of
+its class and of those that it inherits from.
+
+What a verb is asked, declared once.
 
 Problem: an option of a verb was declared four times, for the terminal, for Python, in the checks and in the help, and
 the four came apart. Solution: a frozen dataclass for each verb, whose annotations carry range, unit and help::
@@ -8,20 +15,219 @@ the four came apart. Solution: a frozen dataclass for each verb, whose annotatio
 
 The arguments of the command line (``logger.commands.options``), the function in Python (``function``), the checks
 (``Question``) and the reference are read from it. Modules with questions load nothing heavy.
+
+Fields that the questions of several verbs have in common.
 """
+
 
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
-from numbers import Real
+from math import isfinite
+from numbers import Integral, Real
+from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, ParamSpec, TypeVar, get_args, get_origin
+from types import NoneType, UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    ForwardRef,
+    Literal,
+    NamedTuple,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
-from logger.api.kinds import fault
-from logger.api.ranges import Range
 from logger.errors import BadInput
+from logger.units import INCH_PER_MILE_M_PER_KM
+
+if TYPE_CHECKING:
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.vehicle_file import Model
+
+
+class Range(NamedTuple):
+    """What a number may be, ends included; ``high`` infinite: no end."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    @property
+    def is_half_open(self) -> bool:
+        """Whether it has no end."""
+        return self.high == float("inf")
+
+    @property
+    def words(self) -> str:
+        """Both ends, with the unit."""
+        low, high = (str(one) if isinstance(one, int) else format(one, ".15g") for one in self[:2])
+        return f"{low} or more" if self.is_half_open else f"{low} to {high} {self.unit}".rstrip()
+
+    def fault(self, value: Any) -> str:
+        """What follows the name of a number that lies outside; empty: it does not."""
+        if self.low <= value <= self.high:
+            return ""
+        return f" {value if isinstance(value, int) else format(value, 'g')}: expected {self.words}"
+
+    def check(self, name: str, value: float) -> None:
+        """BadInput for a value outside; ``name``: of what it is."""
+        if words := self.fault(value):
+            raise BadInput(f"{name}{words}")
+
+
+class Limit(Range):
+    """An IRI from which on a road is to be called rough [m/km]; one that no road has is refused."""
+
+    @property
+    def words(self) -> str:
+        """Said by the complaint alone, as the highest is known by what is not loaded before."""
+        return ""
+
+    def fault(self, value: Any) -> str:
+        """As of ``Range``."""
+        from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
+
+        found = Range(self.low, HIGHEST_LIMIT_M_PER_KM, self.unit).fault(value)
+        hint = limit_hint(value) if found else ""
+        return f"{found}{hint}" + f" (at a terminal write {value:g}in/mi)" * bool(hint)
+
+
+LIMIT = Limit(0.01, float("inf"), "m/km")
+
+
+TOLERANCE = Range(0.001, 0.5)
+USUAL_TOLERANCE = 0.2
+"""How far off a car's masses, springs and dampers may well be, as a share."""
+SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Range(0.0, 100.0, "m/s2")
+"""Of a simulated drive; what its sensor adds, noise or steps. An estimate's steps likewise."""
+NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
+"""Of an estimate: noise of a reading, length of a window."""
+AUTO = "auto"
+"""Of a noise: learnt."""
+LENGTH, SPACING = Range(11.0, 1e6, "m"), Range(0.001, 0.3, "m")
+"""Of a random road; a shorter one has no IRI."""
+ROUGHNESS, IRI, ROAD_WAVINESS = Range(1e-3, 1e7, "cm3"), Range(0.01, 1000, "m/km"), Range(1.5, 3.0)
+MOST_ROAD_SAMPLES = 20_000_000
+TRIES, WAVINESS = Range(0, 1000), Range(1.0, 3.5)
+"""Of an identification: further starts, waviness of a road that was not measured."""
+NOISE_MODELS = ("auto", "white", "ar", "road")
+MODAL_METHODS = ("era", "ssi", "n4sid", "decrement")
+MODAL_METHODS_GONE = {"ar": "ssi", "ssi-cov": "ssi", "fft": "ssi", "arx": "n4sid", "armax": "n4sid"}
+"""Of modes: the methods, and for those that are no longer offered the one to use."""
+RESPONSES = ("decay", "random")
+COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
+"""Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
+PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
+LOW_PASS = Range(1.0, 45.0, "Hz")
+"""Of a calibration: people more in the car, times the body's mass, and the recorder's low pass."""
+DAILY_HOURS = Range(0.001, 24.0, "hours")
+"""Of riding, for values of health."""
+
+
+_MOST_SHOWN = 80
+"""Characters of a value in a complaint; a list of readings is longer."""
+_WORDS = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"), str: ("text", "texts"),
+          Path: ("a path", "paths"), bool: ("True or False", "True or False")}
+"""One of a kind, and several."""
+_PUBLIC = {"Drive": "Run", "ChannelRecord": "Channels", "AccelerationRecord": "Record"}
+"""What ``ridelog`` calls classes that go by another name in annotations."""
+
+
+def fault(kind: Any, value: Any, expected: str = "", unit: str = "") -> str:
+    """What follows the name of a value that is none of its kind; empty: it is one.
+
+    kind        an annotation
+    expected    what is asked for, where the kind does not say it
+    unit        of numbers
+    """
+    return "" if allows(kind, value) else f" {_shown(value)}: expected {expected or _named(kind, unit)}"
+
+
+def allows(kind: Any, value: Any) -> bool:
+    """Whether an annotation lets a value be. A number is one of numpy too, and never True or False; text is no list."""
+    origin, inside = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return any(allows(one, value) for one in inside)
+    if origin is Annotated:
+        return allows(inside[0], value)
+    if origin is Literal:
+        return isinstance(value, str) and value in inside
+    if isinstance(kind, ForwardRef):
+        return any(one.__name__ == kind.__forward_arg__ for one in type(value).__mro__)
+    if origin is not None and origin is not Callable:
+        return _holds(origin, inside, value)
+    return _is(kind, value)
+
+
+def _is(kind: Any, value: Any) -> bool:
+    """The same of a kind that holds no others."""
+    if kind in (float, int):
+        return isinstance(value, Real if kind is float else Integral) and not isinstance(value, bool)
+    if kind is bool:
+        return type(value).__name__ in ("bool", "bool_")    # of numpy too, whichever its version
+    if kind is Path:
+        return isinstance(value, PathLike)
+    if get_origin(kind) is Callable:
+        return callable(value)
+    return kind is Any or (value is None if kind in (None, NoneType) else isinstance(value, kind))
+
+
+def _holds(origin: Any, inside: tuple[Any, ...], value: Any) -> bool:
+    """The same of several: each of them counts."""
+    if isinstance(value, str | bytes) or isinstance(value, Mapping) != issubclass(origin, Mapping):
+        return False
+    if issubclass(origin, Mapping):
+        return all(allows(inside[0], name) and allows(inside[1], one) for name, one in value.items())
+    if origin is tuple and inside[-1] is not ...:
+        return isinstance(value, tuple | list) and len(value) == len(inside) and all(map(allows, inside, value))
+    return isinstance(value, origin) and all(allows(inside[0], one) for one in value)
+
+
+def _shown(value: Any) -> str:
+    """A value as Python writes it, in one line; of an object its class."""
+    if type(value).__module__ != "builtins":
+        return f"of type {type(value).__name__}"
+    words = " ".join(repr(value).split())
+    return words if len(words) <= _MOST_SHOWN else words[:_MOST_SHOWN - 3] + "..."
+
+
+def _named(kind: Any, unit: str, several: int = 0) -> str:
+    """What is expected."""
+    ones = list(dict.fromkeys(_alternatives(kind, unit, several)))
+    return " or ".join(filter(None, [", ".join(ones[:-1]), *ones[-1:]]))
+
+
+def _alternatives(kind: Any, unit: str, several: int) -> Iterator[str]:
+    origin, inside = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        for one in inside:
+            yield from _alternatives(one, unit, several) if one is not NoneType else ()
+    elif origin is Annotated:
+        yield from _alternatives(inside[0], unit, several)
+    elif origin is Literal:
+        yield from map(repr, inside)
+    elif isinstance(kind, ForwardRef):
+        name = _PUBLIC.get(kind.__forward_arg__, kind.__forward_arg__)
+        yield (name if name.endswith("s") else f"{name}s") if several else name
+    elif origin is Callable:
+        yield "a function"
+    elif origin is not None and issubclass(origin, Mapping):
+        yield f"{'dicts' if several else 'a dict'} of {_named(inside[1], unit, 1)}"
+    elif origin is not None and issubclass(origin, Collection):
+        how = "pairs" if several else "a pair" if origin is tuple and inside[-1] is not ... else "a list"
+        yield how if inside[0] is Any else f"{how} of {_named(inside[0], unit, 1)}"
+    else:
+        words = _WORDS.get(kind, (f"a {getattr(kind, '__name__', kind)}",) * 2)[several]
+        yield words + f" in {unit}" * bool(unit and kind in (int, float))
+
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -306,7 +512,7 @@ class Verb:
     """A verb of the command line.
 
     question    that it asks
-    answers     module and name of what answers it: ``logger.api.lab:compared``
+    answers     module and name of what answers it: ``logger.api.lab.compare:compared``
     outs        what it writes
     refusal     module and name of what makes a program's object of a ``CheckFailed``; empty: it is a complaint
     """
@@ -315,3 +521,104 @@ class Verb:
     answers: str
     outs: Sequence[Out] = ()
     refusal: str = ""
+
+
+Vehicle = Union["Model", Path, str]
+"""A model, or the name or file of one."""
+Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
+"""One run or several: records (``ridelog.Run``), or their folders."""
+
+VehicleName = Annotated[Vehicle, Option(
+    "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
+    metavar="NAME|FILE", read=str)]
+Anyway = Annotated[bool, Option("go on where a run does not seem to be of this road or this car, or in these units")]
+TrackedRuns = Annotated[Runs, Argument(
+    "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
+Tolerance = Annotated[float | None, Option(
+    "how far off the vehicle's masses, springs and dampers may well be, as a share (default: "
+    f"{USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation", TOLERANCE, "SHARE")]
+Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
+LowPass = Annotated[float | None, Option(
+    "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
+    "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
+EffectFiles = Annotated[Sequence[Path | str], Option(
+    "a Python file with an effect of your own, to be tried as well; may repeat. The names hysteresis and "
+    "frame_friction are taken too: ridelog has these effects, and tries them only where they are asked for",
+    metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
+
+
+def limit_of(text: str) -> float:
+    """An IRI in m/km, of one with in/mi or m/km written behind it, or nothing."""
+    value, is_us = text.strip().removesuffix("in/mi").removesuffix("m/km"), text.strip().endswith("in/mi")
+    try:
+        return float(value) * (INCH_PER_MILE_M_PER_KM if is_us else 1.0)
+    except ValueError:
+        raise ValueError("expected a number, as 2.5 (m/km) or 160in/mi") from None
+
+
+Localized = Annotated[float | None, Option(
+    "list where the IRI over 25 ft, which slides along, is above this, in m/km, or at a terminal as 160in/mi (AASHTO "
+    "R 54)", LIMIT, "IRI", read=limit_of)]
+Unit = Annotated[str | None, Option(
+    "unit of the accelerations, whatever they look like (default: m/s2, and a record that is plainly in g is refused)",
+    choices=("mps2", "g"))]
+
+
+def _rate_hz(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError("expected a rate in Hz; a file goes before --resample") from None
+
+
+ResampleHz = Annotated[float | None, Option(
+    "for a record whose times are uneven, come in bursts, or whose samples repeat: drop the repeats and lay it on an "
+    "even grid of HZ through an anti-alias filter; without HZ (in Python 0): of the record's own rate, 100 Hz at "
+    "least. The result says that it was done", metavar="HZ", read=_rate_hz, bare=0.0)]
+ResampleM = Annotated[float | None, Option(
+    "for an unevenly spaced profile: lay straight lines between its samples and take a sample every M metres; this "
+    "changes the IRI, and the result says that it was done; what was between wide samples stays unknown",
+    metavar="M")]
+
+
+def names_of(text: str) -> list[str]:
+    """Names with commas between them."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def each(given: Any) -> list[Any]:
+    """One run or several, as a list."""
+    return list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+
+
+def paths_of(given: Runs) -> list[Path]:
+    """Those of them that are files or folders."""
+    return [Path(one) for one in each(given) if isinstance(one, str | PathLike)]
+
+
+def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
+    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
+    name, _, rest = text.partition(":")
+    if "=" in name and "/" not in name:
+        raise BadInput(f"{option} {text}: expected NAME:PARAM=VALUE, with a colon after the name")
+    found: dict[str, float] = {}
+    for piece in rest.split(",") if rest else ():
+        parameter, _, value = piece.partition("=")
+        try:
+            found[parameter] = float(value)
+        except ValueError:
+            found[parameter] = float("nan")
+        if not isfinite(found[parameter]):
+            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
+    return name, found
+
+
+def files_of(vehicle: object) -> list[Path]:
+    """The file of a vehicle and those of its own effects; of a model only these. BadInput as ``read_model``."""
+    from logger.shipped import vehicle_path
+    from logger.store.formats.vehicle_file import Model, read_model
+
+    if isinstance(vehicle, Model):
+        return []
+    path = vehicle_path(str(vehicle))
+    return [path, *(Path(one.file) for one in read_model(path).effects if one.file is not None)]

@@ -1,11 +1,15 @@
-"""How a ride feels: acceleration records, and their ISO 2631-1 values."""
+"""How a ride feels: acceleration records, and their ISO 2631-1 values.
+
+The comfort and health values of a ride, for a person and for a program.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +18,19 @@ from logger.api.drive_questions import ComfortQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
+from logger.comfort import exposure
+from logger.comfort.exposure import CautionZone
+from logger.comfort.iso2631 import (
+    COMFORT_FACTORS,
+    HEALTH_FACTORS,
+    AxisFigures,
+    comfort_word,
+    motion_sickness_dose,
+    total,
+)
+from logger.comfort.ride_comfort import RideComfort
 from logger.errors import BadInput
+from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
 from logger.store.formats.drive_file import facts_beside
@@ -22,6 +38,7 @@ from logger.store.formats.record_checks import EvenRecord, RecordRules, even_rec
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
+
 
 Array = npt.NDArray[np.float64]
 
@@ -119,10 +136,9 @@ class Comfort(CommandResult):
 
 def comfort_of(question: ComfortQuestion) -> Comfort:
     """The answer to ``ComfortQuestion``, which says what is raised."""
+    from logger.api.shown import checks_json, checks_lines
     from logger.api.weightings import weighting_named, weightings
-    from logger.comfort.iso2631 import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
-    from logger.report.comfort_text import as_json, lines
-    from logger.report.record_checks_text import checks_json, checks_lines
+    from logger.comfort.ride_comfort import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
 
     used, record = weighting_named(question.weighting), question.record
     name = "record" if isinstance(record, record_file.AccelerationRecord) else str(
@@ -167,3 +183,154 @@ def _even(record: Given, name: str, asked: RecordRules) -> EvenRecord:
     t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz
     accel = {f"accel_{axis}_mps2": one for axis, one in record.by_axis.items() if one is not None}
     return even_record(t_s, accel, {}, name, asked)
+
+
+METHOD = "formula of the standard, magnitude and phase, by Fourier transform of the whole record"
+
+
+def as_json(result: RideComfort) -> dict[str, Any]:
+    """The agreed fields of the vertical axis first, then what else there is; null where there is no such value."""
+    vertical = _axis_json(result.vertical)
+    first = ("a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor")
+    agreed = {"weighting": result.weighting.name, **{name: vertical.pop(name) for name in first},
+              "comfort": _word(result, result.vertical.a_w_mps2)}
+    more = {"rate_hz": result.rate_hz, "duration_s": result.vertical.duration_s, **vertical,
+            "method": METHOD, "unseen_from_hz": result.unseen_from_hz}
+    if result.weighting.is_sickness:
+        more["msdv_mps15"] = _sickness_dose(result.vertical)
+        more["report_beside_a_w"] = ["msdv"]
+    if len(result.axes) > 1:
+        more |= {"axes": {axis: _axis_json(result.axes[axis]) for axis in "xyz"}, **_totals(result)}
+    return agreed | more | {"health": _health(result)}
+
+
+def _axis_json(figures: AxisFigures) -> dict[str, Any]:
+    return {
+        "a_w_mps2": figures.a_w_mps2,
+        "mtvv_mps2": figures.mtvv_mps2,
+        "mtvv_exponential_mps2": figures.mtvv_exponential_mps2,
+        "vdv_mps175": figures.vdv_mps175,
+        "crest_factor": known(figures.crest_factor),
+        "mtvv_ratio": known(figures.mtvv_ratio),
+        "vdv_ratio": known(figures.vdv_ratio),
+        "report_beside_a_w": list(figures.beside_a_w()),
+    }
+
+
+def _word(result: RideComfort, a_w_mps2: float) -> str | None:
+    """None where the words for comfort are not of such a value."""
+    return comfort_word(a_w_mps2) if result.weighting.comfort_words else None
+
+
+def _sickness_dose(figures: AxisFigures) -> float:
+    return motion_sickness_dose(figures.a_w_mps2, figures.duration_s)
+
+
+def _totals(result: RideComfort) -> dict[str, Any]:
+    """All three axes in one: for comfort with its word, and for health."""
+    a_w_mps2 = [result.axes[axis].a_w_mps2 for axis in "xyz"]
+    comfort_mps2 = total(a_w_mps2, COMFORT_FACTORS)
+    return {"total_a_w_mps2": comfort_mps2, "total_comfort": _word(result, comfort_mps2),
+            "health_total_a_w_mps2": total(a_w_mps2, HEALTH_FACTORS)}
+
+
+def _health(result: RideComfort) -> dict[str, Any] | None:
+    """Daily exposure by the worst axis, and where it stands; None where the weighting is none of health."""
+    factors = result.health_factors
+    if not factors:
+        return None
+    hours, seconds = result.daily_hours, result.vertical.duration_s
+    a_w_mps2, a_w_axis = max((k * result.axes[axis].a_w_mps2, axis) for axis, k in factors.items())
+    vdv, vdv_axis = max((k * result.axes[axis].vdv_mps175, axis) for axis, k in factors.items())
+    a8_mps2, dose = exposure.a8(a_w_mps2, hours), exposure.daily_vdv(vdv, seconds, hours)
+    a8_at, vdv_at = exposure.A8_MPS2, exposure.VDV_MPS175
+    return {
+        "daily_hours": hours,
+        "a8_mps2": a8_mps2, "a8_axis": a_w_axis, "a8_verdict": a8_at.verdict(a8_mps2),
+        "hours_to_a8_action": known(exposure.hours_to_a8(a_w_mps2, a8_at.action)),
+        "hours_to_a8_limit": known(exposure.hours_to_a8(a_w_mps2, a8_at.limit)),
+        "daily_vdv_mps175": dose, "vdv_axis": vdv_axis, "vdv_verdict": vdv_at.verdict(dose),
+        "hours_to_vdv_action": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.action)),
+        "hours_to_vdv_limit": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.limit)),
+        "caution_zone": {
+            "n2": _zone(exposure.caution_zone(hours, 2), a_w_mps2, "mps2"),
+            "n4": _zone(exposure.caution_zone(hours, 4), a_w_mps2, "mps2"),
+            "vdv": _zone(exposure.CAUTION_ZONE_VDV_MPS175, dose, "mps175"),
+        },
+    }
+
+
+def _zone(zone: CautionZone, value: float, unit: str) -> dict[str, Any]:
+    return {f"lower_{unit}": zone.lower, f"upper_{unit}": zone.upper, "verdict": zone.verdict(value)}
+
+
+def lines(result: RideComfort, name: str) -> list[str]:
+    """The lines a person sees; ``name`` is that of the file."""
+    printed = [f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
+             f"weighting {result.weighting.name.capitalize()}", ""]
+    heads = ("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4")
+    printed.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
+    for axis in sorted(result.axes):
+        figures = result.axes[axis]
+        values = (figures.a_w_mps2, figures.mtvv_mps2, figures.vdv_mps175, figures.crest_factor, figures.mtvv_ratio,
+                  figures.vdv_ratio)
+        printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" if isfinite(value) else f"{'-':>13}"
+                                                  for value in values))
+    exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
+    printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *_conclusions(result), "",
+              f"Method: {METHOD}; the mean is taken off."]
+    if result.unseen_from_hz is not None:
+        printed.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
+                     f"up to {result.weighting.counts_up_to_hz:g} Hz: the values are of what was recorded.")
+    if result.left_out:
+        printed.append("Other axes are combined only with Wk, x and y together; left out.")
+    return printed
+
+
+def _conclusions(result: RideComfort) -> list[str]:
+    """What the figures come to: how it feels, which of them to use, what it does to health."""
+    lines = []
+    if result.weighting.is_sickness:
+        lines.append(f"Motion sickness dose: {_sickness_dose(result.vertical):.3f} m/s1.5.")
+    elif not result.weighting.comfort_words:
+        lines.append(f"Comfort: no words: ISO 2631-1 has none for {result.weighting.name.capitalize()}.")
+    elif len(result.axes) > 1:
+        totals = _totals(result)
+        lines.append(f"Feels {_spoken(totals['total_comfort'])}: {totals['total_a_w_mps2']:.3f} m/s2 over three axes.")
+    else:
+        lines.append(f"Feels {_spoken(_word(result, result.vertical.a_w_mps2))}.")
+    if not result.weighting.is_sickness:
+        lines.append(_which_to_use(result))
+    health = _health(result)
+    if health is None:
+        return [*lines, f"Health: {result.weighting.name.capitalize()} is not a weighting of health."]
+    n2, n4, dose = (health["caution_zone"][name] for name in ("n2", "n4", "vdv"))
+    return [
+        *lines,
+        f"Health, {health['daily_hours']:.3g} h a day like this:",
+        f"  A(8) {health['a8_mps2']:.3f} m/s2 ({health['a8_axis']}), {_spoken(health['a8_verdict'])}"
+        f"{_from_hours(health['hours_to_a8_action'])}",
+        f"  VDV {health['daily_vdv_mps175']:.2f} m/s1.75 ({health['vdv_axis']}), {_spoken(health['vdv_verdict'])}"
+        f"{_from_hours(health['hours_to_vdv_action'])}",
+        f"  Caution zone: {_spoken(n2['verdict'])} ({n2['lower_mps2']:.2f} to {n2['upper_mps2']:.2f} m/s2) for "
+        f"n = 2, {_spoken(n4['verdict'])} ({n4['lower_mps2']:.2f} to {n4['upper_mps2']:.2f}) for n = 4, "
+        f"{_spoken(dose['verdict'])} by VDV",
+    ]
+
+
+def _which_to_use(result: RideComfort) -> str:
+    wanted = {axis: figures.beside_a_w() for axis, figures in sorted(result.axes.items()) if figures.beside_a_w()}
+    if not wanted:
+        return "a_w is enough: no crest factor above 9, no ratio above 1.5 or 1.75."
+    which = "; ".join(f"{axis}: {' and '.join(name.upper() for name in names)}" for axis, names in wanted.items())
+    return f"a_w alone understates it, there are shocks. Report with it {which}."
+
+
+def _spoken(word: str | None) -> str:
+    return (word or "").replace("_", " ")
+
+
+def _from_hours(hours: float | None) -> str:
+    if hours is None or hours > 24.0:
+        return "; not reached in a day"
+    return f"; action value reached after {hours:.3g} h"

@@ -1,27 +1,42 @@
-"""Roads: measured profiles, random ones, and their International Roughness Index."""
+"""Roads: measured profiles, random ones, and their International Roughness Index.
+
+The IRI of a profile, for a person and for a program.
+
+The class of a road, for a person and for a program.
+
+Areas of localized roughness, for a person and for a program.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.drive_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
 from logger.api.question import function
-from logger.api.road_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.errors import BadInput
 from logger.files import write_text
+from logger.report.quantities import area_lines, area_values
+from logger.report.summary import IRI_CLASSES
+from logger.roads.iso8608 import iri_from_gd_n0
+from logger.roads.localized_roughness import Area
+from logger.roads.plausible import doubts_of, unit_doubt
+from logger.roads.profile_iri import ProfileIri
+from logger.roads.roughness_words import ride_words, road_kinds
+from logger.roads.track_class import TrackClass
 from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.roads.elevation_spectrum import BandedSpectrum
-    from logger.roads.iri import Area
+
 
 Array = npt.NDArray[np.float64]
 
@@ -150,9 +165,7 @@ class Iri(CommandResult):
 
 def iri_of(question: IriQuestion) -> Iri:
     """The answer to ``IriQuestion``, which says what is raised."""
-    from logger.report.iri_text import as_json, lines
-    from logger.report.localized_text import area_lines, area_values
-    from logger.roads.iri import areas, continuous_iri, profile_iri
+    from logger.roads.localized_roughness import areas
     from logger.roads.plausible import spacing_hint, unit_complaint
     from logger.units import WINDOW_M
 
@@ -166,7 +179,7 @@ def iri_of(question: IriQuestion) -> Iri:
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
-    said, values = lines(found, road, Path(name).name), as_json(found, road)
+    said, values = iri_lines(found, road, Path(name).name), iri_json(found, road)
     rough: tuple[Area, ...] = ()
     if localized_m_per_km is not None:
         middle_m, sliding = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
@@ -184,8 +197,7 @@ iri = function("iri", IriQuestion, iri_of)
 def asked_iri(question: IriCommand) -> CommandResult:
     """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
     2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
-    from logger.report.iri_text import response_screen
-    from logger.roads.iri import sinusoid_iri, slope_gain
+    from logger.roads.wavelength import sinusoid_iri, slope_gain
 
     if not question.response:
         return iri_of(question)
@@ -247,8 +259,6 @@ class RoadClass(CommandResult):
 
 def road_class_of(question: ClassifyQuestion) -> RoadClass:
     """The answer to ``ClassifyQuestion``, which says what is raised."""
-    from logger.report.road_text import as_json, lines
-    from logger.roads.elevation_spectrum import track_class
     from logger.roads.plausible import spacing_hint
 
     name, road = _named(question.profile, question.resample_m)
@@ -259,7 +269,8 @@ def road_class_of(question: ClassifyQuestion) -> RoadClass:
     except ValueError as error:
         raise BadInput(f"{name}: {error}{spacing_hint(road.spacing_m)}") from None
     left = found[0].roughness
-    return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
+    return RoadClass("\n".join(class_lines(found, road, Path(name).name)), class_json(found), left.road_class,
+                     left.gd_n0_cm3,
                      left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km, left.bands)
 
 
@@ -272,3 +283,105 @@ def _named(profile: profile_file.Profile | Path | str, resample_m: float | None)
         return "profile", profile
     read = profile if isinstance(profile, profile_file.Profile) else profile_file.read_profile(profile, resample_m)
     return "profile" if read is profile else str(profile), Profile(**vars(read))
+
+
+_HEADS = {"iri_m_per_km": "IRI", "iri_right_m_per_km": "IRI right", "mri_m_per_km": "MRI", "hri_m_per_km": "HRI"}
+
+
+def iri_json(result: ProfileIri, profile: Profile) -> dict[str, Any]:
+    """One track: ``iri_m_per_km`` and ``windows``; two: the right track, MRI and HRI as well; and any resampling."""
+    windows = [
+        {"distance_start_m": profile.start_m + window.distance_start_m,
+         "distance_end_m": profile.start_m + window.distance_end_m, **result.row(number)}
+        for number, window in enumerate(result.windows, start=1)
+    ]
+    resampled = {} if profile.widest_step_m is None else {
+        "resampled_to_m": profile.spacing_m, "widest_step_m": profile.widest_step_m}
+    return {**result.row(0), "windows": windows, **resampled, **doubts_of(_roughest(result))}
+
+
+def _roughest(result: ProfileIri) -> float:
+    return max(result.row(0).values())
+
+
+def _cut_short(result: ProfileIri) -> list[str]:
+    """What is to be said of a profile that no window fits into."""
+    return ["The profile is shorter than one window (--window): its IRI is of all there is.", ""] if (
+        all(window.partial for window in result.windows)) else []
+
+
+def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
+    """The lines a person sees; ``name`` is that of the file."""
+    whole = result.row(0)
+    roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
+    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
+    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    if doubt := unit_doubt(_roughest(result)):
+        printed.append(doubt)
+    if profile.widest_step_m is not None:
+        printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
+    printed += [
+        "", ", ".join(f"{_HEADS[key]} {value:.3f}" for key, value in whole.items()) + " m/km",
+        f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
+        f"Ride: {ride_words(roughness)}", "", *_cut_short(result),
+        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + "  m/km",
+    ]
+    for number, window in enumerate(result.windows, start=1):
+        start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))
+        values = "".join(f" {value:10.3f}" for value in result.row(number).values())
+        printed.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
+    return printed
+
+
+def response_screen(table: list[dict[str, float]]) -> list[str]:
+    """How the IRI responds to each wavelength, with bars."""
+    lines = ["IRI of a sinusoidal road by wavelength (80 km/h, 250 mm moving average)", "",
+             "wavelength  slope gain  IRI of 1 mm"]
+    for row in table:
+        bar = "#" * round(20 * row["slope_gain"])
+        figures = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
+        lines.append(f"{row['wavelength_m']:8.2f} m {figures}  {bar}")
+    return lines
+
+
+def class_json(tracks: Sequence[TrackClass]) -> dict[str, Any]:
+    """Named fields, SI units in the names; a second track is ``right``."""
+    return (_track_json(tracks[0]) | ({"right": _track_json(tracks[1])} if len(tracks) > 1 else {})
+            | doubts_of(max(track.iri_m_per_km for track in tracks)))
+
+
+def _track_json(track: TrackClass) -> dict[str, Any]:
+    found = track.roughness
+    return {
+        "class": found.road_class, "gd_n0_cm3": found.gd_n0_cm3, "waviness": found.waviness,
+        "iri_m_per_km": track.iri_m_per_km, "gd_n0_std_cm3": found.gd_n0_std_cm3,
+        "waviness_std": found.waviness_std, "classes_possible": list(found.classes),
+        "iri_of_gd_m_per_km": iri_from_gd_n0(found.gd_n0_cm3),
+        "iri_expected_m_per_km": track.expected.value, "iri_expected_std_m_per_km": track.expected.std,
+        "lowest_cpm": found.lowest_cpm, "highest_cpm": found.highest_cpm,
+    }
+
+
+def class_lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> list[str]:
+    """The lines a person sees; ``name`` is that of the file."""
+    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
+    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    if doubt := unit_doubt(max(track.iri_m_per_km for track in tracks)):
+        printed.append(doubt)
+    for side, track in zip(("left track", "right track") if len(tracks) > 1 else ("",), tracks, strict=True):
+        printed += [*(["", side] if side else []), "", *_track_lines(track)]
+    return printed
+
+
+def _track_lines(track: TrackClass) -> list[str]:
+    found = track.roughness
+    doubt = "" if len(found.classes) == 1 else \
+        f"; the road is too short or too odd to be sure: it may be {' or '.join(found.classes)}"
+    return [
+        f"class      {found.road_class}: {IRI_CLASSES[found.road_class]}{doubt}",
+        f"Gd(n0)     {found.gd_n0_cm3:.4g} +- {found.gd_n0_std_cm3:.2g} cm3, from waves of "
+        f"{1 / found.highest_cpm:.2g} to {1 / found.lowest_cpm:.2g} m",
+        f"waviness   {found.waviness:.2f} +- {found.waviness_std:.2f} (the classes have 2)",
+        f"IRI        {track.iri_m_per_km:.2f} m/km; this Gd(n0) means {iri_from_gd_n0(found.gd_n0_cm3):.2f} by "
+        f"Eq 4.39, with this waviness {track.expected.value:.2f} +- {track.expected.std:.2f}",
+    ]

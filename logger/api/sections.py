@@ -1,11 +1,19 @@
-"""Logs in sections of road, as agencies file them."""
+"""Logs in sections of road, as agencies file them.
+
+Drives of logs in sections of one length, and their places as a layer for other programs.
+
+Sections of logs in words, and as JSON.
+
+Sections of drives as a layer for other programs: a line each, of the windows whose middles lie in it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,15 +21,25 @@ import numpy.typing as npt
 from logger.api.log_questions import SectionsQuestion, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
+from logger.chart_data import Array, Chart, Curves, Line
+from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-    from logger.exchange.layer import Layer
-    from logger.report.drive_sections import DriveSections
-    from logger.store.log.log_reader import LoggedFile
-
-Array = npt.NDArray[np.float64]
+from logger.exchange.layer import Feature, Field, Kind, Layer, chained, geometries, group_name, iri_title
+from logger.printable import counted
+from logger.records import WindowRecord
+from logger.report.placed import column, iri_errors, placed, trace_of
+from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_values, known
+from logger.report.summary import counts, expected_square
+from logger.roads.iso8608 import iri_class
+from logger.roads.linear_reference import ALONG, on_route
+from logger.roads.localized_roughness import Area, areas
+from logger.roads.road_network import RoadNetwork
+from logger.roads.roughness_words import FEDERAL_WORDS, federal_condition
+from logger.roads.sections import Sections as RoadSections
+from logger.roads.sections import Windows, even_edges
+from logger.roads.sections import sections as in_sections
+from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives
+from logger.units import FOOT_M, MILE_M
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,8 +72,6 @@ class Sections(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the sections along each drive."""
-        from logger.report.sections_text import charts
-
         return charts(self._drives)
 
     def write(self, path: Path, option: str = "--out") -> None:
@@ -66,17 +82,13 @@ class Sections(CommandResult):
 
     def layer(self) -> Layer:
         """Rows with places, for the formats of ``convert``."""
-        from logger.report.sections_layer import sections_layer
-
         return sections_layer(self._drives)
 
 
 def sections_of(question: SectionsQuestion) -> Sections:
     """The answer to ``SectionsQuestion``, which says what is raised."""
     from logger.left_out import left_out_json, left_out_paragraph
-    from logger.report.drive_sections import drive_sections
-    from logger.report.left_rows import of_sections
-    from logger.report.sections_text import as_json, lines
+    from logger.report.placed import of_sections
     from logger.store.log.log_reader import find_logs_in, read_found
 
     length_m, route, places = length_of(question.length), question.route, question.places
@@ -101,9 +113,8 @@ sections = function("sections", SectionsQuestion, sections_of)
 
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
-    from logger.report.drive_sections import route_sections
-    from logger.roads.road_matching import measures, route_network
-    from logger.store.formats.road_lines import read_route
+    from logger.roads.linear_reference import measures, route_network
+    from logger.store.formats.route_file import read_route
 
     route = read_route(path)
     try:
@@ -117,3 +128,257 @@ def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) ->
 
 def _joined(arrays: Sequence[Array]) -> Array:
     return np.concatenate(arrays) if arrays else np.zeros(0)
+
+
+_GAP_M = 1000.0  # between neighbours on a route: beyond it they are two passes
+_REACH = 1.2  # of a window against its length: measures are places, and scatter by less
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSections:
+    """The sections of one drive.
+
+    log, number    the file, and which drive of it, from 1
+    records        its rows with a distance
+    middle_m       (n,) of their middles, counted as the sections are [m]
+    figures        of the k sections, and ``whole`` of all of them as one
+    condition      by the federal limits; empty: not known
+    ends_m         (k,) of the sections, the last one where the drive ends [m]
+    direction      ``along`` a route or ``against`` it; empty: sections count from the beginning of the drive
+    """
+
+    log: str
+    number: int
+    records: tuple[WindowRecord, ...]
+    middle_m: Array
+    figures: RoadSections
+    whole: RoadSections
+    condition: tuple[str, ...]
+    ends_m: Array
+    direction: str = ""
+
+
+def drive_sections(files: Sequence[LoggedFile], length_m: float) -> Iterator[DriveSections]:
+    """Drives of logs, those that have a distance, in sections."""
+    for file in files:
+        for number, drive in enumerate(split_drives(file.records), start=1):
+            records = tuple(one for one in drive
+                            if one.distance_start_m is not None and one.distance_end_m is not None
+                            and one.distance_end_m > one.distance_start_m)
+            if records:
+                yield _of_drive(file.name, number, records, length_m)
+
+
+def route_sections(files: Sequence[LoggedFile], route: RoadNetwork, first_m: float, length_m: float
+                   ) -> Iterator[DriveSections]:
+    """Each pass of a drive over a route in sections of the route's measures, from ``first_m`` on."""
+    for file in files:
+        for number, drive in enumerate(split_drives(file.records), start=1):
+            records = [one for one in drive if placed(one)]
+            if not records:
+                continue
+            found = on_route(route, trace_of(records))
+            breaks = np.flatnonzero((np.diff(found.direction) != 0)
+                                    | ~(np.abs(np.diff(found.measure_m)) < _GAP_M)) + 1
+            for part in np.split(np.arange(len(records)), breaks):
+                if found.direction[part[0]]:
+                    yield from _of_pass(file.name, number, [records[row] for row in part], found.measure_m[part],
+                                        int(found.direction[part[0]]), first_m, length_m)
+
+
+def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: Array, direction: int, first_m: float,
+             length_m: float) -> Iterator[DriveSections]:
+    order = np.argsort(measure_m, kind="stable")
+    measure_m, records = measure_m[order], tuple(records[row] for row in order.tolist())
+    windows = windows_of(records)
+    half_m = (windows.end_m - windows.start_m) / 2
+    # Neighbours share a limit, so that no road counts twice; a hole stays one.
+    limits_m = (measure_m[1:] + measure_m[:-1]) / 2
+    start_m = np.concatenate([measure_m[:1] - half_m[:1], np.maximum(limits_m, (measure_m - _REACH * half_m)[1:])])
+    end_m = np.concatenate([np.minimum(limits_m, (measure_m + _REACH * half_m)[:-1]), measure_m[-1:] + half_m[-1:]])
+    start_m = np.maximum(start_m, first_m)
+    windows = replace(windows, start_m=start_m, end_m=end_m)
+    kept = end_m > start_m
+    if not kept.any():
+        return
+    windows = windows.of(np.flatnonzero(kept))
+    first = int(np.floor((windows.start_m[0] - first_m) / length_m))
+    edges_m = first_m + length_m * first + even_edges(
+        float(windows.end_m[-1] - first_m - length_m * first), length_m)
+    found = in_sections(windows, edges_m)
+    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
+    counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
+    yield DriveSections(log, number, counted_records, measure_m[kept], found, in_sections(windows, edges_m[[0, -1]]),
+                        condition, np.minimum(edges_m[1:], windows.end_m[-1]),
+                        "along" if direction == ALONG else "against")
+
+
+def windows_of(records: Sequence[WindowRecord]) -> Windows:
+    """Rows with a distance as arrays, from the first one's beginning on."""
+    origin_m = records[0].distance_start_m or 0.0
+    return Windows(
+        column(records, lambda one: one.distance_start_m) - origin_m,
+        column(records, lambda one: one.distance_end_m) - origin_m, column(records, lambda one: one.duration_s),
+        column(records, lambda one: one.iri_m_per_km if counts(one) else None), iri_errors(records),
+        column(records, lambda one: expected_square(one) if counts(one) else None))
+
+
+def localized(drive: DriveSections, limit_m_per_km: float) -> list[Area]:
+    """Areas of localized roughness of a drive, by its own distance or the route's measures. A row that does not count
+    has no value; windows of other lengths than 25 ft slide by their own."""
+    windows = windows_of(drive.records)
+    beyond_m = _REACH * float(np.median(windows.end_m - windows.start_m))
+    return areas(drive.middle_m, windows.iri_m_per_km, limit_m_per_km, windows.iri_errors.std, beyond_m)
+
+
+def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:
+    windows = windows_of(records)
+    edges_m = even_edges(float(windows.end_m[-1]), length_m)
+    found = in_sections(windows, edges_m)
+    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
+    return DriveSections(log, number, records, (windows.start_m + windows.end_m) / 2, found,
+                         in_sections(windows, edges_m[[0, -1]]), condition, np.minimum(edges_m[1:], windows.end_m[-1]))
+
+
+def lines(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
+          ) -> list[str]:
+    """For a person; with a limit the areas of localized roughness under each drive."""
+    if not drives:
+        return ["No row has a distance, or lies on the route: there are no sections."]
+    units = UNITS[system]
+    said = list(_summary(drives, length_m, units))
+    head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
+            f"{'std. error':>10}  {'condition':9}  {'a_w m/s2':>8} {units.speed[0]:>6}")
+    for one in drives:
+        said += ["", _title(one), head, *_rows(one, units)]
+        if localized_m_per_km is not None:
+            said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km, units)]
+    return [*said, "",
+            "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313.",
+            "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
+
+
+def _title(one: DriveSections) -> str:
+    return f"{one.log}, drive {one.number}" + (f", {one.direction} the route" if one.direction else "")
+
+
+def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUnits) -> Iterator[str]:
+    count = sum(len(one.condition) for one in drives)
+    known_m = np.concatenate([one.figures.known_m for one in drives])
+    driven_m = sum(float(one.figures.driven_m.sum()) for one in drives)
+    name, unit_m = units.way
+    yield (f"{counted(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {counted(count, 'section')} of "
+           f"{_length_words(length_m)}")
+    total_m = float(known_m.sum())
+    if total_m <= 0:
+        yield "The IRI is known nowhere."
+        return
+    mean, error = _mean([one.whole for one in drives if one.whole.known_m[0] > 0])
+    label, scale = units.iri
+    sure = f"{error / scale:.{units.iri_decimals + 1}f}" if isfinite(error) else "not known"
+    yield (f"Mean IRI {mean / scale:.{units.iri_decimals}f} {label}, standard error {sure}, over "
+           f"{total_m / unit_m:.2f} {name}")
+    words = [word for one in drives for word in one.condition]
+    shares = {word: float(known_m[[here == word for here in words]].sum()) / total_m for word in FEDERAL_WORDS}
+    yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())
+
+
+def _mean(wholes: Sequence[RoadSections]) -> tuple[float, float]:
+    """Mean IRI of drives by length, and its standard error [m/km]: the numbers of the car are wrong in all alike."""
+    known_m, iri, std, common = np.array([
+        (one.known_m[0], one.iri_m_per_km[0], one.iri_errors.std[0], one.iri_errors.common_std[0]) for one in wholes]).T
+    weight = known_m / known_m.sum()
+    variance = weight**2 @ (std**2 - common**2) + (weight @ common) ** 2
+    return float(weight @ iri), float(np.sqrt(variance))
+
+
+def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[str]:
+    figures = one.figures
+    columns = (figures.edges_m[:-1], one.ends_m, figures.known_m, figures.iri_m_per_km, figures.iri_std_m_per_km,
+               figures.a_w_mps2, figures.speed_mps)
+    for word, (start_m, end_m, known_m, iri, std, a_w, speed) in zip(
+            one.condition, zip(*(each.tolist() for each in columns), strict=True), strict=True):
+        (_, unit_m), (_, iri_scale), (_, speed_scale) = units.length, units.iri, units.speed
+        yield (f"{start_m / unit_m:10.{units.length_decimals}f} {end_m / unit_m:10.{units.length_decimals}f} "
+               f"{known_m / (end_m - start_m):6.0%} {_number(iri / iri_scale, units.iri_decimals):>10} "
+               f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9}  {_number(a_w, 2):>8} "
+               f"{_number(speed / speed_scale, 0):>6}")
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if isfinite(value) else "-"
+
+
+def _length_words(length_m: float) -> str:
+    for name, unit_m in (("mi", MILE_M), ("km", 1000.0), ("ft", FOOT_M)):
+        units = length_m / unit_m
+        if abs(units - round(units, 1)) < 1e-6 * units and (name != "km" or units >= 1):
+            return f"{units:g} {name}" if name != "ft" or length_m % 1 else f"{length_m:g} m"
+    return f"{length_m:g} m"
+
+
+# --- for programs ---
+
+
+def as_json(drives: Sequence[DriveSections], length_m: float, localized_m_per_km: float | None = None
+            ) -> dict[str, Any]:
+    """Drives with their sections, and areas of localized roughness above a limit; null where nothing is known."""
+    return {"length_m": length_m, "drives": [
+        {"log": one.log, "drive": one.number, "direction": one.direction or None,
+         "sections": list(section_values(one)),
+         **({} if localized_m_per_km is None else {
+             "localized": [area_values(area) for area in localized(one, localized_m_per_km)]})} for one in drives]}
+
+
+def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
+    """The sections of a drive by the names of their columns; None where nothing is known."""
+    figures = one.figures
+    for index, word in enumerate(one.condition):
+        numbers = {name: known(getattr(figures, name)[index]) for name in (
+            "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps", "worst_m_per_km", "worst_at_m")}
+        a_w = numbers["a_w_mps2"]
+        yield {"distance_start_m": float(figures.edges_m[index]), "distance_end_m": float(one.ends_m[index]),
+               "known_m": float(figures.known_m[index]), **numbers, "condition": word or None,
+               "comfort": None if a_w is None else comfort_word(a_w)}
+
+
+def charts(drives: Sequence[DriveSections]) -> list[Chart]:
+    """The IRI of the sections along each drive."""
+    found: list[Chart] = []
+    for one in drives:
+        known = np.isfinite(one.figures.iri_m_per_km)
+        if known.any():
+            middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
+            found.append(Curves(_title(one), "distance [m]", "IRI [m/km]", (
+                Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
+    return found
+
+
+_KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known_m": Kind.NUMBER,
+          "iri_m_per_km": Kind.NUMBER, "iri_std_m_per_km": Kind.NUMBER, "a_w_mps2": Kind.NUMBER,
+          "speed_mps": Kind.NUMBER, "worst_m_per_km": Kind.NUMBER, "worst_at_m": Kind.NUMBER,
+          "condition": Kind.WORDS, "comfort": Kind.WORDS}
+FIELDS = (Field("log", Kind.WORDS), Field("drive", Kind.COUNT), Field("t_utc", Kind.TIME),
+          Field("direction", Kind.WORDS),
+          *(Field(name, kind) for name, kind in _KINDS.items()))
+
+
+def sections_layer(drives: Sequence[DriveSections]) -> Layer:
+    """The sections of all drives; ``t_utc`` is when the first window of each began."""
+    return Layer("sections", FIELDS, tuple(feature for one in drives for feature in _features(one)))
+
+
+def _features(drive: DriveSections) -> Iterator[Feature]:
+    lines = geometries(drive.records)
+    section = np.searchsorted(drive.figures.edges_m, drive.middle_m, side="right") - 1
+    for index, values in enumerate(section_values(drive)):
+        inside = np.flatnonzero(section == index).tolist()
+        geometry = chained([lines[row][0] for row in inside])
+        began = iso_utc(drive.records[inside[0]].utc_us) if inside else None
+        places = [place for line in geometry for place in line]
+        yield Feature(
+            group_name(drive.log, drive.number), iri_title(values["iri_m_per_km"]),
+            (drive.log, drive.number, began, drive.direction or None, *(values[name] for name in _KINDS)), geometry,
+            places[len(places) // 2] if places else None, began,
+            bool(inside) and index > 0 and lines[inside[0]][1],
+            "" if values["iri_m_per_km"] is None else iri_class(values["iri_m_per_km"]))

@@ -1,11 +1,16 @@
-"""Records that show themselves: as aligned lines at a prompt, with charts beside them in a notebook."""
+"""Records that show themselves: as aligned lines at a prompt, with charts beside them in a notebook.
+
+Files to write, looked at before anything is computed.
+
+What was found and done about a record before it was used, for a person and for a program.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,12 +18,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from logger.errors import EXIT_DONE
-from logger.files import write_text
+from logger.errors import EXIT_DONE, BadInput
+from logger.files import why_not_written, write_text
+from logger.left_out import left_out_json, left_out_lines
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.report.html import Html
+    from logger.report.document import Html
+    from logger.store.formats.record_checks import EvenRecord
+
 
 Array = npt.NDArray[np.float64]
 Row = tuple[str, object, str]
@@ -42,7 +50,7 @@ class Shown(ABC):
         return list(map(chart, self.charts()))
 
     def _repr_html_(self) -> str:
-        from logger.report.notebook import cell
+        from logger.report.document import cell
 
         return cell(repr(self), self.figures())
 
@@ -74,7 +82,7 @@ class CommandResult(Shown):
 
     def as_page(self, of: str) -> Html:
         """It as a page that stands alone; ``of``: what it is a result of, such as a file."""
-        from logger.report.result_page import page
+        from logger.report.charts import page
 
         return page(self.title, of, self.text, self.charts())
 
@@ -103,3 +111,53 @@ def _words(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.4g}" if isfinite(value) else "not known"
     return str(value)
+
+
+def check_outs(asked: Iterable[tuple[str, Path | None]], runs: Iterable[Path] = (), read: Iterable[Path] = ()) -> None:
+    """Raise BadInput as ``check_out`` for any of the files to write, by the options that ask for them, and where two
+    are one file."""
+    folders, files = list(runs), list(read)
+    taken: set[Path] = set()
+    for option, out in asked:
+        if out is not None:
+            if out.resolve() in taken:
+                raise BadInput(f"{option} {out}: expected every file to be another one")
+            check_out(out, folders, files, option)
+            taken.add(out.resolve())
+
+
+def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option: str = "--out") -> None:
+    """Raise BadInput where a file to write is one of a run or another that is read, or cannot be written.
+
+    runs      their folders
+    option    how the file was asked for
+    """
+    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE
+    from logger.store.formats.run_file import RUN
+
+    said = f"{option} {out}".lstrip()
+    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE, EXCITATION, RUN)}:
+        raise BadInput(f"{said}: expected a file that is none of a run's")
+    if out.resolve() in {path.resolve() for path in read}:
+        raise BadInput(f"{said}: expected another file than those that are read")
+    if not out.parent.is_dir() or out.is_dir():
+        raise BadInput(f"{said}: expected a file in a folder that there is")
+    if why := why_not_written(out):
+        raise BadInput(f"{said}: expected a file that may be written ({why})")
+
+
+def checks_json(record: EvenRecord) -> dict[str, Any]:
+    """``doubts``, one object each; ``resampled``: how, or null; ``left_out``: of its samples."""
+    return {**left_out_json(record.left_out), "doubts": [doubt.as_json() for doubt in record.doubts],
+            "resampled": None if record.resampled is None else asdict(record.resampled)}
+
+
+def checks_lines(record: EvenRecord) -> list[str]:
+    """What was done to the record; empty: nothing."""
+    done = record.resampled
+    if done is None:
+        return left_out_lines(record.left_out)
+    dropped = f"{done.repeats_dropped:.0%} repeated samples dropped, then " if done.repeats_dropped else ""
+    return [*left_out_lines(record.left_out),
+            f"Resampled: {dropped}laid from {done.from_hz:.4g} Hz (steps up to {done.widest_step_s:.3g} s) on an even "
+            f"grid of {done.to_hz:.4g} Hz, through an anti-alias filter."]

@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.lab_questions import CompareQuestion
+from logger.api.lab.question import CompareQuestion
 from logger.commands.demo_lab import truth_beside
 from logger.commands.lab import say, take
-from logger.commands.screen import on_screen, progress, warned, wipe
+from logger.commands.options import on_screen, progress, warned, wipe
 from logger.files import write_text
-from logger.report.text_layout import columns, paragraphs
+from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:
     from logger.api.drives import Run
-    from logger.api.extracted_runs import Extracted
-    from logger.api.lab_loop import Say
+    from logger.api.extraction import Extracted
+    from logger.api.lab.loop import Say
     from logger.estimation.assessment import Assessment
     from logger.lab.session import Story
 
@@ -47,11 +47,11 @@ _EXPLAINED = {
 
 def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out``, find what is missing, and judge the fourth with and without it."""
-    from logger.api.bench import require_compiler
-    from logger.api.lab_loop import unsaid_lines
+    from logger.api.lab.bench import require_compiler
+    from logger.api.lab.loop import as_json as story_json
+    from logger.api.lab.loop import unsaid_lines
     from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
     from logger.demo.unpacking import unpacked
-    from logger.report.session_text import as_json as story_json
     from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
@@ -65,7 +65,7 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
               f"Four drives and two measured lines in {out}\nNext: {commands.extract()[0]}")
         return
     tell: Say = unsaid_lines if as_json else say
-    tell([paragraphs(_ABOUT)])
+    tell([wrapped(_ABOUT)])
     tell(_headed("Extract", "extract", *commands.extract()))
     extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]
     before = _judged(out / RUNS / FOURTH, VEHICLE, "The fourth drive, by the file as it is", "before", commands, tell)
@@ -75,7 +75,7 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     page, sentence, table = out / PAGE, *_truth(story)
     _write_page(page, out, story, before, after, sentence)
     tell(_ending(story, before, after, page))
-    tell(["", "=== The answer ===", "", paragraphs([sentence]), "", *table])
+    tell(["", "=== The answer ===", "", wrapped([sentence]), "", *table])
     if as_json:
         print(json.dumps({"runs": [one.as_json() for each in extracted for one in each.runs], **story_json(story),
                           "fourth": _fourth_json(before, after), "truth": _truth_json(), "page": str(page)},
@@ -104,7 +104,7 @@ class _Commands:
         return f"ridelog estimate {folder} --vehicle {vehicle}"
 
     def explain(self, chapter: str, effect: str, vehicle: str) -> str:
-        """Of the steps of ``lab_loop.go_through``."""
+        """Of the steps of ``loop.go_through``."""
         command = {
             "compare": f"ridelog compare --vehicle {vehicle} {self._listed}",
             "diagnose": f"ridelog diagnose --vehicle {vehicle} {self._listed}",
@@ -117,8 +117,7 @@ class _Commands:
 
 
 def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
-    from logger.api.extracted_runs import read_measured_profile
-    from logger.api.extraction import extract_dump
+    from logger.api.extraction import extract_dump, read_measured_profile
     from logger.commands.extract import lines
 
     try:
@@ -130,8 +129,8 @@ def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
 
 
 def _story(commands: _Commands, out: Path, tell: Say) -> Story:
-    from logger.api.lab import bench_with
-    from logger.api.lab_loop import go_through, make_ready
+    from logger.api.lab.bench import bench_with
+    from logger.api.lab.loop import go_through, make_ready
 
     given = bench_with(CompareQuestion(commands.vehicle, commands.runs, warn=warned))
     make_ready(given, out, "--out")
@@ -147,8 +146,7 @@ def _run(folder: Path) -> Run:
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import assessed, sensor_of
-    from logger.report.estimate_text import as_json, lines
+    from logger.api.drives import as_json, assessed, lines, sensor_of
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
@@ -173,9 +171,9 @@ def _essential(lines: list[str]) -> Iterator[str]:
 
 
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
-    from logger.api.extracted_runs import RATE_HZ
+    from logger.api.extraction import RATE_HZ
+    from logger.api.lab.loop import field_page
     from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
-    from logger.report.field_page import page
     from logger.report.maps import Way
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
@@ -186,16 +184,16 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
         _, columns = read_columns(out / RUNS / name / DRIVE)
         lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
         driven.append(Way(name, lat_deg, lon_deg))
-    write_text(file, page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story, before,
+    write_text(file, field_page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story,
+                                before,
                           after, [sentence.partition(" Its numbers")[0]]))
 
 
 def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
-    from logger.report.field_text import HEADS, IN_HINT, rows
-    from logger.report.session_text import ending
+    from logger.api.lab.loop import HEADS, IN_HINT, ending, rows
 
-    return ["", "=== The end ===", "", paragraphs(ending(story)), "", *columns([HEADS, *rows(before, after)]), "",
-            paragraphs([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
+    return ["", "=== The end ===", "", wrapped(ending(story)), "", *columns([HEADS, *rows(before, after)]), "",
+            wrapped([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
 
 
 def _truth(story: Story) -> tuple[str, list[str]]:
@@ -211,7 +209,7 @@ def _truth_json() -> dict[str, Any]:
 
 
 def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:
-    from logger.report.field_text import figures_of
+    from logger.api.lab.loop import figures_of
 
     return {"before": figures_of(before), "after": figures_of(after)}
 
@@ -220,14 +218,14 @@ def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:
 
 
 def _headed(title: str, why: str, *commands: str) -> list[str]:
-    from logger.api.lab_loop import chapter
+    from logger.api.lab.loop import chapter
 
     return chapter(title, _typed(why, *commands))
 
 
 def _typed(why: str, *commands: str) -> str:
     """What a step is for, and what to type for it."""
-    return "\n".join([paragraphs([_EXPLAINED[why]]), "", *(f"    {one}" for one in commands)])
+    return "\n".join([wrapped([_EXPLAINED[why]]), "", *(f"    {one}" for one in commands)])
 
 
 def _dump(out: Path, name: str) -> Path:

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.lab_questions import CompareQuestion
+from logger.api.lab.question import CompareQuestion
 from logger.commands.lab import say, take, walk
-from logger.commands.screen import warned
-from logger.report.text_layout import columns, paragraphs
+from logger.commands.options import warned
+from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:
     from logger.lab.session import Story
@@ -35,9 +35,8 @@ _EXPLAINED = {
 
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
-    from logger.api.bench import require_compiler, sought_effects
-    from logger.api.lab import bench_with
-    from logger.api.lab_loop import unsaid_lines
+    from logger.api.lab.bench import bench_with, require_compiler, sought_effects
+    from logger.api.lab.loop import unsaid_lines
     from logger.demo.lab_drives import VEHICLE
 
     if not unpack_only:
@@ -49,14 +48,14 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
               f"Two drives: {drives}\nNext: ridelog compare --vehicle {VEHICLE} {drives}")
         return
     if not as_json:
-        print(paragraphs([_INTRODUCTION]))
+        print(wrapped([_INTRODUCTION]))
     given = bench_with(CompareQuestion(VEHICLE, folders, warn=warned))
     found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
     print(json.dumps(found.as_json(), allow_nan=False) if as_json else "\n".join(_answer(found.story)))
 
 
 def _explained(chapter: str, _effect: str, _vehicle: str) -> str:
-    return paragraphs([_EXPLAINED[chapter]]) if chapter in _EXPLAINED else ""
+    return wrapped([_EXPLAINED[chapter]]) if chapter in _EXPLAINED else ""
 
 
 def unpack(out: Path) -> list[Path]:
@@ -68,11 +67,11 @@ def unpack(out: Path) -> list[Path]:
 
 def _answer(story: Story) -> list[str]:
     """What the simulated car truly was, and what was found."""
-    from logger.api.lab_loop import chapter
+    from logger.api.lab.loop import chapter
     from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
 
     sentence, table = truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
-    return [*chapter("The answer"), paragraphs([sentence]), "", *table]
+    return [*chapter("The answer"), wrapped([sentence]), "", *table]
 
 
 def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Mapping[str, float]

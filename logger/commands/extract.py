@@ -26,7 +26,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.numbers import add_number
+from logger.commands.options import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import printable
@@ -34,7 +34,7 @@ from logger.printable import printable
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from logger.api.extracted_runs import Extracted
+    from logger.api.extraction import Extracted
 
 CSV_OPTIONS = ("columns", "location", "up", "sign", "range", "speed")
 
@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog extract``."""
     from drivers.errors import DriverError
-    from logger.commands.screen import wipe
+    from logger.commands.options import wipe
 
     extract_one = _of_csv(args) if args.csv else _of_dumps(args)
     sources = args.csv or args.dumps
@@ -103,9 +103,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
-    from logger.api.extracted_runs import read_measured_profile
-    from logger.api.extraction import extract_dump, name_of
-    from logger.commands.screen import on_screen
+    from logger.api.extraction import extract_dump, name_of, read_measured_profile
+    from logger.commands.options import on_screen
     from logger.service.config import load_config
 
     if not args.dumps:
@@ -120,8 +119,8 @@ def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
 
 def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
     from logger.api.csv_extraction import Asked, extract_csv, run_name
-    from logger.api.extracted_runs import read_measured_profile
-    from logger.commands.screen import on_screen
+    from logger.api.extraction import read_measured_profile
+    from logger.commands.options import on_screen
     from logger.service.config import load_config
     from logger.store.formats.logger_csv import named_columns
 

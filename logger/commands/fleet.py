@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 
-from logger.api.fleet_questions import INGEST, REPORT, SUMMARISE
+from logger.api.log_questions import INGEST, REPORT, SUMMARISE
 from logger.commands import options
 
 VERBS = {"ingest": (INGEST, "add logs to a dataset"), "summarise": (SUMMARISE, "figures of roads and cars"),

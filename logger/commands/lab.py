@@ -1,4 +1,4 @@
-"""``ridelog lab`` at a terminal: the loop of ``logger.api.lab_loop``, which asks before it adds."""
+"""``ridelog lab`` at a terminal: the loop of ``logger.api.lab.loop``, which asks before it adds."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.lab_questions import LAB, LabLoopQuestion, LabQuestion
-from logger.commands.options import asked, declare, help_of, respelled
-from logger.commands.screen import progress
+from logger.api.lab.question import LAB, LabLoopQuestion, LabQuestion
+from logger.commands.options import asked, declare, help_of, progress, respelled
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
-    from logger.api.bench import Bench
-    from logger.api.lab_loop import Ask, Explain, LabStory, Learns, Say
+    from logger.api.lab.bench import Bench
+    from logger.api.lab.loop import Ask, Explain, LabStory, Learns, Say
 
 __doc__ = help_of(LabLoopQuestion)
 
@@ -30,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
-    from logger.api.lab import bench_with
-    from logger.api.lab_loop import always, unsaid_lines
+    from logger.api.lab.bench import bench_with
+    from logger.api.lab.loop import always, unsaid_lines
 
     with respelled(LabLoopQuestion):
         question = asked(LAB, args)
@@ -47,12 +46,12 @@ def run(args: argparse.Namespace) -> int:
 
 def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain | None = None,
          learns: Learns | None = None) -> LabStory:
-    """Go through the loop, as ``lab_loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
-    from logger.api import lab_loop
+    """Go through the loop, as ``loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
+    from logger.api.lab import loop
 
-    lab_loop.make_ready(given, out, "--out")
-    return lab_loop.walk(given, out, ask, notify, progress, explain or lab_loop.unexplained,
-                         learns or lab_loop.always)
+    loop.make_ready(given, out, "--out")
+    return loop.walk(given, out, ask, notify, progress, explain or loop.unexplained,
+                         learns or loop.always)
 
 
 # --- at the terminal ---
@@ -84,7 +83,7 @@ def _asking(question: LabQuestion) -> Ask:
 
 def _asked(given: Bench, name: str, question: LabQuestion) -> str | None:
     """What the user says."""
-    from logger.api.lab import asked_for
+    from logger.api.lab.compare import asked_for
 
     while True:
         try:

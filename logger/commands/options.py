@@ -1,4 +1,11 @@
-"""Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed."""
+"""Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed.
+
+``--out FILE.html`` of commands whose results have charts; ``.png``, ``.svg`` and ``.pdf`` hold the charts alone.
+
+Progress on the screen.
+
+Options that are numbers within a range, checked where they are declared.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +13,13 @@ import argparse
 import importlib
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING
 from pathlib import Path
 from types import NoneType
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from logger.api.outputs import check_outs
 from logger.api.question import (
     Argument,
     Asking,
@@ -22,17 +28,23 @@ from logger.api.question import (
     Option,
     Out,
     Question,
+    Range,
     Switches,
     Verb,
     WrongOption,
     askings,
     help_of,
 )
-from logger.commands.pictures import PICTURES, parted, write_result
-from logger.commands.screen import on_screen, warned, wipe
+from logger.api.shown import check_outs
 from logger.errors import BadInput, CheckFailed
-from logger.files import together
-from logger.printable import printable
+from logger.files import together, write_file
+from logger.printable import printable, word
+from logger.report.drawing import ENDINGS
+from logger.report.quantities import WIDTH
+
+if TYPE_CHECKING:
+    from logger.api.shown import CommandResult
+    from logger.chart_data import Chart
 
 
 class Asked:
@@ -203,7 +215,7 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
 
 
 def _named(place: str) -> Any:
-    """What a module and a name in it are: ``logger.api.lab:compared``."""
+    """What a module and a name in it are: ``logger.api.lab.compare:compared``."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
 
@@ -226,3 +238,106 @@ def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None
             one_of = "one of " * (len(offered) > 1)
             raise BadInput(f"{out.flag} {wrong[0]}: expected a file that ends in {one_of}{', '.join(offered)}")
     question.check_written({out.flag: paths for out, paths in asked_for.items()})
+
+
+PAGE = ".html"
+PICTURES = (PAGE, *ENDINGS)
+HELP = "write a page with pictures; .png, .svg or .pdf: the pictures alone"
+
+
+def is_picture(path: Path) -> bool:
+    """Whether a file that was asked for is one."""
+    return path.suffix.lower() in PICTURES
+
+
+def parted(asked: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """Of files that ``--out`` was given: the pictures, and the others."""
+    return [path for path in asked if is_picture(path)], [path for path in asked if not is_picture(path)]
+
+
+def write_pictures(paths: Sequence[Path], title: str, of: str, text: str, charts_of: Callable[[], Sequence[Chart]]
+                   ) -> None:
+    """Write those that were asked for, all of them or none.
+
+    of           what it is a result of, such as a file
+    text         what the command prints
+    charts_of    makes the charts
+    """
+    from logger.report.charts import page
+
+    if paths:
+        charts = charts_of()
+        _write(paths, lambda: page(title, of, text, charts), charts)
+
+
+def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
+    """The same of a result, whose page may be its own."""
+    if paths:
+        _write(paths, lambda: found.as_page(of), found.charts())
+
+
+def _write(paths: Sequence[Path], page: Callable[[], str], charts: Sequence[Chart]) -> None:
+    made = [page().encode() if path.suffix.lower() == PAGE else _drawn(path, charts) for path in paths]
+    with together():
+        for path, content in zip(paths, made, strict=True):
+            write_file(path, [content])
+
+
+def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
+    if not charts:
+        raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
+    from logger.report.drawing import drawn
+
+    return drawn(charts, path)
+
+
+def warned(words: str) -> None:
+    """Say on stderr that it will take long."""
+    print(words, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """What is under way, on one line of the terminal that is wiped at the end; said to nobody where that is none."""
+    try:
+        yield on_screen()
+    finally:
+        wipe()
+
+
+def on_screen() -> Callable[[str], None]:
+    """Progress on one line of the terminal, on stderr; said to nobody where that is no terminal."""
+    return _show if sys.stderr.isatty() else _show_nothing
+
+
+def wipe() -> None:
+    """End the line of progress."""
+    if sys.stderr.isatty():
+        print("\r" + " " * (WIDTH - 1) + "\r", end="", file=sys.stderr, flush=True)
+
+
+def _show(words: str) -> None:
+    print(f"\r{word(words, WIDTH - 1):{WIDTH - 1}}", end="", file=sys.stderr, flush=True)
+
+
+def _show_nothing(_words: str) -> None:
+    pass
+
+
+def add_number(
+    parser: argparse.ArgumentParser | argparse._ArgumentGroup, option: str, low: float, high: float, unit: str = "",
+    *, kind: type[float] | type[int] = float, **rest: Any,
+) -> None:
+    """Add an option whose number lies from ``low`` to ``high`` (infinity: no end). BadInput, which names the option,
+    for another one; ``rest`` as ``add_argument`` takes it."""
+    def number(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            what = ("a whole number" if kind is int else "a number") + (f" in {unit}" if unit else "")
+            without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""
+            raise BadInput(f"{option} {text}: expected {what}{without}") from None
+        Range(low, high, unit).check(option, value)
+        return value
+
+    parser.add_argument(option, type=number, **rest)

@@ -86,7 +86,7 @@ class Outcome:
 
     def text(self) -> str:
         """For a person."""
-        from logger.report.terminal import screen
+        from logger.report.summary import screen
         from logger.service.receiver_learning import drive_words
 
         lines = [screen(self.summary, sys.stdout.encoding or "ascii")]

@@ -13,9 +13,9 @@ from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.drawing import ENDINGS
-from logger.report.left_rows import of_files
 from logger.report.maps import Way
 from logger.report.page import page
+from logger.report.placed import of_files
 from logger.report.summary import summarise, summary_json
 from logger.store.formats.road_lines import read_road_lines
 from logger.store.log.log_reader import LoggedFile, find_logs_in, read_found

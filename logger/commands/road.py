@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.road_questions import CLASSIFY, GENERATE, RandomRoadQuestion
+from logger.api.drive_questions import CLASSIFY, GENERATE, RandomRoadQuestion
 from logger.commands import options
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text

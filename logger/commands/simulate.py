@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.outputs import check_outs
-from logger.api.simulate_question import SIMULATE, SimulateCommand, SimulateQuestion
-from logger.api.terms import named_numbers
+from logger.api.drive_questions import SIMULATE, SimulateCommand, SimulateQuestion
+from logger.api.question import named_numbers
+from logger.api.shown import check_outs
 from logger.commands import options
-from logger.commands.pictures import parted, write_pictures
+from logger.commands.options import parted, write_pictures
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import together
 from logger.printable import printable

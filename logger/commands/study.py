@@ -21,7 +21,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from logger.api.outputs import check_outs
+from logger.api.shown import check_outs
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_text
 

@@ -20,9 +20,20 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 import numpy as np
 
 from logger.demo.lab_drives import LONG_AGO
-from logger.demo.motion import LEAD_M, SPACING_M, Road, RoadStretch, build_road
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import DEFAULT, LINES, Drive, DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import (
+    DEFAULT,
+    LEAD_M,
+    LINES,
+    SPACING_M,
+    Drive,
+    DrivePlan,
+    Reception,
+    Road,
+    RoadStretch,
+    build_road,
+    record,
+    simulate_drive,
+)
 from logger.files import write_file
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects

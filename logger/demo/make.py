@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from logger.demo.motion import RoadStretch, SpeedBump
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import DrivePlan, Reception, RoadStretch, SpeedBump, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

@@ -6,8 +6,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import BadInput
-from logger.exchange.layer import Field, Kind, Layer
-from logger.exchange.wkb import wkb
+from logger.exchange.layer import Field, Kind, Layer, wkb
 
 if TYPE_CHECKING:
     import pyarrow

@@ -1,12 +1,83 @@
-"""What other programs are given: rows with values and places, in any of the formats."""
+"""Lines on the ground, in the order of maps: longitude before latitude, cut at the 180th meridian.
+
+What other programs are given: rows with values and places, in any of the formats.
+
+Geometries as well-known binary (OGC 06-103r4, section 8): little-endian, longitude before latitude.
+
+Rows of logs as a layer: the columns of the log by their names there, and the file that the row is from.
+
+Problem: a row has one place, its middle; a map wants the stretch of road that the row is about. Solution: a row's line
+runs from half-way to the row before, through its middle, half-way to the next; where a neighbour does not join (a gap,
+lost GPS) it ends at the middle, and a row without neighbours is a point. Nothing is drawn where nothing was measured.
+"""
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
-from logger.exchange.geometry import Geometry, Place
+from logger.geodesy import east_deg
 from logger.printable import word
+from logger.records import WindowRecord
+from logger.store.log.log_reader import LoggedFile, iso_utc, joined, split_drives
+from logger.store.log.row_format import COLUMNS
+from logger.units import US_PER_S
+
+Place = tuple[float, float]
+"""Longitude and latitude [degrees]."""
+Line = tuple[Place, ...]
+Geometry = tuple[Line, ...]
+"""Lines in the order driven; a line of one place is a point; nothing where no place is known."""
+
+
+DECIMALS = 6
+"""Of a degree in files of text: 0.1 m (RFC 7946, section 11.2)."""
+
+
+def half_way(one: Place, other: Place) -> Place:
+    """The middle between two near places."""
+    return _wrapped(one[0] + east_deg(one[0], other[0]) / 2), (one[1] + other[1]) / 2
+
+
+def cut(line: Line) -> Geometry:
+    """A line in two where it crosses the 180th meridian (RFC 7946, section 3.1.9)."""
+    parts: list[list[Place]] = [[line[0]]]
+    for (lon0, lat0), (lon1, lat1) in pairwise(line):
+        if abs(lon1 - lon0) > 180.0:
+            edge = 180.0 if lon0 > 0 else -180.0
+            way = east_deg(lon0, lon1)
+            lat = lat0 + (lat1 - lat0) * ((edge - lon0) / way if way else 0.0)
+            parts[-1].append((edge, lat))
+            parts.append([(-edge, lat)])
+        parts[-1].append((lon1, lat1))
+    lines = [tuple(_without_repeats(part)) for part in parts]
+    return tuple(part for part in lines if len(part) > 1) or (lines[0],)
+
+
+def chained(geometries: Sequence[Geometry]) -> Geometry:
+    """One geometry of many: lines of which one begins where the one before it ends are one line."""
+    lines: list[list[Place]] = []
+    for line in (line for geometry in geometries for line in geometry):
+        if lines and lines[-1][-1] == line[0]:
+            lines[-1].extend(line[1:])
+        else:
+            lines.append(list(line))
+    found = tuple(map(tuple, lines))
+    return tuple(line for line in found if len(line) > 1) or found[:1]
+
+
+def _without_repeats(places: Sequence[Place]) -> Iterator[Place]:
+    """Those of a car that stands are all the same."""
+    return (place for index, place in enumerate(places) if not index or place != places[index - 1])
+
+
+def _wrapped(lon_deg: float) -> float:
+    """The same meridian from -180 to 180; what is there already stays as it was written."""
+    return lon_deg if -180.0 <= lon_deg <= 180.0 else (lon_deg + 180.0) % 360.0 - 180.0
+
 
 Value = str | int | float | None
 """None: not known."""
@@ -79,3 +150,93 @@ class Layer:
     def placed(self) -> int:
         """How many rows have a place."""
         return sum(bool(one.geometry) for one in self.features)
+
+
+POINT, LINE, LINES = 1, 2, 5
+TYPE_NAMES = {POINT: "Point", LINE: "LineString", LINES: "MultiLineString"}
+
+
+def type_of(geometry: Geometry) -> int:
+    """Its code in well-known binary."""
+    if len(geometry) > 1:
+        return LINES
+    return LINE if len(geometry[0]) > 1 else POINT
+
+
+def wkb(geometry: Geometry) -> bytes | None:
+    """Its bytes; None where there is none."""
+    if not geometry:
+        return None
+    kind = type_of(geometry)
+    if kind == POINT:
+        return struct.pack("<BIdd", 1, POINT, *geometry[0][0])
+    if kind == LINE:
+        return _line(geometry[0])
+    return struct.pack("<BII", 1, LINES, len(geometry)) + b"".join(map(_line, geometry))
+
+
+def _line(line: Line) -> bytes:
+    flat = [degrees for place in line for degrees in place]
+    return struct.pack(f"<BII{len(flat)}d", 1, LINE, len(line), *flat)
+
+
+LAYER = "windows"
+_KINDS = {"t_utc": Kind.TIME, "segment": Kind.COUNT, "drive": Kind.COUNT, "samples": Kind.COUNT,
+          "clipped_samples": Kind.COUNT, "comfort": Kind.WORDS, "iri_class": Kind.WORDS, "flags": Kind.WORDS}
+FIELDS = (Field("log", Kind.WORDS),
+          *(Field(column.name, _KINDS.get(column.name, Kind.NUMBER)) for column in COLUMNS))
+
+
+def windows_layer(files: Sequence[LoggedFile]) -> Layer:
+    """The rows of logs as they were read, drives in the order driven."""
+    return Layer(LAYER, FIELDS, tuple(
+        feature for file in files for number, drive in enumerate(split_drives(file.records), start=1)
+        for feature in _features(file.name, group_name(file.name, number), drive)))
+
+
+def group_name(log: str, drive: int) -> str:
+    """What the rows of a drive belong to; drives of a log count from 1."""
+    return f"{log}, drive {drive}"
+
+
+def iri_title(iri_m_per_km: float | None) -> str:
+    """A row in a few words."""
+    return "IRI not known" if iri_m_per_km is None else f"IRI {iri_m_per_km:.2f} m/km"
+
+
+def geometries(records: Sequence[WindowRecord]) -> list[tuple[Geometry, bool]]:
+    """Where the rows of a drive lie, and whether each joins the row before it."""
+    found = {id(record): (geometry, number > 0) for piece in joined(records)
+             for number, (record, geometry) in enumerate(zip(piece, _of_piece(piece), strict=True))}
+    return [found.get(id(record), ((), False)) for record in records]
+
+
+def _features(log: str, group: str, records: Sequence[WindowRecord]) -> Iterator[Feature]:
+    for record, (geometry, joins) in zip(records, geometries(records), strict=True):
+        middle_us = None if record.utc_us is None else record.utc_us + round(US_PER_S * record.duration_s / 2)
+        yield Feature(group, iri_title(record.iri_m_per_km), (log, *_values(record)), geometry,
+                      _middle(record) if geometry else None, iso_utc(middle_us), joins, record.iri_class)
+
+
+def _values(record: WindowRecord) -> Iterator[Value]:
+    for column in COLUMNS:
+        value = getattr(record, column.attribute)
+        if column.name == "t_utc":
+            yield iso_utc(value)
+        elif column.name == "t_s":
+            yield value / US_PER_S
+        elif column.name == "flags":
+            yield "|".join(value)
+        else:
+            yield None if value == "" else value
+
+
+def _middle(record: WindowRecord) -> Place:
+    return record.lon_deg or 0.0, record.lat_deg or 0.0
+
+
+def _of_piece(piece: Sequence[WindowRecord]) -> Iterator[Geometry]:
+    places = [_middle(record) for record in piece]
+    ends = [half_way(one, next_) for one, next_ in pairwise(places)]
+    for index, place in enumerate(places):
+        yield cut((*ends[max(index - 1, 0) : index], place, *ends[index : index + 1]))

@@ -1,24 +1,345 @@
-"""The overview of a fleet: a page of some ten kilobytes with a map, whose tiles lie beside it, and the lists to act
-on."""
+"""Figures of a fleet in words and as JSON.
+
+Figures of roads as a layer for the formats of other programs: a line each, or a point for what has no direction.
+
+Roads in tiles by zoom level, as scripts that lie beside a page.
+
+Problem: a county has a million segments, and a page that holds them does not open. Solution: squares of Web Mercator
+(EPSG:3857), as street maps have them; down to the last level but one a tile holds means over 1/64 of its side, at the
+last level segments with their history. A reader loads what is in view. A page opened from a folder may not fetch, but
+may load scripts: so each tile is one, which calls ``fleetTile``.
+
+The overview of a fleet: a page of some ten kilobytes with a map, whose tiles lie beside it, and the lists to act
+on.
+
+The folder of a report: written beside its place, and moved there when it is whole.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from math import cos, degrees, isfinite, radians, sin
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from logger.fleet.road_cells import SEGMENT_M
-from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
-from logger.fleet.tiles import DEEPEST, highest_level, names_of, projected
-from logger.fleet.words import error_words, not_known
+from logger.errors import BadInput
+from logger.exchange.format import format_of
+from logger.exchange.layer import Feature, Field, Geometry, Kind, Layer, cut, iri_title
+from logger.files import make_folder, whole_folder, write_file, write_text
+from logger.fleet.dataset import DAY_US, Engine
+from logger.fleet.ingest import Counts
+from logger.fleet.road_map import SEGMENT_M, RoadPieces
+from logger.fleet.summary import (
+    FALSE_SHARE,
+    SECTION_M,
+    FleetFigures,
+    RoadTable,
+    change_found,
+    gains_table,
+    grouped,
+    history,
+)
+from logger.geodesy import EARTH_RADIUS_M
+from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.printable import counted
-from logger.report.document import data_block, document, grid, heading, hint, section, tiles
-from logger.report.html import EMPTY, Html, concatenated, html
-from logger.report.terminal import distance_words
-from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI
-from logger.store.log.log_reader import utc
+from logger.report.document import (
+    EMPTY,
+    Html,
+    concatenated,
+    data_block,
+    document,
+    grid,
+    heading,
+    hint,
+    html,
+    section,
+    tiles,
+)
+from logger.report.placed import damaged
+from logger.report.quantities import known
+from logger.report.summary import distance_words
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI, federal_condition
+from logger.store.log.log_reader import iso_utc, utc
 from logger.units import INCH_PER_MILE_M_PER_KM
+
+_SHOWN_ROADS, _SHOWN_CARS = 15, 10
+_SURE = 2.0
+"""Standard errors that a bias is listed from."""
+
+
+def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
+    """What an ingest did, by name; ``rows``: in the dataset after it."""
+    return {**vars(counts), "rows": rows, **left_out_json(_left_out(counts))}
+
+
+def _left_out(counts: Counts) -> list[LeftOut]:
+    return [damaged(counts.damaged_lines), *(LeftOut(number, "row", why) for number, why in (
+        (counts.repeated, "that are known already"),
+        (counts.contradictions, "at odds with a known one of the same number and time; the first one stays"),
+        (counts.undated, "without a date"), (counts.unplaced, "without a place or a direction"),
+        (counts.trimmed, "cut at the ends of drives")))]
+
+
+def ingest_words(counts: Counts, rows: int, place: str) -> str:
+    """The same in lines."""
+    lines = [f"{place}: {counts.added:,} rows added, {rows:,} in all"]
+    known = [f"  {counted(counts.known_logs, 'log')} known already"] if counts.known_logs else []
+    return "\n".join([*lines, *known, *(f"  {one}" for one in left_out_lines(_left_out(counts)))])
+
+
+def figures_json(figures: FleetFigures) -> dict[str, Any]:
+    """A summary by name; null: not known."""
+    names = [field.name for field in FIELDS]
+    biases = figures.biases
+    return {
+        "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
+        "growth_per_year": known(biases.growth_per_year), "pass_std": known(biases.pass_std),
+        "session_std": known(biases.session_std), "repeats": biases.repeats, "repeats_needed": biases.needed,
+        "not_known": not_known(figures) or None, "change_found_m_per_km_per_year": known(change_found(figures.roads)),
+        "cars": [{"car": car, "passes": int(passes), "bias": known(gain - 1.0 if estimated else np.nan),
+                  "bias_std": known(gain * std if estimated else np.nan), "group": int(group)}
+                 for car, passes, gain, std, group, estimated in zip(
+                     figures.names, figures.car_passes.tolist(), biases.gain.tolist(), biases.log_std.tolist(),
+                     biases.group.tolist(), biases.known.tolist(), strict=True)],
+        "roads": [dict(zip(names, one.values, strict=True)) for one in roads_layer(figures.roads).features]}
+
+
+def figures_words(figures: FleetFigures) -> str:
+    """A summary in lines: what it rests on, cars that read too high or too low, the roughest roads, and the changes."""
+    roads, biases = figures.roads, figures.biases
+    lines = [f"{counted(figures.windows, 'window')} of {counted(len(figures.cars), 'car')}; "
+             f"{counted(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
+    if figures.withheld:
+        lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
+    if why := not_known(figures):
+        lines.append(why)
+    if isfinite(biases.pass_std):
+        lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
+                     f"{biases.session_std:.1%} are shared by all passes of a session")
+    if isfinite(biases.growth_per_year):
+        lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
+    return "\n".join([*lines, "", *_words_cars(figures), "", *_roads(roads), "", *_changes(roads)])
+
+
+def not_known(figures: FleetFigures) -> str:
+    """Why figures are empty that too few drives show; nothing where there are enough."""
+    if isfinite(figures.biases.pass_std):
+        return ""
+    return ("Not known yet: how far one drive is off another, and so the error of an IRI, its change a year, and what "
+            f"each car reads too high. It takes {figures.biases.needed} drives over roads that the same car has driven "
+            f"before; there {'is' if figures.biases.repeats == 1 else 'are'} {figures.biases.repeats}. Drive the same "
+            "roads again.")
+
+
+def _words_cars(figures: FleetFigures) -> list[str]:
+    biases = figures.biases
+    bias, std = biases.gain - 1.0, biases.gain * biases.log_std
+    if not isfinite(biases.pass_std):
+        more = len(figures.names) - _SHOWN_CARS
+        return [f"Cars: {', '.join(sorted(figures.names)[:_SHOWN_CARS])}"
+                + f" and {more} more (--json has all)" * (more > 0)]
+    if not biases.known.any():
+        return ["No road has passes of two cars: nothing is known of their biases"]
+    order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
+    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > _SURE * std[one]]
+    alone = int((~biases.known).sum())
+    lines = [f"Cars that read otherwise than the mean car ({len(sure)} of {len(bias)})"]
+    width = max((len(figures.names[one]) for one in sure[:_SHOWN_CARS]), default=0)
+    lines += [f"  {figures.names[one]:{width}}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
+              f"{int(figures.car_passes[one]):,} passes" for one in sure[:_SHOWN_CARS]]
+    if len(sure) > _SHOWN_CARS:
+        lines.append(f"  and {len(sure) - _SHOWN_CARS} more (--json has all)")
+    return lines + ([f"  of {alone} cars nothing is known: they share no road with others"] if alone else [])
+
+
+def _roads(roads: RoadTable) -> list[str]:
+    order = np.argsort(-np.nan_to_num(roads.iri_m_per_km), kind="stable")[:_SHOWN_ROADS].tolist()
+    if not order:
+        return ["No road to show"]
+    lines = [f"Roughest {roads.by}s",
+             "  place                    IRI [m/km]      cars  passes  a_w [m/s2]  last seen   visit"]
+    return lines + [
+        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} "
+        f"{error_words(roads.iri_std_m_per_km[one]):7}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
+        f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
+        f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
+
+
+def _changes(roads: RoadTable) -> list[str]:
+    worse = np.flatnonzero(roads.worse)
+    order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
+    limit = change_found(roads)
+    power = ([f"A change of {limit:.2f} m/km a year would be found on every second {roads.by} with 80 % certainty"]
+            if isfinite(limit) else [])
+    if not roads.changes_known:
+        return [f"Whether a {roads.by} has become worse is not known"]
+    if not order:
+        return [f"No {roads.by} has become worse, as far as these drives show", *power]
+    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,
+             "  place                    IRI [m/km]   a year [m/km]    p"]
+    return lines + [
+        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
+        f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
+        f"{roads.p_value[one]:.1g}" for one in order]
+
+
+def error_words(std: float) -> str:
+    """A standard error behind its value: "± 0.12"; nothing where it is not known."""
+    return f"± {std:.2f}" if isfinite(std) else ""
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if isfinite(value) else ""
+
+
+_NUMBERS = ("lat_deg", "lon_deg", "heading_deg", "length_m", "passes", "iri_m_per_km", "iri_std_m_per_km",
+            "trend_m_per_km_per_year", "trend_std_m_per_km_per_year", "p_value", "a_w_mps2", "speed_mps")
+FIELDS = (Field("key", Kind.COUNT), Field("cars", Kind.COUNT), *(Field(name, Kind.NUMBER) for name in _NUMBERS),
+          Field("condition", Kind.WORDS), Field("last_utc", Kind.TIME), Field("visit", Kind.WORDS))
+_DRAWN_M = {"segment": SEGMENT_M, "section": SECTION_M}
+
+
+def roads_layer(roads: RoadTable) -> Layer:
+    """The rows of a table, in its order."""
+    columns = [getattr(roads, name).tolist() for name in ("key", "cars", *_NUMBERS)]
+    features = []
+    for values, last_us, visit in zip(zip(*columns, strict=True), roads.last_us.tolist(), roads.visit.tolist(),
+                                      strict=True):
+        row = dict(zip(("key", "cars", *_NUMBERS), values, strict=True))
+        known = [value if not isinstance(value, float) or isfinite(value) else None for value in values]
+        condition = federal_condition(row["iri_m_per_km"]) if isfinite(row["iri_m_per_km"]) else None
+        last_utc = iso_utc(last_us // DAY_US * DAY_US)  # a time of day would tell whose drive it was
+        features.append(Feature(
+            roads.by, iri_title(row["iri_m_per_km"]), (*known, condition, last_utc, visit or None),
+            _line(row["lat_deg"], row["lon_deg"], row["heading_deg"], _DRAWN_M.get(roads.by, 0.0)),
+            (row["lon_deg"], row["lat_deg"]), last_utc, False, ""))
+    return Layer(f"{roads.by}s", FIELDS, tuple(features))
+
+
+def _line(lat_deg: float, lon_deg: float, heading_deg: float, length_m: float) -> Geometry:
+    """A line of a length through a place along its direction; the place alone where there is none."""
+    if not length_m or not isfinite(heading_deg):
+        return (((lon_deg, lat_deg),),)
+    half_deg = degrees(length_m / 2 / EARTH_RADIUS_M)
+    north = half_deg * cos(radians(heading_deg))
+    east = half_deg * sin(radians(heading_deg)) / cos(radians(lat_deg))
+    return cut(((lon_deg - east, lat_deg - north), (lon_deg + east, lat_deg + north)))
+
+
+Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.int64]
+
+CELLS = 64
+DEEPEST = 15
+"""Where a segment of 66 ft is some 6 pixels long at middle latitudes."""
+_STEPS = 4096
+_MOST_LAT_DEG = 85.0
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Means of quarters of a year since 1970, rows by road: its place in the table of segments, quarter, IRI [m/km],
+    passes.
+    """
+
+    segment: npt.NDArray[np.intp]
+    quarter: Codes
+    iri_m_per_km: Array
+    passes: Codes
+
+
+def projected(lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:
+    """Places [degrees] in Web Mercator, the world being 1 wide and high, y downwards."""
+    lat_rad = np.radians(np.clip(lat_deg, -_MOST_LAT_DEG, _MOST_LAT_DEG))
+    return lon_deg / 360.0 + 0.5, 0.5 - np.arcsinh(np.tan(lat_rad)) / (2 * np.pi)
+
+
+def highest_level(x: Array, y: Array) -> int:
+    """The level at which all places lie in a few tiles."""
+    extent = max(float(np.ptp(x)), float(np.ptp(y)), 2.0**-DEEPEST)
+    return int(np.clip(np.floor(-np.log2(extent)), 0, DEEPEST))
+
+
+def write_tiles(segments: RoadTable, history: History, folder: Path) -> int:
+    """Write ``folder/LEVEL/X_Y.js`` for all levels; give their number. Raises OSError."""
+    x, y = projected(segments.lat_deg, segments.lon_deg)
+    written = 0
+    for level in range(highest_level(x, y), DEEPEST + 1):
+        make_folder(folder / str(level))
+        made = _of_segments(segments, history, x, y) if level == DEEPEST else _of_squares(segments, x, y, level)
+        for name, content in made:
+            text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+            write_text(folder / f"{name}.js", f'fleetTile("{name}",{text})\n')
+            written += 1
+    return written
+
+
+def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    column, row = _tile_of(x, y, level, CELLS)
+    place, code = np.unique((column << 32) | row, return_inverse=True)
+    length_m = np.bincount(code, segments.length_m)
+    mean = np.bincount(code, segments.iri_m_per_km * segments.length_m) / length_m
+    worst, worse = np.zeros(len(place)), np.zeros(len(place), dtype=np.int64)
+    np.maximum.at(worst, code, segments.iri_m_per_km)
+    np.maximum.at(worse, code, segments.worse.astype(np.int64))
+    column, row = place >> 32, place & (2**32 - 1)
+    quarter = 1 << (2 * column // CELLS % 2 + 2 * (2 * row // CELLS % 2))
+    at = row % CELLS * CELLS + column % CELLS
+    for name, rows in _by_tile(column // CELLS, row // CELLS, level):
+        yield name, {"n": int(np.bitwise_or.reduce(quarter[rows])), "at": at[rows].tolist(),
+                     "m": _hundredths(mean[rows]), "w": _hundredths(worst[rows]), "c": worse[rows].tolist()}
+
+
+def _of_segments(segments: RoadTable, history: History, x: Array, y: Array) -> Iterator[tuple[str, dict[str, Any]]]:
+    column, row = _tile_of(x, y, DEEPEST)
+    order = np.lexsort((history.quarter, history.segment))
+    steps = np.stack([history.quarter, np.round(history.iri_m_per_km * 100).astype(np.int64), history.passes], axis=1)
+    steps = steps[order]
+    first = np.searchsorted(history.segment[order], np.arange(len(x) + 1))
+    for name, rows in _by_tile(column, row, DEEPEST):
+        yield name, {
+            "x": np.round((x[rows] * 2**DEEPEST - column[rows]) * _STEPS).astype(int).tolist(),
+            "y": np.round((y[rows] * 2**DEEPEST - row[rows]) * _STEPS).astype(int).tolist(),
+            "h": np.round(segments.heading_deg[rows]).astype(int).tolist(),
+            "m": _hundredths(segments.iri_m_per_km[rows]), "s": _hundredths(segments.iri_std_m_per_km[rows]),
+            "t": _hundredths(segments.trend_m_per_km_per_year[rows]),
+            "u": _hundredths(segments.trend_std_m_per_km_per_year[rows]),
+            "c": segments.worse[rows].astype(int).tolist(),
+            "k": segments.cars[rows].tolist(), "n": segments.passes[rows].astype(int).tolist(),
+            "d": (segments.last_us[rows] // DAY_US).tolist(),
+            "q": [steps[first[one] : first[one + 1]].tolist() for one in rows.tolist()]}
+
+
+def names_of(x: Array, y: Array, level: int) -> list[str]:
+    """The tiles of a level, by name."""
+    return [name for name, _ in _by_tile(*_tile_of(x, y, level), level)]
+
+
+def _tile_of(x: Array, y: Array, level: int, parts: int = 1) -> tuple[Codes, Codes]:
+    """Column and row of the tile, or of its parts, that places lie in."""
+    across = 2**level * parts
+    column, row = (np.clip(np.floor(one * across), 0, across - 1).astype(np.int64) for one in (x, y))
+    return column, row
+
+
+def _by_tile(column: Codes, row: Codes, level: int) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Names of tiles, and the rows that lie in each."""
+    order = np.lexsort((row, column))
+    new = (np.diff(column[order]) != 0) | (np.diff(row[order]) != 0)
+    for rows in np.split(order, np.flatnonzero(new) + 1):
+        yield f"{level}/{int(column[rows[0]])}_{int(row[rows[0]])}", rows
+
+
+def _hundredths(values: Array) -> list[int | None]:
+    return [round(value * 100) if value == value else None for value in values.tolist()]
+
 
 _SHOWN = 20
 _SHARED = ("windows.js", "canvas.js", "map.js")
@@ -134,3 +455,42 @@ def _cars(figures: FleetFigures) -> Html:
     return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(not_known(figures) or (
         "What a car reads of the roads that it shares with others, against the mean car; the figures above are free of "
         "it. The cars that read otherwise come first.")))
+
+
+INDEX = "index.html"
+_TILES = "tiles"
+
+
+def check_folder(out: Path) -> None:
+    """Raise BadInput for a place that is neither free nor a report's."""
+    if not out.parent.is_dir():
+        raise BadInput(f"--out {out}: expected a folder in a folder that there is")
+    is_report = (out / INDEX).is_file() and (out / _TILES).is_dir()
+    if out.exists() and not is_report and not (out.is_dir() and not any(out.iterdir())):
+        raise BadInput(f"--out {out}: expected a folder that is not there, is empty, or that a report has made")
+
+
+def history_of(engine: Engine, figures: FleetFigures, since_us: int | None, until_us: int | None) -> History:
+    """The quarters of the segments of a summary."""
+    found = engine.arrays(history(engine.rows, gains_table(figures.cars, figures.biases), since_us, until_us))
+    key = figures.roads.key
+    at = np.minimum(np.searchsorted(key, found["road"]), len(key) - 1)
+    published = key[at] == found["road"]
+    passes = found["passes"][published]
+    return History(at[published], found["quarter"][published], found["iri"][published] / passes, passes)
+
+
+def write_report(figures: FleetFigures, steps: History, pieces: RoadPieces | None, out: Path) -> int:
+    """Write the folder, of figures by segment; give the number of tiles. BadInput for what cannot be written."""
+    sections = grouped(figures.roads, "section", pieces, figures.shared)
+    try:
+        with whole_folder(out) as new:
+            tiles = write_tiles(figures.roads, steps, new / _TILES)
+            for name, roads in (("segments.parquet", figures.roads), ("sections.parquet", sections),
+                                ("sections.csv", sections)):
+                write_file(new / name, format_of(out / name).content(
+                    roads_layer(roads).printable(), str(out / name)))
+            write_text(new / INDEX, fleet_page(figures, sections))
+    except OSError as error:
+        raise BadInput(f"--out {out}: expected a folder that can be written ({error.strerror or error})") from None
+    return tiles

@@ -1,26 +1,216 @@
-"""The figures of a dataset: roads, sections, cells or routes, and the cars that measured them."""
+"""The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
+
+Three groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and
+time. ``passes_by_session``: means by session, of a part of the roads, from which the biases of cars follow.
+``roads``: the sums of each piece of road over all cars, each car's readings divided by its gain. What follows from the
+sums is arithmetic over as many rows as there are pieces of road.
+
+Mean and change of each road from sums over its passes, with their errors.
+
+Few passes show little of their own scatter. Their variance is drawn towards that of all roads by as much as the roads'
+variances agree (G. K. Smyth, Linear models and empirical Bayes methods, 2004, sections 3 and 6.2: a scaled inverse
+chi-square prior whose two numbers follow from mean and variance of the logarithms). Changes are significant where the
+share of false ones among them stays below a limit (Y. Benjamini and Y. Hochberg, 1995).
+
+The figures of a dataset: roads, sections, cells or routes, and the cars that measured them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.fleet.car_biases import CarBiases, car_biases
-from logger.fleet.engine import Engine
-from logger.fleet.expressions import cars as car_sums
-from logger.fleet.expressions import passes_by_car, passes_by_session, roads
-from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
-from logger.fleet.road_elimination import RoadPasses
-from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
-from logger.fleet.road_map import RoadPieces
-from logger.roads.sections import FAIR_TO_IN_PER_MI
+from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
+from logger.fleet.dataset import Engine
+from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
 
+if TYPE_CHECKING:
+    import ibis.expr.types as ir
+
+
+YEAR_US = 365.25 * 86400e6
+"""A Julian year."""
+_PRIME = 1_000_003
+
+
+def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:
+    """Sums of passes by road and car, of a time [us since 1970, half-open]; years count from ``zero_us``."""
+    passes = _passes(rows, since_us, until_us)
+    passes = passes.mutate(
+        years=(passes.utc_us - zero_us).cast("float64") / YEAR_US, iri=passes.pass_iri_m_per_km,
+        heading_rad=passes.heading_deg.cast("float64").radians(), square=passes.pass_a_w_mps2 * passes.pass_a_w_mps2)
+    return passes.group_by(["road", "car"]).aggregate(
+        passes=passes.count(), windows=passes.pass_windows.sum(),
+        years=passes.years.sum(), years_square=(passes.years * passes.years).sum(),
+        iri=passes.iri.sum(), iri_years=(passes.iri * passes.years).sum(), iri_square=(passes.iri * passes.iri).sum(),
+        felt=passes.square.count(), a_w_square=passes.square.sum(), speed=passes.speed_mps.cast("float64").sum(),
+        lat=passes.lat_deg.sum(), lon=passes.lon_deg.sum(), north=passes.heading_rad.cos().sum(),
+        east=passes.heading_rad.sin().sum(), last_us=passes.utc_us.max())
+
+
+def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
+    # Errors go with the IRI: one that is not above zero is none.
+    passes = rows.filter(rows.pass_iri_m_per_km > 0)
+    if since_us is not None:
+        passes = passes.filter(passes.utc_us >= since_us)
+    return passes if until_us is None else passes.filter(passes.utc_us < until_us)
+
+
+def car_sums(by_car: ir.Table) -> ir.Table:
+    """Passes and roads of each car."""
+    return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
+
+
+def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int, one_in: int
+                      ) -> ir.Table:
+    """Means over passes by road, car and session, of one road in so many: by the remainder of the key, first by a
+    prime, as the last bits of a key are a direction."""
+    passes = _passes(rows, since_us, until_us)
+    if one_in > 1:
+        passes = passes.filter((passes.road % _PRIME) % one_in == 0)
+    passes = passes.mutate(years=(passes.utc_us - zero_us).cast("float64") / YEAR_US)
+    return passes.group_by(["road", "car", "session"]).aggregate(
+        passes=passes.count(), iri=passes.pass_iri_m_per_km.mean(), years=passes.years.mean())
+
+
+def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:
+    """Sums by road over all cars; ``gains`` has each car's gain and the variance of its logarithm."""
+    joined = by_car.join(gains, "car")
+    passes = joined.passes.cast("float64")
+
+    def total(column: Any) -> Any:
+        return column.sum()
+
+    plain = ("years", "years_square", "felt", "a_w_square", "speed", "lat", "lon", "north", "east", "windows")
+    return joined.group_by("road").aggregate(
+        passes=total(joined.passes), cars=joined.car.count(), last_us=joined.last_us.max(),
+        iri=total(joined.iri / joined.gain), iri_years=total(joined.iri_years / joined.gain),
+        iri_square=total(joined.iri_square / (joined.gain * joined.gain)),
+        bias_square=total(passes * passes * joined.log_variance), **{name: total(joined[name]) for name in plain})
+
+
+def history(rows: ir.Table, gains: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
+    """Passes by road and quarter of a year: number, mean IRI with the cars' gains taken out."""
+    passes = _passes(rows, since_us, until_us).join(gains, "car")
+    passes = passes.mutate(quarter=(passes.utc_us.cast("float64") / (YEAR_US / 4)).floor().cast("int64"))
+    return passes.group_by(["road", "quarter"]).aggregate(
+        passes=passes.count(), iri=(passes.pass_iri_m_per_km / passes.gain).sum())
+
+
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Of the passes over each of n roads: number; sums of times [years], IRI [m/km] and products; and what the cars'
+    gains add to the variance of the sum, over the square of the IRI."""
+
+    passes: Array
+    years: Array
+    years_square: Array
+    iri: Array
+    iri_years: Array
+    iri_square: Array
+    bias_square: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RoadFigures:
+    """Of n roads; NaN: not known.
+
+    iri_m_per_km, iri_std_m_per_km            mean of the passes, and its standard error with that of the cars' biases
+    trend_m_per_km_per_year, trend_std_...    change, from three passes on
+    p_value                                   of no change, two-sided
+    """
+
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    trend_m_per_km_per_year: Array
+    trend_std_m_per_km_per_year: Array
+    p_value: Array
+
+
+def road_figures(sums: Sums, pass_std: float) -> RoadFigures:
+    """Figures of n roads. ``pass_std``: relative standard deviation of a pass, for where no road shows it; NaN: drives
+    are too few to show how far they scatter, so no error and no change is known."""
+    from scipy.stats import t
+
+    count = sums.passes
+    mean = sums.iri / count
+    if not np.isfinite(pass_std):
+        return RoadFigures(mean, *(np.full(len(mean), np.nan) for _ in range(4)))
+    spread_years = np.maximum(sums.years_square - sums.years**2 / count, 0.0)
+    product = sums.iri_years - sums.iri * sums.years / count
+    has_trend = (count >= 3) & (spread_years > 1e-9 * count)
+    trend = np.divide(product, spread_years, out=np.zeros(len(mean)), where=has_trend)
+    rest = np.maximum(sums.iri_square - sums.iri**2 / count - trend * product, 0.0)
+    freedom = count - 1 - has_trend
+    variance = np.divide(rest, freedom * mean**2, out=np.zeros(len(mean)), where=freedom > 0)
+    prior_freedom, prior = _prior(variance, freedom, pass_std**2)
+    if np.isinf(prior_freedom):
+        moderated = np.full(len(mean), prior)
+    else:
+        moderated = (prior_freedom * prior + freedom * variance) / (prior_freedom + freedom)
+    iri_std = mean * np.sqrt(moderated / count + sums.bias_square / count**2)
+    trend_std = np.sqrt(np.divide(moderated * mean**2, spread_years, out=np.full(len(mean), np.nan), where=has_trend))
+    trend = np.where(has_trend, trend, np.nan)
+    p_value = 2.0 * t.sf(np.abs(trend) / trend_std, np.minimum(prior_freedom + freedom, 1e9))
+    return RoadFigures(mean, iri_std, trend, trend_std, p_value)
+
+
+def significant(p_value: Array, false_share: float) -> Bools:
+    """Which of n tests are significant, with a share of false ones among them of at most so much; NaN is none."""
+    known = np.flatnonzero(np.isfinite(p_value))
+    order = known[np.argsort(p_value[known], kind="stable")]
+    passed = np.flatnonzero(p_value[order] <= false_share * np.arange(1, len(order) + 1) / max(len(order), 1))
+    out = np.zeros(len(p_value), dtype=np.bool_)
+    if len(passed):
+        out[order[: passed[-1] + 1]] = True
+    return out
+
+
+def _prior(variance: Array, freedom: Array, otherwise: float) -> tuple[float, float]:
+    """Degrees of freedom and value of the prior variance (Smyth 2004, section 6.2)."""
+    from scipy.special import digamma, polygamma
+
+    known = (freedom > 0) & (variance > 0)
+    if known.sum() < 3:
+        return np.inf, otherwise
+    half = freedom[known] / 2
+    level = np.log(variance[known]) - digamma(half) + np.log(half)
+    excess = level.var(ddof=1) - float(polygamma(1, half).mean())
+    if excess <= 0:
+        return np.inf, float(np.exp(level.mean()))
+    prior_half = _inverse_trigamma(excess)
+    return 2 * prior_half, float(np.exp(level.mean() + digamma(prior_half) - np.log(prior_half)))
+
+
+def _inverse_trigamma(value: float) -> float:
+    """Where trigamma has a value above 0, by Newton's method for 1 / trigamma, which is convex (Smyth 2004,
+    appendix)."""
+    from scipy.special import polygamma
+
+    if value > 1e7:
+        return float(value**-0.5)
+    if value < 1e-6:
+        return 1.0 / value
+    at = 0.5 + 1.0 / value
+    for _ in range(50):
+        trigamma = float(polygamma(1, at))
+        step = trigamma * (1.0 - trigamma / value) / float(polygamma(2, at))
+        at += step
+        if -step / at < 1e-8:
+            break
+    return at
+
+
 Keys = npt.NDArray[np.int64]
 
 FALSE_SHARE = 0.05

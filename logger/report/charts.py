@@ -2,11 +2,13 @@
 
 A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
 are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground.
+
+A result of a command as a page that stands alone: its words and its charts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor, log10
@@ -15,7 +17,7 @@ from textwrap import wrap
 import numpy as np
 
 from logger.chart_data import SERIES, Array, Bars, Chart, Curves, Field, Line
-from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.document import EMPTY, Html, concatenated, document, heading, html, section
 
 WIDTH = 1000
 _ABOUT = 6
@@ -315,3 +317,25 @@ def steps_figure(one: Steps) -> Html:
         parts += [_words(x, _STEPS.bottom_px + 18 + _LINE_PX * number, line, "middle")
                   for number, line in enumerate(wrap(words, letters)[:_MOST_LINES])]
     return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")
+
+
+_COLUMN_GAP = "  "
+
+
+def page(title: str, of: str, text: str, charts: Sequence[Chart]) -> Html:
+    """The page.
+
+    of      what it is a result of, such as a file
+    text    what the command prints
+    """
+    return document(f"{title}: {of}", [
+        heading(title, of), *map(_part, text.split("\n\n")),
+        section("Pictures", concatenated(map(chart, charts)))])
+
+
+def _part(text: str) -> Html:
+    """Lines of a table stay in their columns, and are shifted sideways on a phone; sentences wrap."""
+    lines = text.strip("\n").split("\n")
+    if any(_COLUMN_GAP in line.strip() for line in lines):
+        return html('<pre class="whole">{}</pre>', "\n".join(lines))
+    return html('<p class="lines">{}</p>', "\n".join(lines))

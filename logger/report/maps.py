@@ -16,7 +16,7 @@ import numpy as np
 from logger.chart_data import Array
 from logger.geodesy import east_and_north_m
 from logger.report.charts import WIDTH, nice_step
-from logger.report.html import Html, concatenated, html
+from logger.report.document import Html, concatenated, html
 
 _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640

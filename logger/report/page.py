@@ -3,54 +3,73 @@
 It opens from a stick on a machine without network or rights: no script, no picture or font from elsewhere, and a
 content policy that forbids them even if a hostile file got a tag past us. Every text that comes from a file is
 escaped. The map and the curves are drawn by a script of ours (``assets``) out of packed numbers; all else is plain.
+
+What the page's script fills: the places of the map, the curves and the table, with their keys and words.
+
+The windows of drives as the page's script takes them: columns of whole numbers, packed small.
+
+Problem: 100,000 windows of some fifteen numbers are 15 MB as text, and a page has to hold them. Solution: a number is
+kept in the steps that can be read off the page (a millimetre, a hundredth of a m/km), differences from row to row are
+kept where neighbours are alike, and what is left is deflated byte by byte of equal weight, so that the bytes that are
+all zero cost nothing.
 """
 
 from __future__ import annotations
 
 import json
+import zlib
+from base64 import b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
+from itertools import chain
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
+import numpy.typing as npt
+
+from logger.chart_data import Array
+from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.document import (
+    EMPTY,
+    Html,
     bullets,
+    concatenated,
     data_block,
     document,
     grid,
     heading,
     hint,
+    html,
     map_links,
     paragraphs,
     section,
     tiles,
 )
-from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.maps import Way
-from logger.report.places_passed import places_passed
+from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
     DriveSummary,
     RoughWindow,
     Share,
-    summarise,
-)
-from logger.report.terminal import (
+    class_limits_m_per_km,
     class_words,
     comfort_words,
+    counts,
     date_words,
     distance_words,
+    expected_square,
     iri_words,
     place_words,
     span_words,
+    summarise,
 )
-from logger.report.track_data import track_data
-from logger.report.track_views import rank, track_views, windows_table
-from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
+from logger.store.log.log_reader import LoggedFile, along_m, joined, length_m, split_drives, utc
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
 _MAX_SIDECARS = 10
@@ -274,3 +293,265 @@ def _different(contents: Iterable[Any]) -> list[Any]:
         if content is not None:
             seen.setdefault(json.dumps(content, sort_keys=True), content)
     return list(seen.values())
+
+
+_MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
+_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that stands in no mean"))
+
+
+def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
+    """The map and the curves, which the script draws, and what it says of them.
+
+    sources    whose pictures and roads the map shows
+    drives     when each was
+    """
+    placed = any(record.lat_deg is not None and record.lon_deg is not None for record in records)
+    if not placed and not summary.distance_m > 0:
+        return section("Along the way", Html('<p class="empty">No row has a position or a distance: there is neither '
+                                             "map nor curve.</p>"))
+    parts = [_map_view(summary, sources, drives) if placed else
+             Html('<p class="empty">No row has a position, so there is no map.</p>')]
+    parts += [_curves_view()] if summary.distance_m > 0 else []
+    return html('<section id="views" data-mode="iri"><h2>Along the way</h2><noscript><p class="warn">The map, the '
+                "curves and the table of windows are drawn by a script, which this browser does not run.</p>"
+                "</noscript>{}{}</section>", concatenated(parts), _READOUT)
+
+
+def _choice(drives: Sequence[str]) -> Html:
+    """All drives, or one of them."""
+    if len(drives) < 2:
+        return EMPTY
+    options = concatenated(html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)
+                           for number, when in enumerate(drives))
+    return html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select>'
+                "</label>", options)
+
+
+def _repeated_words(windows: int) -> str:
+    if windows <= MOST_ROWS:
+        return "Where several drives came by, the colour is that of their mean."
+    return (f"More than {MOST_ROWS:,} windows: where several drives came by, they are drawn one over the other. Show a "
+            "single drive, or let ridelog passes average them.")
+
+
+def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
+    buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
+                                "true" if name == "iri" else "false", words) for name, words in _MODES)
+    trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
+    repeated = hint(_repeated_words(summary.windows)) if len(drives) > 1 else EMPTY
+    return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
+                "{}</div>{}</div>"
+                '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. '
+                "Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
+                'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
+                '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
+                '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
+                '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
+                '{}{}<ul class="legend by-trust">{}</ul>{}{}', buttons, _choice(drives),
+                _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
+                _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust, repeated,
+                hint(sources) if sources else EMPTY)
+
+
+def _curves_view() -> Html:
+    return Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves '
+                "of roughness, weighted acceleration and speed along the way. Left and right go from window "
+                "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
+                'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
+                "</div>") + hint(
+        "The shaded band is the IRI plus and minus its standard error. Where many windows share a place of the "
+        "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey stroke "
+        "reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort (fairly, very, "
+        "extreme). The strip at the bottom: orange where a window carries a flag, grey where it has no value that "
+        "counts.")
+
+
+_READOUT = Html(
+    '<div class="readout"><div id="reading" aria-live="polite"><p class="hint">Point at a window, or tap it. Drag over '
+    'the curves for the figures of a range.</p></div><div id="range" hidden><div id="figures" aria-live="polite"></div>'
+    '<p class="actions"><button type="button" id="range-look">Look at it</button>'
+    '<button type="button" id="look-all">Whole way</button>'
+    '<button type="button" id="range-clear">Forget the range</button></p></div></div>')
+
+
+def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
+    shown = {share.name for share in shares}
+    ranks = [number for number, one in enumerate(names) if one in shown]
+    shown |= set(names[min(ranks): max(ranks)]) if ranks else set()  # a mean of windows may lie between their classes
+    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(one, names), words_of(one))
+                           for one in sorted(shown, key=lambda one: names.index(one) if one in names else len(names)))
+    return html('<ul class="legend {}">{}</ul>', name, entries)
+
+
+def windows_table(records: Sequence[WindowRecord]) -> Html:
+    """Every row, as a table of which the script shows some at a time: it stands behind the map and the curves."""
+    names = ("drive", "row", "time UTC", "from [m]", "lat", "lon", "km/h", "IRI [m/km]", "±", "a_w [m/s²]",
+             "MTVV [m/s²]", "VDV [m/s^1.75]", "crest", "class", "comfort", "flags")
+    head = concatenated(html('<th scope="col">{}</th>', name) for name in names)
+    turns = concatenated(html('<button type="button" data-turn="{}">{}</button>', *turn) for turn in (
+        ("first", "First"), ("-1", "Previous"), ("1", "Next"), ("last", "Last")))
+    return html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><thead><tr>{}</tr>'
+                '</thead><tbody id="rows"></tbody></table></div><p class="actions">{}<span id="rows-of" '
+                'aria-live="polite"></span></p></details>', len(records), head, turns)
+
+
+def rank(name: str, names: tuple[str, ...]) -> str:
+    """Number of a name's colour; ``x`` for what has none."""
+    return str(names.index(name)) if name in names else "x"
+
+
+UNKNOWN = -(2**31)
+"""Stands for a value that is not known."""
+_MOST = 2**31 - 1
+_DEG = 1e6
+"""Steps in a degree: 0.11 m, the six decimals that RFC 7946 (section 11.2) calls enough."""
+
+Ints = npt.NDArray[np.uint32]
+Column = tuple[str, float, int, Array]
+"""Name, steps per unit, how many times differences are taken, values (n,) with NaN for unknown."""
+
+_PLAIN: Sequence[tuple[str, float, int, Callable[[WindowRecord], float | None]]] = (
+    ("row", 1, 1, lambda record: record.segment),
+    ("length_m", 1e3, 1, length_m),
+    ("duration_s", 1e3, 1, lambda record: record.duration_s),
+    ("lat_deg", _DEG, 2, lambda record: record.lat_deg),
+    ("speed_mps", 1e2, 1, lambda record: record.speed_mps),
+    ("iri_m_per_km", 1e2, 0, lambda record: record.iri_m_per_km),
+    ("iri_std_m_per_km", 1e2, 0, lambda record: record.iri_std_m_per_km),
+    ("a_w_mps2", 1e3, 0, lambda record: record.a_w_mps2),
+    ("mtvv_mps2", 1e2, 0, lambda record: record.mtvv_mps2),
+    ("vdv_mps175", 1e2, 0, lambda record: record.vdv_mps175),
+    ("crest_factor", 1e1, 0, lambda record: record.crest_factor),
+    ("iri_rank", 1, 0, lambda record: _rank(record.iri_class, tuple(IRI_CLASSES))),
+    ("comfort_rank", 1, 0, lambda record: _rank(record.comfort, COMFORT_NAMES)),
+    ("counts", 1, 0, counts),
+)
+
+
+def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[Way] = (), passed: PlacesPassed | None = None
+               ) -> dict[str, Any]:
+    """All that the script draws, as JSON can hold it.
+
+    base      roads that are drawn beneath
+    passed    places that several drives passed
+    """
+    records = list(chain.from_iterable(drives))
+    origin_deg = next((record.lon_deg for record in records if record.lon_deg is not None), 0.0)
+    flags = list(dict.fromkeys(record.flags for record in records))
+    numbers = {combination: number for number, combination in enumerate(flags)}
+    columns = [(name, steps, order, _floats(map(value_of, records))) for name, steps, order, value_of in _PLAIN]
+    columns += [
+        ("lon_deg", _DEG, 2, _unwrapped(_floats(record.lon_deg for record in records), origin_deg)),
+        # Most windows begin when the one before ends: beside their durations their instants cost nothing.
+        ("beyond_s", 1e3, 1, np.concatenate([_since_s(drive) for drive in drives] or [np.zeros(0)])
+         - _elapsed_s(records)),
+        # Most windows are expected to be what they are: as a difference the column is all but empty.
+        ("expected_above_mps2", 1e3, 0, _floats(map(_expected_above, records))),
+        ("flags", 1, 0, _floats(numbers[record.flags] for record in records)),
+        ("begins", 1, 0, _begins(drives)),
+    ]
+    if passed is not None:
+        columns.append(("place", 1, 2, passed.place))
+    return {
+        "windows": packed(columns),
+        "drives": [{"windows": len(drive), "start_s": _start_s(drive)} for drive in drives],
+        "passed": None if passed is None else packed([
+            ("drives", 1, 0, passed.drives.astype(np.float64)), ("iri_m_per_km", 1e2, 0, passed.iri_m_per_km),
+            ("iri_std_m_per_km", 1e2, 0, passed.iri_std_m_per_km)]),
+        "flags": flags,
+        "base": packed(_base_columns(base, origin_deg, _floats(record.lat_deg for record in records),
+                                     columns[len(_PLAIN)][3])),
+        "limits": {"iri": [class_limits_m_per_km(letter)[0] for letter in tuple(IRI_CLASSES)[1:]],
+                   "comfort": sorted(limit for limit, _ in COMFORT_WORDS)[1:]},
+        "letters": tuple(IRI_CLASSES),
+    }
+
+
+def packed(columns: Sequence[Column]) -> dict[str, Any]:
+    """Columns of equal length as base64 text of one deflated block, and what is needed to read it."""
+    planes = b"".join(_planes(values, steps, order) for _, steps, order, values in columns)
+    return {"count": len(columns[0][3]), "columns": [[name, steps, order] for name, steps, order, _ in columns],
+            "packed": b64encode(zlib.compress(planes, 9)).decode("ascii")}
+
+
+def _planes(values: Array, steps: float, order: int) -> bytes:
+    """The lowest bytes of all numbers, then the next ones, four in all. Differences wrap around 32 bits, as the
+    script's sums do, so that any number comes back as it was."""
+    known = np.isfinite(values)
+    whole = np.where(known, np.clip(np.where(known, values, 0.0), -_MOST / steps, _MOST / steps) * steps, UNKNOWN)
+    differences = np.rint(whole).astype(np.int64).astype(np.uint32)
+    for _ in range(order):
+        differences = np.diff(differences, prepend=np.uint32(0))
+    signed = differences.view(np.int32)
+    # Small numbers of either sign become small numbers without one (zigzag, as in Protocol Buffers).
+    zigzag = (differences << np.uint32(1)) ^ (signed >> 31).view(np.uint32)
+    return zigzag.astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+def _floats(values: Any) -> Array:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _unwrapped(lon_deg: Array, origin_deg: float) -> Array:
+    """Longitudes that do not jump at the date line: within 180 degrees of the origin."""
+    return (lon_deg - origin_deg + 180.0) % 360.0 - 180.0 + origin_deg
+
+
+def _rank(name: str, names: tuple[str, ...]) -> int | None:
+    return names.index(name) if name in names else None
+
+
+def _start_s(drive: Sequence[WindowRecord]) -> float | None:
+    """Seconds since 1970 of the first row that knows them."""
+    return next((record.utc_us / 1e6 for record in drive if record.utc_us is not None), None)
+
+
+def _since_s(drive: Sequence[WindowRecord]) -> Array:
+    """Time of each row since the drive's first date."""
+    return _floats(record.utc_us and record.utc_us / 1e6 for record in drive) - (_start_s(drive) or 0.0)
+
+
+def _elapsed_s(records: Sequence[WindowRecord]) -> Array:
+    """Time in all windows before each, in the milliseconds that the script sums up."""
+    lasted_s = np.round(_floats(record.duration_s for record in records), 3)
+    return np.cumsum(lasted_s) - lasted_s
+
+
+def _expected_above(record: WindowRecord) -> float | None:
+    """How far the acceleration that stands in a mean lies above the one that is shown (NaN: it stands in none)."""
+    square = expected_square(record)
+    return None if square is None else square**0.5 - (record.a_w_mps2 or 0.0)
+
+
+def _begins(drives: Sequence[Sequence[WindowRecord]]) -> Array:
+    """2 where a drive begins, 1 where a row is not joined to the one before, 0 elsewhere."""
+    begins = []
+    for drive in drives:
+        firsts = {id(piece[0]) for piece in joined(drive) if piece}
+        placed = [record.lat_deg is not None and record.lon_deg is not None for record in drive]
+        begins += [2] + [int(id(record) in firsts or here != before)
+                         for record, here, before in zip(drive[1:], placed[1:], placed, strict=False)]
+    return _floats(begins)
+
+
+def _base_columns(base: Sequence[Way], origin_deg: float, lat_deg: Array, lon_deg: Array) -> list[Column]:
+    """The roads beneath, those that come near to the way: as far around it as it is wide, 1 km at least."""
+    near = _near(lat_deg, lon_deg)
+    kept = [(way.lat_deg, lon) for way in base
+            if near(way.lat_deg, lon := _unwrapped(way.lon_deg, origin_deg))]
+    begins = [np.arange(len(lat)) == 0 for lat, _ in kept]
+    return [("lat_deg", _DEG / 10, 1, np.concatenate([lat for lat, _ in kept] or [np.zeros(0)])),
+            ("lon_deg", _DEG / 10, 1, np.concatenate([lon for _, lon in kept] or [np.zeros(0)])),
+            ("begins", 1, 0, np.concatenate([one.astype(np.float64) for one in begins] or [np.zeros(0)]))]
+
+
+def _near(lat_deg: Array, lon_deg: Array) -> Callable[[Array, Array], bool]:
+    if not np.isfinite(lat_deg).any():
+        return lambda lat, lon: False
+    south, north = np.nanmin(lat_deg), np.nanmax(lat_deg)
+    west, east = np.nanmin(lon_deg), np.nanmax(lon_deg)
+    around = max(north - south, (east - west) * np.cos(np.radians(south)), 0.01)
+    aside = around / max(np.cos(np.radians(south)), 0.01)
+    return lambda lat, lon: bool(
+        lat.size and lat.max() > south - around and lat.min() < north + around
+        and lon.max() > west - aside and lon.min() < east + aside)

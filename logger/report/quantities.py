@@ -1,12 +1,24 @@
-"""Numbers with their errors and units, as a person reads them."""
+"""Numbers with their errors and units, as a person reads them.
+
+Units in which a table is printed for a person: SI, or those of road agencies in the US.
+
+Paragraphs and columns of plain text, as wide as a screen.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import floor, inf, isfinite, log10
+from textwrap import fill
+from typing import TYPE_CHECKING
 
-from logger.vehicle.effect import Chosen
+from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
+
+if TYPE_CHECKING:
+    from logger.roads.localized_roughness import Area
+    from logger.vehicle.effect import Chosen
 
 _SYMBOLS = {
     "n": "N", "kg": "kg", "w": "W", "j": "J", "pa": "Pa", "hz": "Hz", "m": "m", "mm": "mm", "km": "km", "s": "s",
@@ -86,3 +98,73 @@ def signal_errors(errors: Mapping[str, Sequence[float]], words: str) -> list[str
 def known(value: float) -> float | None:
     """A number for a program; None (null) where it is not known."""
     return float(value) if isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class DisplayUnits:
+    """Name and SI value of each unit, and decimals that are printed.
+
+    length    of sections and where they lie
+    place     of what is shorter than a section
+    way       of a whole drive
+    """
+
+    length: tuple[str, float]
+    length_decimals: int
+    place: tuple[str, float]
+    place_decimals: int
+    iri: tuple[str, float]
+    iri_decimals: int
+    speed: tuple[str, float]
+    way: tuple[str, float]
+
+
+UNITS = {
+    "si": DisplayUnits(("m", 1.0), 1, ("m", 1.0), 2, ("m/km", 1.0), 2, ("km/h", KMH_MPS), ("km", 1000.0)),
+    "us": DisplayUnits(("mi", MILE_M), 3, ("ft", FOOT_M), 1, ("in/mi", INCH_PER_MILE_M_PER_KM), 0, ("mph", MPH_MPS),
+                       ("mi", MILE_M)),
+}
+
+
+WIDTH = 100
+
+
+def wrapped(lines: Sequence[str], mark: str = "") -> str:
+    """Lines of text as wide as a screen, each after a mark."""
+    return "\n".join(fill(line, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark),
+                          break_long_words=False, break_on_hyphens=False) for line in lines)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of words as columns, the last one as wide as it is."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def enumerated(names: Sequence[str], last: str) -> str:
+    """Names in a row, with a word before the last: "a, b or c"."""
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def area_lines(found: Sequence[Area], limit_m_per_km: float, units: DisplayUnits = UNITS["si"]) -> Iterator[str]:
+    """A table, or a sentence where there is none."""
+    (place, place_m), (iri, scale), decimals = units.place, units.iri, units.iri_decimals
+    limit = f"{limit_m_per_km / scale:.{decimals}f}" if scale != 1 else f"{limit_m_per_km:g}"
+    if not found:
+        yield f"Localized roughness: nowhere is the IRI over 25 ft above {limit} {iri}."
+        return
+    yield f"Localized roughness: where the IRI over 25 ft, which slides along, is above {limit} {iri}"
+    yield f"{'from ' + place:>10} {'to ' + place:>10} {'length ' + place:>9} {'worst ' + iri:>14} {'at ' + place:>10}"
+    for one in found:
+        error = known(one.worst_std_m_per_km)
+        worst = (f"{one.worst_m_per_km / scale:.{decimals}f}"
+                 + ("" if error is None else f" ± {error / scale:.{decimals}f}"))
+        start, end, length, at = (f"{value / place_m:.{units.place_decimals}f}" for value in (
+            one.start_m, one.end_m, one.end_m - one.start_m, one.worst_at_m))
+        yield f"{start:>10} {end:>10} {length:>9} {worst:>14} {at:>10}"
+
+
+def area_values(one: Area) -> dict[str, float | None]:
+    """By the names of their columns; None where nothing is known."""
+    return {"distance_start_m": one.start_m, "distance_end_m": one.end_m, "worst_m_per_km": one.worst_m_per_km,
+            "worst_std_m_per_km": known(one.worst_std_m_per_km), "worst_at_m": one.worst_at_m}

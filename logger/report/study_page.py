@@ -8,8 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from logger.report.charts import chart
-from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
-from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.document import (
+    EMPTY,
+    Html,
+    bullets,
+    concatenated,
+    document,
+    grid,
+    heading,
+    hint,
+    html,
+    paragraphs,
+    section,
+    tiles,
+)
 from logger.studies.all_studies import Carried
 from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Table, Word, word_of
 

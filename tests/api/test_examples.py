@@ -22,8 +22,8 @@ import ridelog
 from ..support.slow import slow
 
 MODULES = [importlib.import_module(one.name) for one in pkgutil.walk_packages(logger.api.__path__, "logger.api.")]
-SLOW = ("logger.api.lab_questions", "logger.api.diagnosis", "logger.api.fleet", "logger.api.fleet_questions",
-        "logger.api.bench", "logger.api.plan")
+SLOW = ("logger.api.lab.question", "logger.api.lab.diagnose", "logger.api.fleet", "logger.api.log_questions",
+        "logger.api.lab.bench", "logger.api.lab.plan")
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from logger.api.bench import known_effects, silent
-from logger.api.model_checks import check_model, predicted
-from logger.api.run_checks import checked_runs
+from logger.api.lab.bench import known_effects, silent
+from logger.api.lab.checks import check_model, checked_runs, predicted
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.lab.likelihood.priors import Tolerance

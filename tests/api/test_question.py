@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ridelog
-from logger.api.drive_questions import ModesCommand, ModesQuestion
+from logger.api.drive_questions import IriCommand, IriQuestion, ModesCommand, ModesQuestion, RandomRoadQuestion
 from logger.api.question import (
     Argument,
     Asking,
@@ -20,6 +20,7 @@ from logger.api.question import (
     Notify,
     Option,
     Question,
+    Range,
     Switches,
     Verb,
     askings,
@@ -27,8 +28,6 @@ from logger.api.question import (
     help_of,
     silent,
 )
-from logger.api.ranges import Range
-from logger.api.road_questions import IriCommand, IriQuestion, RandomRoadQuestion
 from logger.commands import options
 from logger.commands.main import ASKED
 from logger.errors import BadInput

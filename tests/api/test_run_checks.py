@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.run_checks import driven_stretches, thinned_runs
+from logger.api.lab.checks import driven_stretches, thinned_runs
 from logger.errors import BadInput
 from logger.runs import CLIPPED, NO_READING, READING, SKIP_S
 from logger.store.formats.drive_file import DriveOnRoad

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.diagnosis import records_of
+from logger.api.lab.diagnose import records_of
 from logger.errors import BadInput
 from logger.runs import BY_RECEIVER, BY_ROAD, RecordFacts
 from logger.store.formats.drive_file import Drive

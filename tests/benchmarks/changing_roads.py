@@ -42,7 +42,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
-from logger.report.placed_rows import column, iri_errors, placed
+from logger.report.placed import column, iri_errors, placed
 from logger.roads.sections import Windows, even_edges, sections
 from logger.roads.window_errors import WindowErrors
 from logger.service.signal_chain import GRID_STEP_US

@@ -30,11 +30,8 @@ from scipy.stats import norm
 
 from logger.api.fleet import fleet_summarise
 from logger.fleet.dataset import ROW_TYPES, Dataset
-from logger.fleet.drive_rows import filed_rows
-from logger.fleet.ingest import BATCH_ROWS
-from logger.fleet.log_columns import joined_columns
-from logger.fleet.pseudonyms import own_key, pseudonym
-from logger.fleet.road_cells import cell_keys, cells
+from logger.fleet.ingest import BATCH_ROWS, filed_rows, joined_columns, own_key, pseudonym
+from logger.fleet.road_map import cell_keys, cells
 from logger.units import WINDOW_M
 
 from ..support.drives.fleet_town import BLOCK_M, DRIVE_STD, WINDOW_STD, YEAR_S, Drives, Town, drives, town, write_logs

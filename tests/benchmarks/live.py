@@ -20,8 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.dump import Event, open_dump
-from logger.demo.motion import RoadStretch
-from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ridelog
-from logger.api.bench import among
-from logger.api.lab import bench_with
-from logger.api.lab_questions import CompareQuestion
-from logger.api.ranges import USUAL_TOLERANCE
+from logger.api.lab.bench import among, bench_with
+from logger.api.lab.question import CompareQuestion
+from logger.api.question import USUAL_TOLERANCE
 from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
 from logger.store.formats.effect_file import shipped_effects

@@ -13,10 +13,17 @@ import pytest
 import yaml
 
 from drivers.dump import DumpWriter, open_dump
-from drivers.readings import GPS, Event
-from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
+from drivers.events import GPS, Event
+from logger.demo.simulated_drive import (
+    LEAD_M,
+    SPACING_M,
+    Drive,
+    DrivePlan,
+    Reception,
+    RoadStretch,
+    record,
+    simulate_drive,
+)
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

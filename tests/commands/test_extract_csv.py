@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
-from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
+from logger.demo.simulated_drive import LEAD_M, SPACING_M, Drive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

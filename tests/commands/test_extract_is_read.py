@@ -12,10 +12,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from drivers.readings import GPS, Event
-from logger.demo.motion import RoadStretch
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
+from drivers.events import GPS, Event
+from logger.demo.simulated_drive import Drive, DrivePlan, Reception, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_drive
 from logger.store.formats.vehicle_file import read_vehicle

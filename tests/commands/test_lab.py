@@ -180,7 +180,7 @@ def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str],
 def test_no_more_files_are_written_than_were_looked_at(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("logger.api.lab_loop.MOST_ROUNDS", 1)
+    monkeypatch.setattr("logger.api.lab.loop.MOST_ROUNDS", 1)
     two = [*named("sensor_offset", offset_m=0.5), *named("time_offset", delay_s=0.02)]
     few = {one.effect.name: one.effect for one in two}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)

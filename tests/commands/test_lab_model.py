@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.api.bench import sought_effects
-from logger.api.outputs import check_out
-from logger.api.run_checks import checked_runs
+from logger.api.lab.bench import sought_effects
+from logger.api.lab.checks import checked_runs
+from logger.api.shown import check_out
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track

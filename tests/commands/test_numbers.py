@@ -7,8 +7,8 @@ from math import inf
 
 import pytest
 
-from logger.api.terms import named_numbers
-from logger.commands.numbers import add_number
+from logger.api.question import named_numbers
+from logger.commands.options import add_number
 from logger.errors import BadInput
 
 

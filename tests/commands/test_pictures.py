@@ -130,7 +130,7 @@ def test_a_fit_has_its_residuals_and_correlations(tmp_path: Path) -> None:
 
 
 def test_white_residuals_stay_in_the_band() -> None:
-    from logger.api.identify.charts import _left
+    from logger.api.identify.answer import _left
 
     white = [np.random.default_rng(seed).standard_normal(4000) for seed in (1, 2)]
     curves = _left(white)

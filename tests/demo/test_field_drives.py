@@ -12,7 +12,7 @@ import pytest
 
 from drivers.dump import open_dump
 from logger.demo import field_drives
-from logger.demo.motion import RoadStretch, body_acceleration, build_road, drive_along, sensed_acceleration
+from logger.demo.simulated_drive import RoadStretch, body_acceleration, build_road, drive_along, sensed_acceleration
 from logger.demo.unpacking import unpacked
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects

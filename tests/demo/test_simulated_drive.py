@@ -11,9 +11,16 @@ from scipy import signal
 
 from drivers.dump import open_dump
 from logger.demo import make
-from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import (
+    LEAD_M,
+    SPACING_M,
+    Drive,
+    DrivePlan,
+    Reception,
+    RoadStretch,
+    record,
+    simulate_drive,
+)
 from logger.roads import iso8608
 from logger.roads.iri import iri
 from logger.shipped import vehicle_file

@@ -14,7 +14,7 @@ import pytest
 from pyogrio.errors import DataSourceError
 
 from logger.exchange.format import formats, write_layer
-from logger.exchange.windows import windows_layer
+from logger.exchange.layer import windows_layer
 from logger.store.log.log_reader import LoggedFile
 
 from .test_convert import drive, eastwards

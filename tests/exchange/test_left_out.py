@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.run_checks import driven_stretches
+from logger.api.lab.checks import driven_stretches
 from logger.commands.main import main
 from logger.left_out import LeftOut, counting, left_out_json, left_out_lines
 from logger.profiles.track import Track

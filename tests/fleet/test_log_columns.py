@@ -15,7 +15,7 @@ import pytest
 from logger.api.fleet import fleet_summarise
 from logger.commands.main import main
 from logger.fleet.dataset import Dataset
-from logger.fleet.log_columns import columns_of
+from logger.fleet.ingest import columns_of
 from logger.store.log.row_format import HEADER, HEADERS, format_row, scan
 
 from ..support.drives.fleet_town import drives, records, town

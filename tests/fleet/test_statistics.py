@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from logger.fleet.car_biases import Variances, car_biases
-from logger.fleet.road_cells import SEGMENT_M, block_of, cell_keys, cells, section_of
-from logger.fleet.road_elimination import Elimination, RoadPasses
-from logger.fleet.road_figures import Sums, road_figures, significant
-from logger.fleet.road_map import RoadMap, pieces_of
+from logger.fleet.car_biases import Elimination, RoadPasses, Variances, car_biases
+from logger.fleet.road_map import SEGMENT_M, RoadMap, block_of, cell_keys, cells, pieces_of, section_of
+from logger.fleet.summary import Sums, road_figures, significant
 from logger.geodesy import EARTH_RADIUS_M, ground_distance_m
 
 SESSION_STD, PASS_STD = 0.05, 0.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.api.identify.words import common_words
+from logger.api.identify.answer import common_words
 from logger.identification.drive_model import VehicleModel
 from logger.identification.noise_models import RoadNoise
 from logger.identification.prediction_error_fit import FitOptions, fit

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.api.lab.compare import comparison_json, conclusion, evidence, headline
 from logger.lab.compare import Comparison, compare
-from logger.report.comparison_text import as_json, conclusion, evidence, headline
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -77,13 +77,13 @@ def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Compar
     residual = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
                            zip(residuals.runs, residuals.predictions, strict=True)])
     measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])
-    reported = as_json(lacking)
+    reported = comparison_json(lacking)
     assert reported["error"] == pytest.approx(np.sqrt(np.mean(residual**2) / np.mean(measured**2)))
     assert sum(run["samples"] for run in reported["runs"]) == len(residual)
 
 
 def test_json_has_what_the_format_names(lacking: Comparison) -> None:
-    reported = json.loads(json.dumps(as_json(lacking), allow_nan=False))
+    reported = json.loads(json.dumps(comparison_json(lacking), allow_nan=False))
     assert {"error", "runs", "where", "evidence", "refitted", "marks"} <= reported.keys()
     assert {"run", "error", "samples"} <= reported["runs"][0].keys()
     where = reported["where"]
@@ -104,5 +104,5 @@ def test_one_short_run() -> None:
                     speed_mps=run.speed_mps[:500])
     found = compare(SimulatedRuns([short]), CAR)
     assert np.isfinite(found.refitted.error)
-    json.dumps(as_json(found), allow_nan=False)
+    json.dumps(comparison_json(found), allow_nan=False)
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from logger.api.lab.compare import MOVED_HEADS, addition_json, bias, errors, judgement, moved_rows
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.sensor_drift import OFFSET, Drift
 from logger.lab.selection.add_effect import AddedEffects, Number
-from logger.report.add_effect_text import MOVED_HEADS, as_json, bias, errors, judgement, moved_rows
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.uncertain import NumberErrors
@@ -53,7 +53,7 @@ def test_what_is_removed_is_said_before_the_effect() -> None:
     drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
     found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
     assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). That has nothing to do")
-    assert as_json(found)["removed"]["drift"]["error_power_share"] == 0.4
+    assert addition_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
 def test_an_effect_that_does_not_help_is_warned_of() -> None:
@@ -105,7 +105,7 @@ def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
 
 
 def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was_added() -> None:
-    reported = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    reported = json.loads(json.dumps(addition_json(FOUND), allow_nan=False))
     assert {"effect", "parameters", "standard_errors", "error_before", "error_after"} <= reported.keys()
     assert reported["effect"] == "dry_friction" and reported["parameters"]["friction_force_n"] == 84.7
     assert reported["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.api.lab.diagnose import diagnosis_json, diagnosis_summary, looks_like, table, untested
 from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis
 from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.residual_tests import run_residual_tests
@@ -17,7 +18,6 @@ from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
 from logger.lab.selection.error_scale import JUDGED_ON, Step
-from logger.report.diagnosis_text import as_json, looks_like, summary, table, untested
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -61,7 +61,7 @@ def shape() -> Shape:
 
 
 def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
-    nothing, errors = summary(NOTHING)
+    nothing, errors = diagnosis_summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
     assert errors == ("Error on stretches that no fit saw: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit "
                       "84.8 %) with its numbers refitted. The sensor's noise alone makes about 0.150 (fit 85.0 %).")
@@ -69,7 +69,7 @@ def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
 
 
 def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() -> None:
-    missing, errors = summary(FOUND)
+    missing, errors = diagnosis_summary(FOUND)
     assert missing == (f"dry_friction is missing ({EFFECTS['dry_friction'].title}): friction_force_n 85 ± 4 N, "
                        "transition_velocity_m_per_s 0 m/s. The probability that noise alone looks like this, all "
                        "candidates together: below 1e-9.")
@@ -78,7 +78,7 @@ def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() ->
 
 
 def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
-    missing, left, *_ = summary(replace(FOUND, excess=0.5))
+    missing, left, *_ = diagnosis_summary(replace(FOUND, excess=0.5))
     assert "dry_friction would explain part of what is missing, or imitates something else" in missing
     assert left == ("Something more is missing that no candidate explains: in the worst run the residual is 1.5 times "
                     "the sensor's noise.")
@@ -86,17 +86,17 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
 
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
     found = replace(NOTHING, excess=2.0)
-    left, _ = summary(found)
+    left, _ = diagnosis_summary(found)
     assert left == ("Something is missing that no candidate explains: in the worst run the residual is 3 times the "
                     "sensor's noise.")
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
-    _, imitation, _ = summary(imitating)
+    _, imitation, _ = diagnosis_summary(imitating)
     assert imitation.startswith("Candidates that improve the fit by less than 10% of what a full explanation would")
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
     found = replace(NOTHING, conflicts={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13})
-    conflict, _ = summary(found)
+    conflict, _ = diagnosis_summary(found)
     assert found.unexplained and not found.exceeds_noise
     assert conflict.startswith("These numbers of the vehicle's file are beyond their tolerance: "
                                "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
@@ -104,35 +104,35 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
 
 def test_distances_that_are_off_are_reported() -> None:
     off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
-    assert any("up to 0.34 m. That makes 40% of" in one for one in summary(off))
+    assert any("up to 0.34 m. That makes 40% of" in one for one in diagnosis_summary(off))
 
 
 def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them() -> None:
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
     found = replace(FOUND, candidates=(alike, *OTHERS))
-    verdict, drives, *_ = summary(found)
+    verdict, drives, *_ = diagnosis_summary(found)
     assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
                               "distinguish them. The numbers are for dry_friction (")
     assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain about as much of the residual as ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives
-    assert as_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
-    assert as_json(FOUND)["groups"] == [["dry_friction"]] and as_json(NOTHING)["groups"] == []
+    assert diagnosis_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
+    assert diagnosis_json(FOUND)["groups"] == [["dry_friction"]] and diagnosis_json(NOTHING)["groups"] == []
 
 
 def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> None:
     near = candidate("sensor_gain", 0.008, 15.6)
-    *_, said = summary(replace(NOTHING, candidates=(near, OTHERS[0])))
+    *_, said = diagnosis_summary(replace(NOTHING, candidates=(near, OTHERS[0])))
     assert said == ("sensor_gain comes near to being named: noise alone would look like it in 0.8% of such searches, "
                     f"and 0.1% is the most that is allowed. To know: {EFFECTS['sensor_gain'].shown_by}.")
-    assert not any("comes near" in one for one in (*summary(NOTHING), *summary(FOUND)))
+    assert not any("comes near" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:
     steps = (*FOUND.steps[:2], Step("with tire_damping", 0.2), *FOUND.steps[2:])
-    assert summary(replace(FOUND, steps=steps))[-1] == (
+    assert diagnosis_summary(replace(FOUND, steps=steps))[-1] == (
         "Added during the search and dropped again, because the others explain it: tire_damping.")
-    assert not any("dropped again" in one for one in summary(FOUND))
+    assert not any("dropped again" in one for one in diagnosis_summary(FOUND))
 
 
 def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
@@ -164,7 +164,7 @@ def test_the_table_has_the_candidates_in_order_with_errors_where_they_are_known(
 
 
 def test_the_object_has_what_the_contract_promises() -> None:
-    reported = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    reported = json.loads(json.dumps(diagnosis_json(FOUND), allow_nan=False))
     assert {"baseline_error", "noise_floor_error", "candidates", "verdict", "unexplained"} <= reported.keys()
     assert (reported["baseline_error"], reported["noise_floor_error"]) == (0.31, 0.15)
     assert reported["verdict"] == ["dry_friction"] and reported["unexplained"] is False
@@ -181,13 +181,13 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
     found = replace(FOUND, excess=0.5, shape=shape, conflicts={"sprung_mass_kg": -0.13}, obstacles={
         "roll": "one track is known", "sensor_offset": ALREADY_PRESENT}, undetectable=(
             Undetectable(EFFECTS["wheel_lift"], 0.1),))
-    reported = json.loads(json.dumps(as_json(found), allow_nan=False))
+    reported = json.loads(json.dumps(diagnosis_json(found), allow_nan=False))
     assert reported["unexplained"] is True and reported["left_over_noise"] == 1.5
     assert reported["numbers_off_too_far"] == {"sprung_mass_kg": -0.13}
     assert reported["not_tried"] == {"roll": "one track is known"} and reported["hidden"] == {"wheel_lift": 0.1}
     assert reported["judged_on"] == JUDGED_ON
     assert reported["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
-    assert reported["sentences"] == [*summary(found), *looks_like(found)]
+    assert reported["sentences"] == [*diagnosis_summary(found), *looks_like(found)]
     seen = reported["unexplained_shape"]
     assert seen["repeats_every_m"] == pytest.approx(2 * np.pi * 0.31, rel=0.02)
     assert sum(part["error_power_share"] for part in seen["frequency"]) == pytest.approx(1.0, abs=0.05)
@@ -196,5 +196,5 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
 
 
 def test_a_diagnosis_that_lacks_nothing_has_an_empty_verdict() -> None:
-    reported = as_json(NOTHING)
+    reported = diagnosis_json(NOTHING)
     assert reported["verdict"] == [] and reported["unexplained"] is False and reported["unexplained_shape"] is None

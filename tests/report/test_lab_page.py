@@ -8,9 +8,8 @@ from html.parser import HTMLParser
 
 import pytest
 
+from logger.api.lab.compare import evidence, headline, page
 from logger.lab.compare import Comparison, compare
-from logger.report.comparison_text import evidence, headline
-from logger.report.lab_page import page
 
 from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs_of
 

@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 from logger.commands import main
 from logger.commands import report as report_command
 from logger.errors import BadInput
-from logger.report.page import FLAG_MEANINGS, page
-from logger.report.track_data import track_data
+from logger.report.page import FLAG_MEANINGS, page, track_data
 from logger.store.formats.road_lines import read_road_lines
 from logger.store.log.log_reader import LoggedFile
 from logger.store.log.row_format import COLUMNS, HEADER, format_row
@@ -274,7 +273,8 @@ def test_roads_of_every_kind_are_read(tmp_path: Path) -> None:
         ([46.5, 46.5], [6.5, 6.6]), ([2, 4], [1, 3]), ([6, 8], [5, 7])]
 
 
-@pytest.mark.parametrize("address", ["logs", "https://host/{z}/{x}.png", "https://h/{z}/{x}/{y}';script-src *", "http://["])
+@pytest.mark.parametrize("address", ["logs", "https://host/{z}/{x}.png", "https://h/{z}/{x}/{y}';script-src *",
+                                     "http://["])
 def test_an_address_of_no_street_pictures_is_refused(drive, tmp_path: Path, address: str) -> None:
     write_log(tmp_path / "00001-001.csv", drive(2))
     with pytest.raises(BadInput, match="--tiles: expected an address such as https"):

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.report.places_passed import places_passed
-from logger.report.summary import summarise
-from logger.report.terminal import date_words
-from logger.report.track_views import track_views
+from logger.report.page import track_views
+from logger.report.placed import places_passed
+from logger.report.summary import date_words, summarise
 
 from ..support.drives.logged_rows import repeated_drives
 
@@ -49,6 +48,6 @@ def test_a_page_of_too_many_windows_says_that_drives_lie_over_each_other(monkeyp
     rows = repeated_drives(2, 20, (2.0, 3.0))
     drives = [date_words(summarise(rows[part])) for part in (slice(20), slice(20, None))]
     assert "colour is that of their mean" in str(track_views(rows, summarise(rows), "", drives))
-    monkeypatch.setattr("logger.report.track_views.MOST_ROWS", 30)
+    monkeypatch.setattr("logger.report.page.MOST_ROWS", 30)
     page = str(track_views(rows, summarise(rows), "", drives))
     assert "More than 30 windows" in page and "ridelog passes" in page and "colour is that of" not in page

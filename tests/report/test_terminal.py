@@ -2,8 +2,7 @@
 
 import pytest
 
-from logger.report.summary import summarise
-from logger.report.terminal import date_words, distance_words, screen, span_words
+from logger.report.summary import date_words, distance_words, screen, span_words, summarise
 
 ROUGH = {3: {"iri_m_per_km": 14.2, "iri_std_m_per_km": 2.1, "iri_class": "D", "comfort": "very_uncomfortable"}}
 

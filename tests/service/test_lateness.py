@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.demo.motion import RoadStretch
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import DrivePlan, simulate_drive
+from logger.demo.simulated_drive import DrivePlan, Reception, RoadStretch, simulate_drive
 from logger.service.config import Config, GpsConfig
 from logger.service.pipeline import FIX_DELAY_US, LONGEST_LAG_US, longest_wait_us
 from logger.shipped import vehicle_file

@@ -7,7 +7,7 @@ from statistics import fmean
 
 import pytest
 
-from logger.report.placed_rows import placed
+from logger.report.placed import placed
 
 from ..support.drives.lines import (
     SATELLITES,

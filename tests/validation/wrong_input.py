@@ -19,9 +19,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from logger.api.bench import known_effects, silent
-from logger.api.model_checks import check_model
-from logger.api.run_checks import checked_runs
+from logger.api.lab.bench import known_effects, silent
+from logger.api.lab.checks import check_model, checked_runs
 from logger.errors import BadInput
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.likelihood.priors import Tolerance

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from logger.api.bench import among, known_effects
+from logger.api.lab.bench import among, known_effects
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import own_effect, shipped_effects

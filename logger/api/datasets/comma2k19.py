@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import DrivenWindows, Recording, driven_windows
-from logger.api.road_sets import expected_files, from_folder
+from logger.api.road_sets import DrivenWindows, Recording, driven_windows, expected_files, from_folder
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M

@@ -18,18 +18,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import (
+from logger.api.road_sets import (
+    NOT_RUN,
+    REPEAT_COLUMNS,
     WINDOWS_M,
+    Compared,
     DrivenWindows,
     Recording,
+    along,
+    compared_table,
     each_pass,
+    expected_files,
+    from_folder,
     on_line,
+    repeat_row,
     runs_of,
     unit_by_gravity,
+    verdict_of,
     windows_of,
 )
-from logger.api.road_sets import NOT_RUN, expected_files, from_folder
-from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.files import read_bounded

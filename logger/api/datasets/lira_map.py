@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_sets import expected_files, from_folder
-from logger.api.road_tables import REPEAT_COLUMNS, repeat_row
+from logger.api.road_sets import REPEAT_COLUMNS, expected_files, from_folder, repeat_row
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput

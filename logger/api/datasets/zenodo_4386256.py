@@ -15,16 +15,22 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import (
+from logger.api.road_sets import (
+    NOT_RUN,
+    REPEAT_R2,
     WINDOWS_M,
+    Compared,
     DrivenWindows,
     Recording,
+    along,
+    compared_table,
     driven_windows,
     each_pass,
+    expected_files,
+    from_folder,
     unit_by_gravity,
+    verdict_of,
 )
-from logger.api.road_sets import NOT_RUN, expected_files, from_folder
-from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table

@@ -1,40 +1,52 @@
-"""Vehicle parameters, and those of effects and roads, from drives: a grey-box prediction-error fit."""
+"""Vehicle parameters, and those of effects and roads, from drives: a grey-box prediction-error fit.
+
+A fit in plain words: what was found, how sure it is, and whether to believe it.
+
+A fit without a measured road, in plain words and for a program.
+
+A fit as pictures: its residuals, and which numbers can be estimated only together.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.bench import slow_words
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
-from logger.api.lab import word_of
-from logger.api.model_checks import check_roads
-from logger.api.question import function
+from logger.api.lab.bench import slow_words, word_of
+from logger.api.lab.checks import check_roads
+from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
-from logger.api.terms import each, paths_of
 from logger.api.vehicles import Model, model_of
+from logger.chart_data import Bars, Chart, Curves, Line
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
+from logger.identification.noise_models import UNTESTED, Test, autocorrelation, cross_correlation
+from logger.identification.prediction_error_fit import Fit, least_share
+from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET
+from logger.identification.unknown_road.road_fit import RoadFit
+from logger.lab.readings_fit import ReadingsFit
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import SKIP_S, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import vehicle_file
+from logger.vehicle.named_parameters import Coordinates, Free
 
 if TYPE_CHECKING:
-    from logger.chart_data import Chart
-    from logger.identification.drive_model import DriveModel
-    from logger.identification.prediction_error_fit import Fit, FitOptions
+    from logger.identification.prediction_error_fit import FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
-    from logger.identification.unknown_road.road_fit import RoadFit
-    from logger.vehicle.named_parameters import Free
     from logger.vehicle.uncertain import NumberErrors
+
 
 Array = npt.NDArray[np.float64]
 
@@ -91,8 +103,6 @@ class Identification(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """Of the residuals, and of numbers that err together."""
-        from logger.api.identify.charts import charts
-
         return charts(self.fit)
 
     def write(self, path: Path, option: str = "--out") -> None:
@@ -171,7 +181,6 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
 
 def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``."""
-    from logger.api.identify.words import as_json, common_words, doubts, lines, record_json, record_words, tests
     from logger.identification.session import UnusableRun, error_before
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.lab.readings_fit import fit_to_readings
@@ -198,10 +207,10 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     model, checks = found.model, tests(found.model, found.fit)
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
-    text = [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
+    text = [_head(given, len(fit.free), records, low), *measured_lines(fit, *checks), *common_words(model, common),
             *record_words(found), *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
-        "\n".join(text), as_json(fit, *checks) | record_json(found, common, records)
+        "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
         tuple(doubts(fit, *checks)))
 
@@ -354,7 +363,6 @@ def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
 def _on_unmeasured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
     """The fit over roads that were not measured: one for all runs, or one for each. BadInput and ``NotIdentifiable`` as
     ``identify``."""
-    from logger.api.identify.unmeasured_words import as_json, lines
     from logger.identification.session import UnusableRun, drives_of
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.road_fit import fit_roads
@@ -377,10 +385,10 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
     model = vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))), errors=_road_fit_errors(fit))
-    text = [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters),
+    text = [_head(given, len(parameters), records, f"; over {where}", ","), *unmeasured_lines(fit, parameters),
             *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
-        "\n".join(text), {**as_json(fit, parameters), "runs": [record.name for record in records],
+        "\n".join(text), {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
                           **left_out_json(runs_left_out(records))}, fit, model_of(model),
         tuple(finding.words for finding in fit.verdict))
 
@@ -414,3 +422,289 @@ def _head(given: vehicle_file.Model, free: int, records: Sequence[Record], more:
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, "
             f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} the "
             f"first {records[0].skip_s:g} s of a run left out")
+
+
+NORMAL_95 = 1.959964
+_MENTIONED = 0.7
+_DOUBTFUL = 0.1
+
+
+def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
+    """Whether the fit's residuals are white, and whether they are free of the road; untested where they are no more
+    than the predictions' own inaccuracy."""
+    if fit.error_after < least_share(model):
+        return UNTESTED, UNTESTED
+    inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
+              zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
+    return (autocorrelation(fit.white, fit.noise.parameters - 1),
+            cross_correlation(fit.white, inputs, fit.sensitivities))
+
+
+def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
+    """All of it for a program; null where nothing is known."""
+    names = list(fit.parameters)
+    return {
+        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
+        "error_before": fit.error_before, "error_after": fit.error_after, "converged": fit.converged,
+        "start": {one.name: one.start for one in fit.free},
+        "bounds": {one.name: [one.low, one.high] for one in fit.free},
+        "interval_95": {name: list(interval(fit, name)) for name in names},
+        "correlation": {name: dict(zip(names, row, strict=True))
+                        for name, row in zip(names, fit.correlation.tolist(), strict=True)},
+        "at_bound": fit.at_bound, "iterations": fit.iterations,
+        "noise": {"model": fit.noise.name, **fit.noise.levels},
+        "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
+        "cannot_tell": list(doubts(fit, white, free_of_road)),
+    }
+
+
+def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+    """What stands between the estimates and their being believed, each in words; nothing when all is well."""
+    yield from (finding.words for finding in fit.verdict)
+    if not fit.converged:
+        yield "the fit did not converge."
+    if fit.at_bound:
+        yield f"{', '.join(fit.at_bound)} ended at a bound, which is where it was stopped and not what was measured."
+    if not white.passed:
+        yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
+               "errors are a guide only.")
+    if not free_of_road.passed:
+        yield (f"residuals follow the road (p = {free_of_road.p_value:.2g}): the model lacks something of the car or "
+               "of the road, and the estimates are biased by it.")
+
+
+def _p_value(test: Test) -> float | None:
+    return test.p_value if test.degrees else None
+
+
+def interval(fit: Fit, name: str) -> tuple[float, float]:
+    """The 95 % interval of an estimate; of a size in the logarithm, so that it stays above 0."""
+    value, error = fit.parameters[name], fit.standard_errors[name]
+    if next(one for one in fit.free if one.name == name).by_factors:
+        factor = float(np.exp(NORMAL_95 * error / value))
+        return value / factor, value * factor
+    return value - NORMAL_95 * error, value + NORMAL_95 * error
+
+
+def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+    """What a person reads."""
+    steps = f"{fit.iterations} steps"
+    yield (f"Converged in {steps}." if fit.converged else
+           f"NOT CONVERGED in {steps}: do not use these values; try other starts (--start, --tries) or fewer numbers.")
+    if len(fit.ends) > 1:
+        yield _ends(fit)
+    yield (f"Error, rms of measured minus model over rms of measured: {fit.error_before:.4f} before, "
+           f"{fit.error_after:.4f} after.")
+    yield ""
+    yield from _table(fit)
+    yield ""
+    yield f"The residual is modelled as {fit.noise.words}."
+    yield from _measured_correlations(fit)
+    yield from _checks(white, free_of_road)
+    yield from _measured_limits(fit, sound=not any(doubts(fit, white, free_of_road)))
+
+
+def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
+    """Whether drives over one obstacle, or one profile, were over one road, and what that means for the errors."""
+    runs = len(model.records)
+    if common.share:
+        yield (f"These {runs} runs are over one road: they share {common.share:.0%} of the roughness that the profile "
+               f"does not contain. The standard errors count that; they are up to {common.growth:.2f} times those of "
+               "runs over roads of their own.")
+    elif may_have_common(model) and common.fit.noise.name != "road":
+        yield (f"If these {runs} runs are over one and the same place, the error of its profile is the same in all of "
+               f"them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
+
+
+def record_words(found: ReadingsFit) -> Iterator[str]:
+    """What of the records was used in addition to their samples."""
+    if found.rounded:
+        yield "Readings are rounded: each says in which step it was, and no more (step_mps2 in run.yaml)."
+    if found.moved_m:
+        yield (f"Places are uncertain (place_std_m in run.yaml): they were corrected by up to {found.moved_m:.2g} m, "
+               "and the standard errors include that uncertainty.")
+
+
+def record_json(found: ReadingsFit, common: CommonRoughness, records: Sequence[Record]) -> dict[str, Any]:
+    """The same as an object."""
+    return {"common_roughness": common.share, "rounding_by_bounds": found.rounded, "moved_m": found.moved_m,
+            "runs": [record.name for record in records]}
+
+
+def _ends(fit: Fit) -> str:
+    scale = np.array([fit.standard_errors[one.name] for one in fit.free])
+    best = fit.ends[np.argmin(np.abs((fit.ends - np.array(list(fit.parameters.values()))) / scale).max(axis=1))]
+    same = int((np.abs((fit.ends - best) / scale).max(axis=1) < 1.0).sum())
+    return f"{same} of {len(fit.ends)} starts end at the same place; the best of all is taken."
+
+
+def _table(fit: Fit) -> Iterator[str]:
+    width = max(len("parameter"), *map(len, fit.parameters))
+    yield (f"{'parameter':{width}} {'start':>10} {'estimate':>10} {'std. error':>11} {'relative':>9}   "
+           f"{'95 % interval':^21}  moved")
+    for one in fit.free:
+        value, error = fit.parameters[one.name], fit.standard_errors[one.name]
+        low, high = interval(fit, one.name)
+        relative = f"{error / abs(value):.2%}" if one.by_factors else "-"
+        moved = f"{value / one.start - 1:+.1%}" if one.by_factors else f"{value - one.start:+.3g}"
+        mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
+        yield (f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g} {relative:>9}   "
+               f"{low:9.5g} to {high:9.5g}  {moved}{mark}")
+
+
+def _measured_correlations(fit: Fit) -> Iterator[str]:
+    names = list(fit.parameters)
+    pairs = [(abs(fit.correlation[i, j]), fit.correlation[i, j], names[i], names[j])
+             for j in range(len(names)) for i in range(j)]
+    large = sorted((pair for pair in pairs if pair[0] > _MENTIONED), reverse=True)
+    if large:
+        yield f"Estimates that err together (correlation beyond {_MENTIONED:g}): " + "; ".join(
+            f"{first} and {second} {value:+.2f}" for _, value, first, second in large) + "."
+
+
+def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
+    if white.degrees:
+        yield (f"Are residuals white (Ljung-Box)? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
+               + ("yes, standard errors can be trusted." if white.passed else
+                  "no, the noise model is incomplete; the standard errors are a guide only."))
+    if not white.degrees and not free_of_road.degrees:
+        yield "There is no residual to test."
+    if free_of_road.degrees:
+        yield (f"Do residuals follow the road? p = {free_of_road.p_value:.2g} over {free_of_road.degrees} degrees of "
+               "freedom: " + ("no." if free_of_road.passed else
+                              "yes, the model lacks something of the car, and the estimates are biased by that."))
+
+
+def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
+    if fit.at_bound:
+        yield (f"At a bound: {', '.join(fit.at_bound)}. That is where it was stopped, not what was measured; its "
+               "standard error means nothing. Widen --bounds, or ask what the model lacks.")
+        if fit.noise.name != "white":
+            yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
+                   "at a time: try --noise white.")
+    for finding in fit.verdict:
+        yield f"Cannot tell: {finding.words}"
+    sizes = [one.name for one in fit.free if one.by_factors]
+    vague = {name: error / abs(fit.parameters[name]) for name, error in fit.standard_errors.items()
+             if name in sizes and error > _DOUBTFUL * abs(fit.parameters[name])}
+    if vague:
+        listed = ", ".join(f"{name} ({share:.0%})" for name, share in vague.items())
+        yield f"Poorly determined by these runs: {listed}."
+    elif sound:
+        yield "These runs determine all that was asked."
+    if len(fit.parameters) > 1:
+        yield _least_known(fit)
+
+
+def _least_known(fit: Fit) -> str:
+    """The combination that is known worst: the longest axis of the error ellipsoid in relative changes."""
+    names = list(fit.parameters)
+    scale = np.abs(Coordinates(fit.free).slopes(np.array(list(fit.parameters.values()))))
+    powers, directions = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
+    ends = [directions[:, 0], directions[:, -1]]
+    said = []
+    for direction, power in zip(ends, (powers[0], powers[-1]), strict=True):
+        shares = direction / direction[np.argmax(np.abs(direction))]
+        large = sorted(zip(-np.abs(shares), names, shares, strict=True))[:4]
+        along = ", ".join(f"{name} {share:+.2f}" for size, name, share in large if -size > 0.1)
+        said.append(f"{along} ({np.sqrt(max(power, 0.0)):.2%})")
+    return f"Known best in the combination {said[0]}, worst in {said[1]}."
+
+
+_UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
+
+
+def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
+    """All of it for a program."""
+    return {
+        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
+        "error_before": _finite(fit.error_before), "error_after": _finite(fit.error_after), "converged": fit.converged,
+        "start": {one.name: one.start for one in free}, "bounds": {one.name: [one.low, one.high] for one in free},
+        "road": fit.roads, "road_standard_errors": fit.road_errors,
+        "correlation": {first: {second: float(value) for second, value in zip(fit.names, row, strict=True)}
+                        for first, row in zip(fit.names, _correlation(fit), strict=True)},
+        "at_bound": fit.at_bound, "iterations": fit.iterations,
+        "cannot_tell": [finding.words for finding in fit.verdict],
+    }
+
+
+def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
+    """What a person reads."""
+    yield (f"Converged in {fit.iterations} steps." if fit.converged else
+           f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start) or free less.")
+    yield (f"Residual over the most probable road, rms over that of the readings: {fit.error_before:.4f} before, "
+           f"{fit.error_after:.4f} after.")
+    yield ""
+    width = max(map(len, [*fit.parameters, *fit.roads]))
+    yield f"{'parameter':{width}} {'start':>10} {'estimate':>10} {'std. error':>11}   {'95 % interval':^21}"
+    for one in free:
+        value, error = fit.parameters[one.name], fit.standard_errors[one.name]
+        mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
+        yield f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g}   {_between(value, error)}{mark}"
+    for name, value in fit.roads.items():
+        error = fit.road_errors[name]
+        unit = _UNITS.get(name.rpartition(".")[2], "")
+        yield f"{name:{width}} {'':10} {value:10.4g} {error:11.3g}   {_between(value, error)}  {unit}"
+    yield ""
+    yield from _unmeasured_limits(fit, free)
+
+
+def _between(value: float, error: float) -> str:
+    return f"{value - NORMAL_95 * error:9.5g} to {value + NORMAL_95 * error:9.5g}"
+
+
+def _unmeasured_limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
+    correlation = _correlation(fit)
+    pairs = sorted(((abs(correlation[i, j]), correlation[i, j], fit.names[i], fit.names[j])
+                    for j in range(len(fit.names)) for i in range(j)), reverse=True)
+    if large := [f"{first} and {second} {value:+.2f}" for size, value, first, second in pairs if size > _MENTIONED]:
+        yield f"Estimates that err together (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
+    for finding in fit.verdict:
+        yield f"Cannot tell: {finding.words}"
+    sizes = [one.name for one in free if one.by_factors]
+    vague = {name: fit.standard_errors[name] / abs(fit.parameters[name]) for name in sizes}
+    if rough := [f"{name} ({share:.0%})" for name, share in vague.items() if share > _DOUBTFUL]:
+        yield (f"Poorly determined without the road's profile: {', '.join(rough)}. Several drives over one road at "
+               "different speeds (--same-road) determine them better.")
+    yield ("The road is assumed to be one of ISO 8608 with this waviness; bumps, holes or a spectrum of another shape "
+           "bias the estimates. Masses, springs and dampers are known only relative to those that were held fixed.")
+
+
+def _correlation(fit: RoadFit) -> np.ndarray:
+    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
+    return np.asarray(fit.covariance / np.outer(deviations, deviations))
+
+
+def _finite(error: float) -> float | None:
+    return error if np.isfinite(error) else None
+
+
+_LAGS, _MOST_PAIRS = 50, 12
+
+
+def charts(fit: Fit | RoadFit) -> list[Chart]:
+    """Of a fit on measured roads the residuals' autocorrelation, with the band that chance stays in; of every fit with
+    two numbers or more how they hang together."""
+    pairs = _fit_correlations(fit)
+    return [*([_left(fit.white)] if isinstance(fit, Fit) else []), *([pairs] if pairs.bars else [])]
+
+
+def _left(white: list[Array]) -> Curves:
+    """G. M. Ljung and G. E. P. Box 1978: of white residuals each is nearly normal, of variance 1 / n."""
+    count, power = sum(map(len, white)), max(sum(float(one @ one) for one in white), 1e-300)
+    lags = np.arange(1, min(_LAGS, min(map(len, white)) - 1) + 1)
+    found = np.array([sum(float(one[lag:] @ one[:-lag]) for one in white) for lag in lags]) / power
+    bound = np.full(len(lags), NORMAL_95 / np.sqrt(count))
+    return Curves("Autocorrelation of the residuals", "lag [samples]", "correlation", (
+        Line("residuals", lags.astype(np.float64), found),
+        Line("95 % of chance", lags.astype(np.float64), bound, faint=True),
+        Line("", lags.astype(np.float64), -bound, faint=True)), (0.0, ""))
+
+
+def _fit_correlations(fit: Fit | RoadFit) -> Bars:
+    names = fit.names if isinstance(fit, RoadFit) else list(fit.parameters)
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
+    correlation = fit.covariance / np.outer(errors, errors)
+    pairs = [(f"{names[i]}, {names[j]}", float(correlation[i, j])) for i, j in combinations(range(len(names)), 2)]
+    pairs.sort(key=lambda pair: -abs(pair[1]))
+    return Bars("Numbers that err together", "correlation of their errors", tuple(pairs[:_MOST_PAIRS]))

@@ -6,9 +6,22 @@ from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
-from logger.api.question import Argument, Entries, LongQuestion, Option, Out, Switches, Verb
-from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
-from logger.api.terms import Anyway, Runs, VehicleName, names_of
+from logger.api.question import (
+    NOISE_MODELS,
+    TRIES,
+    WAVINESS,
+    Anyway,
+    Argument,
+    Entries,
+    LongQuestion,
+    Option,
+    Out,
+    Runs,
+    Switches,
+    VehicleName,
+    Verb,
+    names_of,
+)
 
 OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
 """What lies on a road, and its numbers beside ``start_m``."""

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from logger.exchange.format import Format
-from logger.exchange.geometry import DECIMALS, Geometry, Line
-from logger.exchange.layer import Layer
-from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
+from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Geometry, Layer, Line, type_of
 
 
 class GeoJson(Format):

@@ -11,8 +11,7 @@ from itertools import groupby
 from xml.sax.saxutils import escape
 
 from logger.exchange.format import Format
-from logger.exchange.geometry import DECIMALS
-from logger.exchange.layer import Feature, Layer
+from logger.exchange.layer import DECIMALS, Feature, Layer
 
 _SPACE = "urn:x-ridelog:values:1"
 _IN_THE_POINT = {"lat_deg", "lon_deg", "t_utc"}

@@ -9,8 +9,7 @@ from typing import Any
 
 from logger.exchange.arrow_table import GEOMETRY, arrow_table
 from logger.exchange.format import Format
-from logger.exchange.layer import Layer
-from logger.exchange.wkb import TYPE_NAMES, type_of
+from logger.exchange.layer import TYPE_NAMES, Layer, type_of
 
 
 class GeoParquet(Format):

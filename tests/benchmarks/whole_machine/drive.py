@@ -21,8 +21,7 @@ from types import TracebackType
 from typing import Self
 
 from drivers.dump import DumpHeader, DumpWriter, Event, open_dump
-from logger.demo.motion import RoadStretch
-from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

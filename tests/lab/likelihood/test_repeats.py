@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.api.lab.compare import comparison_json, headline
 from logger.lab.compare import compare
 from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.repeats import find_repeats
 from logger.profiles.excitation import Excitation
-from logger.report.comparison_text import as_json, headline
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -57,7 +57,7 @@ def test_a_comparison_says_so() -> None:
     found = compare(SimulatedRuns(rig_runs((2, 3))), CAR)
     (line,) = [one for one in headline(found) if "repeat each other" in one]
     assert re.match(r"run2 and run3 repeat each other and differ by 0\.(19|2|21|22) m/s2 r\.m\.s\. from", line)
-    assert as_json(found)["repeats"]["deviation_mps2"] == pytest.approx(LEVEL, rel=0.1)
+    assert comparison_json(found)["repeats"]["deviation_mps2"] == pytest.approx(LEVEL, rel=0.1)
 
 
 def test_drives_and_other_excitations_repeat_nothing() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.lab.words import error_text, paired
 from logger.lab.residuals.breakdown import Part, breakdown
-from logger.report.residual_text import error_text, paired
 from logger.runs import Run, short_names
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with

@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
+from logger.api.lab.diagnose import diagnosis_summary
 from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.growing_power import growing_power, steady_power
 from logger.lab.residuals.noise_colour import is_monotonic, rising_levels
-from logger.report.diagnosis_text import summary
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
@@ -81,7 +81,7 @@ def test_a_sensor_whose_noise_has_a_colour_lacks_no_physics() -> None:
     found = diagnose(posterior_of(louder_runs), FEW)
     assert found.coloured and not found.unexplained and not found.verdict
     assert found.noise.deviation_mps2 == pytest.approx(0.2, rel=0.2)
-    assert "louder at some frequencies" in " ".join(summary(found))
+    assert "louder at some frequencies" in " ".join(diagnosis_summary(found))
 
 
 @pytest.mark.slow

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from logger.api.lab.compare import comparison_json, conclusion, evidence, headline
 from logger.lab.compare import Comparison, compare
 from logger.lab.likelihood.record_band import with_pass_bands
-from logger.report.comparison_text import as_json, conclusion, evidence, headline
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
@@ -42,7 +42,7 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     assert "The sensor drifts (exponential, " in said and "That has nothing to do with the car" in said
     assert evidence(found) == ["No test finds more than noise in the residual."] and not found.missing
     assert conclusion(found).startswith("Nothing else is missing")
-    shown = as_json(found)
+    shown = comparison_json(found)
     assert shown["error"] == found.plain.error and shown["error_without_drift"] == removed.error
     assert shown["removed"]["drift"]["runs"][0]["time_s"] == pytest.approx(9.0, rel=0.1)
 

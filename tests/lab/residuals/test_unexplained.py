@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from logger.api.lab.words import line_sentence, looks_like
 from logger.lab.diagnosis import refit
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import shape_of, spatial_line_of
-from logger.report.residual_text import line_sentence, looks_like
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.api.bench import tolerance_of
+from logger.api.lab.bench import tolerance_of
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.standard_errors import standard_errors

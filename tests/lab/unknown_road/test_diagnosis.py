@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.lab.diagnose import same_road_json
 from logger.identification.unknown_road.marginal_likelihood import at_n0
 from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
@@ -25,7 +26,6 @@ from logger.lab.unknown_road.likelihood import (
 )
 from logger.lab.unknown_road.one_road import certain_two_roads, possible_two_roads, road_agreements
 from logger.profiles.track import Track
-from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.runs import Run
 from logger.shipped import vehicle_file
@@ -142,7 +142,7 @@ def test_what_may_only_imitate_is_not_named() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0, imitation=200.0)
     assert one.helps(0.3) and one.may_imitate and not replace(one, imitation=50.0).may_imitate
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
-    reported = as_json(found)
+    reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
     assert any(words.startswith("Not decided: tire_damping would explain a little") for words in reported["sentences"])
 
@@ -268,7 +268,7 @@ def test_what_was_not_fitted_says_so() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
-    reported = as_json(found)
+    reported = same_road_json(found)
     assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
     assert reported["maybe_over_two_roads"] == [["slow", "brisk"]]
     assert any(words.startswith("Whether slow and brisk are over one road") for words in reported["sentences"])

@@ -17,9 +17,7 @@ import numpy as np
 
 from drivers.dump import DumpHeader, Event
 from logger.demo.make import PLAN
-from logger.demo.motion import STEP_S, DriveMotion
-from logger.demo.receiver import Reception, transmit
-from logger.demo.simulated_drive import GPS_BAUD, simulate_drive
+from logger.demo.simulated_drive import GPS_BAUD, STEP_S, DriveMotion, Reception, simulate_drive, transmit
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

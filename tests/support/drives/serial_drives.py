@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 
 from drivers.dump import Event
-from logger.demo.motion import RoadStretch
-from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
+from logger.demo.simulated_drive import Drive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

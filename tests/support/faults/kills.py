@@ -26,8 +26,7 @@ from unittest.mock import patch
 
 from drivers.dump import Event, intact_bytes, open_dump
 from logger.commands.status import advice, screen
-from logger.demo.motion import RoadStretch
-from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from logger.report.document import document, grid, paragraphs, section
-from logger.report.html import Html, html
+from logger.report.document import Html, document, grid, html, paragraphs, section
 
 from ..cases.random_case import WRONG_FOR_S, WRONG_MPS
 from ..cases.seeds import RELEASE_SEEDS

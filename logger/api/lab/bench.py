@@ -1,0 +1,341 @@
+"""A model and runs on it, checked together, and what the lab does with them.
+
+Problem: a user of the lab, at a terminal or in a notebook, brings a vehicle, runs and maybe effects of their own,
+which may not fit each other; a search takes minutes, and what is wrong has to be said before it. Solution:
+``bench_of`` checks all of it once, and its methods are the questions that can be asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from logger.api.drives import Run as DrivenRun
+from logger.api.drives import run_on_road
+from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
+from logger.api.lab.question import LabQuestion
+from logger.api.question import TOLERANCE, Notify, Runs, WrongOption, each, silent
+from logger.api.vehicles import model_of
+from logger.errors import BadInput
+from logger.lab.compare import Comparison, compare
+from logger.lab.diagnosis import Diagnosis, diagnose, refit
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.record_band import with_pass_bands
+from logger.lab.selection.add_effect import AddedEffects, add
+from logger.lab.selection.candidate_fit import fit_roughly, refine
+from logger.lab.selection.screening import misalignment, screen
+from logger.runs import Array, Run
+from logger.shipped import vehicle_path
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats import drive_file
+from logger.store.formats.effect_file import check_on, effect_named, own_effect, shipped_effects
+from logger.store.formats.vehicle_file import Model, Step
+from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
+from logger.vehicle.effect_sizes import sized
+
+_SLOW = "expect ten minutes or more for each minute driven"
+_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A model and runs on it, ready to be worked on.
+
+    word         by which the user knows the vehicle
+    effects      those that there are, by name
+    files        of the user's own among them
+    tolerance    by what the car's numbers may well be off
+    """
+
+    word: str
+    model: Model
+    runs: SimulatedRuns
+    effects: Mapping[str, Effect]
+    files: Mapping[str, str]
+    tolerance: Tolerance
+
+    def posterior(self, searches: bool = False) -> Posterior:
+        """What the lab fits; simulated less finely where it ``searches``.
+
+        Raises BadInput when the vehicle lacks what it needs.
+        """
+        runs = SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ) if searches else self.runs
+        model = self.model
+        return Posterior(runs, model.given or model.vehicle, self.tolerance, model.vehicle)
+
+    def try_out(self, one: Chosen) -> None:
+        """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
+        check_on(self.model.vehicle, one, self.two_tracks, self.timed)
+        if one.file is not None and not slow([one.effect]):
+            predicted(one.file, self.model, self.runs, [one])
+
+    @property
+    def files_read(self) -> list[Path]:
+        """Files of the vehicle and of the user's own effects."""
+        return [vehicle_path(self.word), *map(Path, self.files.values())]
+
+    def filed(self, one: Chosen) -> Chosen:
+        """An effect that knows which file it is from, where it is the user's own."""
+        return replace(one, file=self.files.get(one.effect.name))
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road of every run is known under the right wheels too."""
+        return all(run.two_tracks for run in self.runs.runs)
+
+    @property
+    def timed(self) -> bool:
+        """Whether all runs are driven by time."""
+        return all(run.timed for run in self.runs.runs)
+
+    def compared(self) -> Comparison:
+        """The model against the runs. BadInput when the vehicle lacks what it needs."""
+        with self.blamed():
+            return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given, self.tolerance)
+
+    def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> Diagnosis:
+        """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
+        effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
+        with self.blamed():
+            return diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
+
+    def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
+        """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
+        cannot be there with these values.
+
+        said    how it was asked for
+        """
+        if name in self.effects:
+            effect, file = self.effects[name], self.files.get(name)
+        else:
+            effect, file = effect_named(name)
+            effect = effect if file else sized(effect, self.model.vehicle)
+        if effect.name in [one.effect.name for one in self.model.effects]:
+            raise BadInput(f"{self.word}: expected a vehicle without {effect.name}, which it has")
+        try:
+            whole = effect.checked({**effect.usual, **values})
+        except ValueError as error:
+            raise BadInput(f"{said}: {error}") from None
+        self.try_out(chosen(effect, whole, file=file))
+        return effect, file
+
+    def with_effect(self, effect: Effect, file: str | None) -> Bench:
+        """The same where this effect is known, too."""
+        return replace(self, effects={**self.effects, effect.name: effect},
+                       files={**self.files, effect.name: file} if file is not None else self.files)
+
+    def search_values(self, effect: Effect, values: Mapping[str, float], notify: Notify = silent) -> Chosen:
+        """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
+        if set(values) >= {one.name for one in effect.parameters}:
+            return chosen(effect, values)
+        with self.blamed():
+            posterior = self.posterior(searches=True)
+            notify("refitting the car's own numbers")
+            nominal = posterior.start(self.model.effects)
+            seen = misalignment(posterior, nominal)
+            base = refit(posterior, nominal)
+            notify(f"searching for {effect.name}")
+            tries = fit_roughly(base.score, base, screen(base, effect, [seen]))
+        choices = {one.name for one in effect.parameters if one.choices} & set(values)
+        said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
+        best = max((refine(base.score, one) for one in said or tries), key=lambda one: one.gain)
+        return chosen(effect, {**best.chosen.values, **values})
+
+    def added(self, start: Chosen, candidates: int, notify: Notify = silent) -> AddedEffects:
+        """The effect fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
+        notify(f"fitting the car without and with {start.effect.name}")
+        with self.blamed():
+            return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
+
+    def model_with(self, found: AddedEffects) -> Model:
+        """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
+        fit ended at numbers that no car has."""
+        for one in found.effects:
+            check_on(found.vehicle, one, two_tracks=True)
+        history = self.model.history
+        if not history:
+            history = (Step("as it was given", found.error_before, found.noise_floor_error),
+                       Step("numbers refitted", found.error_refitted, found.noise_floor_error))
+        step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
+        return Model(found.vehicle, found.effects, (*history, step),
+                     self.model.given or self.model.vehicle, found.errors)
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """What is wrong with the vehicle names it."""
+        try:
+            yield
+        except ValueError as error:
+            raise BadInput(f"{self.word}: {error}") from None
+
+
+def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str],
+             tolerance: Tolerance, searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
+             anyway: bool = False) -> Bench:
+    """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
+    low-passed, or that say so, only the band that remains is compared.
+
+    word        by which the user knows the vehicle
+    tolerance   as ``tolerance_of``
+    searches    the command that will search through all effects, and so needs the compiler; None: it will not
+    warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
+    low_pass_hz what lies above is not compared; None: all is that the records hold
+    """
+    effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))
+    if searches is not None:
+        require_compiler(searches, effects.values())
+    found = Bench(word, model, runs, effects, files, tolerance)
+    if words := slow_words([one.effect for one in model.effects]):
+        warn(words)
+    shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
+    predictions = check_model(word, model, runs, warn, shipped, tolerance.numbers, anyway)
+    _try_own(found, effect_files)
+    return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
+
+
+def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str],
+                  tolerance: Tolerance) -> Bench:
+    """The model on drives that nobody has driven yet, without readings. Arguments and BadInput as ``bench_of``, and for
+    a road that moves no car."""
+    effects, files = known_effects(model, effect_files)
+    require_compiler("plan", effects.values())
+    found = Bench(word, model, SimulatedRuns(drives), effects, files, tolerance)
+    check_moves(word, model, found.runs)
+    _try_own(found, effect_files)
+    return found
+
+
+def tolerance_of(share: float | None) -> Tolerance:
+    """What a share either way is taken for that the user said of masses, springs and dampers; None: the usual one.
+    BadInput for one that no car's numbers have."""
+    if share is None:
+        return Tolerance()
+    TOLERANCE.check("tolerance", share)
+    return Tolerance(numbers=share / Tolerance.band)
+
+
+def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
+                  ) -> tuple[dict[str, Effect], dict[str, str]]:
+    """The effects that a search tries, by name: those that it tries unasked, in the model's sizes, a model's own, and
+    those of some more files; and the files of the user's own, by name. BadInput for a name that is there twice.
+
+    files     of effects, or names of such that a search does not try unasked
+    on_rig    as ``sought_effects``
+    """
+    effects, own = {name: sized(one, model.vehicle) for name, one in sought_effects(on_rig).items()}, {}
+    for one in model.effects:
+        if one.file is not None:
+            effects[one.effect.name], own[one.effect.name] = one.effect, one.file
+    for file in files:
+        is_shipped = file in shipped_effects()
+        effect = sized(shipped_effects()[file], model.vehicle) if is_shipped else own_effect(Path(file))
+        if effect.name in effects:
+            raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
+        effects[effect.name] = effect
+        if not is_shipped:
+            own[effect.name] = file
+    return effects, own
+
+
+def sought_effects(on_rig: bool = False) -> dict[str, Effect]:
+    """The effects that come with ridelog and that a search tries unasked, by name.
+
+    on_rig    whether the runs are of a test rig, and not of a road
+    """
+    where = (Sought.ALWAYS, Sought.ON_RIGS) if on_rig else (Sought.ALWAYS,)
+    return {name: one for name, one in shipped_effects().items() if one.sought in where}
+
+
+def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:
+    """Those of these names, which may be any that come with ridelog; None: all. BadInput for a name that there is not.
+    """
+    if names is None:
+        return dict(effects)
+    effects = dict(sorted({**shipped_effects(), **effects}.items()))
+    if unknown := set(names) - set(effects):
+        raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
+    return {name: effects[name] for name in sorted(names)}
+
+
+def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_hz: float | None) -> SimulatedRuns:
+    """The runs as they are compared. BadInput where next to nothing would be."""
+    half_hz = runs.runs[0].rate_hz / 2
+    if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
+        raise WrongOption(f"`low_pass_hz` {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the "
+                          "sample rate")
+    try:
+        found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)],
+                                low_pass_hz)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    same = all(one.low_pass is None and one.facts.pass_band_hz is None for one in found)
+    return runs if same else SimulatedRuns(found, runs.fine_hz)
+
+
+def slow(effects: Iterable[Effect]) -> list[str]:
+    """Names of those that are simulated in plain Python, where there is no compiler."""
+    names = [one.name for one in effects if isinstance(one, ForceEffect)]
+    if names:
+        from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
+        return [] if COMPILED else names
+    return []
+
+
+def slow_words(effects: Iterable[Effect]) -> str:
+    """That simulations with these effects take long, if they do."""
+    if names := slow(effects):
+        return (f"Without the lab extra (pip install '.[lab]') simulations with {' and '.join(names)} take some "
+                f"hundred times longer: {_SLOW}.")
+    return ""
+
+
+def require_compiler(command: str, effects: Collection[Effect]) -> None:
+    """Raise BadInput where a search over these effects would take hours: it needs the compiler of the ``lab`` extra.
+
+    A search over the rest alone could not say that nothing is missing, nor that an effect explains most.
+    """
+    if names := slow(effects):
+        raise BadInput(f"{command} needs the lab extra (pip install '.[lab]'), which is not installed: without it "
+                       f"{len(names)} of {len(effects)} effects cannot be tried, and what it says would mislead")
+
+
+def _try_own(found: Bench, files: Sequence[str]) -> None:
+    """Try the effects of these files on the car, at the values that a search begins at."""
+    for name, effect in found.effects.items():
+        if found.files.get(name) in files and effect.obstacle_on(
+                found.model.vehicle, found.two_tracks, found.timed) is None:
+            for values in effect.trials():
+                found.try_out(chosen(effect, values, file=found.files[name]))
+
+
+def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = True) -> Bench:
+    """Vehicle, runs and effects of a question, checked together."""
+    given: Any = question
+    off, model = tolerance_of(question.tolerance), model_of(given.vehicle)
+    return bench_of(word_of(given.vehicle, model), model, checked_runs(lab_drives(given.runs), thin, model.vehicle),
+                    list(map(str, getattr(question, "effect_files", ()))), off, searches, question.warn,
+                    question.low_pass_hz, question.anyway)
+
+
+def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:
+    """One run or several, read, with their roads. BadInput for none, for two that are one, or of one name, and for one
+    without a road."""
+    given = each(runs)
+    if not given:
+        raise BadInput("expected a run, found none")
+    places = [one.path if isinstance(one, DrivenRun) else Path(one).resolve() for one in given]
+    if again := next((one for number, one in enumerate(given) if places[number] in places[:number]), None):
+        raise BadInput(
+            f"{again.path if isinstance(again, DrivenRun) else again}: expected each run once, and under a name "
+                       "of its own")
+    return [drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)},
+                                   track=run.track) for run in map(run_on_road, given) if run.track is not None]
+
+
+def word_of(vehicle: Model | Path | str, model: Model) -> str:
+    """By which the user knows a vehicle."""
+    return str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name

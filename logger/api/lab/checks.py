@@ -1,0 +1,448 @@
+"""Whether a vehicle's model and runs can be used together, before anything is searched.
+
+Runs are checked by themselves and with each other, then the model against them: units, ways up, roads, another car.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+from math import log
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+from logger.errors import BadInput
+from logger.units import FOOT_M, STANDARD_GRAVITY_MPS2
+
+if TYPE_CHECKING:
+    from logger.lab.another_car import AnotherCar
+    from logger.lab.road_match import RoadMatch
+    from logger.runs import Array, Bools, Run
+    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.store.formats.drive_file import Drive, DriveOnRoad
+    from logger.store.formats.vehicle_file import Model
+    from logger.vehicle.compose import Car
+    from logger.vehicle.effect import Chosen, Effect
+    from logger.vehicle.vehicle import Vehicle
+
+
+_MODEL_CHECKS_LEAST_MPS2 = 1e-4
+_NEAR = 0.3
+_RECORD, _PROFILE = "the record seems to be", "the profile seems to be"
+# Measured / model, where one of them is in another unit.
+_UNITS = (
+    (_RECORD, "g", 1 / STANDARD_GRAVITY_MPS2), (_RECORD, "thousandths of g", 1000 / STANDARD_GRAVITY_MPS2),
+    (_RECORD, "mm/s2", 1000.0), (_RECORD, "ft/s2", 1 / FOOT_M),
+    (_PROFILE, "mm", 0.001), (_PROFILE, "cm", 0.01), (_PROFILE, "inches", FOOT_M / 12), (_PROFILE, "feet", FOOT_M),
+)
+_SENSOR_GAIN = (0.2, 5.0)
+"""Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
+ANYWAY = "--anyway goes on"
+_NAMED = 4
+"""Of the numbers of another car, so many are said."""
+
+
+def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], known: Mapping[str, Effect],
+                numbers: float, anyway: bool = False) -> list[Array]:
+    """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
+    the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
+    profile is in another unit, or the road or the car is another one, unless the user wants to go on ``anyway`` (then
+    it is a warning).
+
+    word       by which the user knows the vehicle
+    known      effects, by name: where one of them explains the runs as another car would, it may be this car
+    numbers    deviation of what the car's numbers are usually off by, as a share
+    """
+    from logger.vehicle.compose import compose
+
+    predictions = check_moves(word, model, runs)
+    car = compose(model.vehicle, model.effects)
+    followed = _followed(runs, predictions, car)
+    # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
+    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed), _other_roads(runs, followed, car),
+               _another_car(word, model, runs, predictions, known, numbers)), warn, anyway)
+    return predictions
+
+
+def check_moves(word: str, model: Model, runs: SimulatedRuns) -> list[Array]:
+    """What the model predicts (n,) per run, whatever was measured. Raises BadInput where an effect of the model cannot
+    be on one of the runs, the model's motion grows without bound, or the road moves no car."""
+    for run in runs.runs:
+        for one in model.effects:
+            why = one.effect.obstacle_on(model.vehicle, run.two_tracks, run.timed)
+            if why is not None:
+                raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
+    predictions = predicted(word, model, runs, model.effects)
+    if not any(map(_moves, runs.runs, predictions)):
+        raise BadInput(f"{runs.runs[0].name}: expected " + (
+            "an excitation that moves the car; it is flat while the record lasts" if runs.runs[0].timed else
+            "a drive over a road that moves the car; where it was the profile is flat, or it stood still"))
+    return predictions
+
+
+def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
+    """Raise BadInput where a run was driven over another road than that of its profile, as ``check_model``: all that
+    can be asked where the vehicle's numbers may be far off."""
+    from logger.vehicle.compose import compose
+
+    car = compose(model.vehicle, model.effects)
+    followed = _followed(runs, predicted(word, model, runs, model.effects), car)
+    _say(_other_roads(runs, followed, car), warn, anyway)
+
+
+def predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
+    """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
+    from logger.vehicle.compose import bounded, compose
+
+    try:
+        predictions = runs.predict(compose(model.vehicle, effects))
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None
+    if not bounded(predictions):
+        names = " and ".join(one.effect.name for one in effects)
+        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+    return predictions
+
+
+def _say(complaints: Iterable[str], warn: Callable[[str], None], anyway: bool) -> None:
+    """The first complaint as BadInput, or all of them as warnings."""
+    for complaint in complaints:
+        if not anyway:
+            raise BadInput(f"{complaint} ({ANYWAY})")
+        warn(complaint)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it, at any lag and
+    within the half wave at hand. What is wrong with a whole record, its sign or its unit, is wrong in both bands."""
+
+    pairs: list[tuple[Run, Array]]
+    body_hz: Array
+
+    @cached_property
+    def band_hz(self) -> tuple[float, float]:
+        from logger.lab.road_match import bounce_band_hz
+
+        return bounce_band_hz(self.body_hz)
+
+    @cached_property
+    def around(self) -> list[RoadMatch]:
+        from logger.lab.road_match import road_match
+
+        return [road_match(run, prediction, self.band_hz) for run, prediction in self.pairs]
+
+    @cached_property
+    def below(self) -> list[RoadMatch]:
+        from logger.lab.road_match import below_bounce_band_hz, road_match
+
+        band_hz = below_bounce_band_hz(self.body_hz)
+        return [road_match(run, prediction, band_hz) for run, prediction in self.pairs]
+
+    @cached_property
+    def below_at_hand(self) -> list[RoadMatch]:
+        from logger.lab.road_match import match_below_bounce
+
+        return [match_below_bounce(run, prediction, self.body_hz) for run, prediction in self.pairs]
+
+
+def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.modes import undamped_frequencies_hz
+
+    structure = structure_of(car.vehicle)
+    return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)],
+                     undamped_frequencies_hz(structure)[: -len(structure.wheels)])
+
+
+def _moves(run: Run, prediction: Array) -> bool:
+    model = run.main(prediction)[run.first:]
+    return float(model @ model) >= _MODEL_CHECKS_LEAST_MPS2**2 * len(model)
+
+
+def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
+    """Which runs are upside down."""
+    for k, (run, around) in enumerate(zip(runs.runs, followed.around, strict=True)):
+        if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
+            yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
+                   f"the model (correlation {around.turned:.2f})")
+
+
+def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
+    """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
+    if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body moves with the
+    road whatever is missing, but one run holds few such waves."""
+    clear = [(run.name, around.gain, below.gain) for run, around, below in
+             zip(runs.runs, followed.around, followed.below, strict=True) if around.is_clear]
+    for name, gain, _ in clear:
+        what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
+        of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
+        gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
+        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for one in gains):
+            yield (f"{name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the model "
+                   f"says: {what} in {unit}")
+
+
+def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
+    """Which runs do not follow their road, and where they would fit."""
+    from logger.lab.road_match import pool
+
+    strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
+    if not strangers and pool(followed.around).is_refuted:
+        strangers = list(range(len(followed.around)))
+    for k in strangers:
+        found, run = followed.around[k], runs.runs[k]
+        what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
+        yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
+               f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
+
+
+def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],
+                 known: Mapping[str, Effect], numbers: float) -> Iterator[str]:
+    """That the runs are of another car, which explains them as no effect does, and how it differs."""
+    from logger.lab.another_car import another_car
+    from logger.vehicle.stepping_loop import COMPILED
+
+    mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
+    found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
+    if found is not None and not _explained_by_an_effect(found, model, known, numbers):
+        far = list(found.shares.items())[:_NAMED]
+        more = f" and {len(found.shares) - _NAMED} more numbers far off" if len(found.shares) > _NAMED else ""
+        yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: this one says "
+               f"next to nothing of it (error {found.error:.2f}), one with "
+               f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
+               "Is it another car's file? ridelog identify fits a car's numbers"
+               + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
+
+
+def _explained_by_an_effect(found: AnotherCar, model: Model, known: Mapping[str, Effect], numbers: float) -> bool:
+    """Whether an effect, in the model's car, explains as much as another car does."""
+    from logger.lab.best_effect import error_with_best_effect
+
+    return error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) <= found.found_error
+
+
+def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
+    """Where a run that does not follow its road would fit."""
+    from logger.lab.road_match import better_placement
+    from logger.profiles.track import Track
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    track = run.track
+    if not isinstance(track, Track):
+        return "is it another run's excitation, or another clock's?"
+    reverse = Track(track.spacing_m, track.elevation_m[::-1].copy(), track.start_m)
+    both = {False: SimulatedRuns([run]), True: SimulatedRuns([replace(run, track=reverse)])}
+
+    def predict(farther_m: Array, backwards: bool) -> Array:
+        return run.main(both[backwards].predict(car, [farther_m], rough=True)[0])
+
+    found = better_placement(run, predict, band_hz, (track.start_m, track.end_m))
+    if found is None:
+        return "it fits nowhere on it. Is it the profile of another road, or another drive's record?"
+    if found.backwards:
+        return "it follows the profile read backwards. Was it driven in the other direction?"
+    return f"it fits about {found.farther_m:+.0f} m farther along. Do distances begin where the profile does?"
+
+
+_SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
+# What the lab looks at of a car lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
+_RATE_HZ, _NEARLY = 100.0, 0.25
+LEAST_S = 5.0
+# The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
+# second on. A recorder's clock may be off by a per cent.
+_LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
+_MOST_MEAN_MPS2 = 2.0
+_RUN_CHECKS_LEAST_MPS2 = 1e-5  # no sensor is so quiet
+_BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
+_DISAGREE, _DISAGREE_M = 0.5, 5.0
+
+
+def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
+    """Runs of one sample rate; of about 100 samples a second, or as many as the ``vehicle`` needs, if they have many
+    more and may be thinned (``thin``).
+
+    Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
+    """
+    from logger.profiles.track import Track
+    from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+    from logger.store.formats.drive_file import DRIVE
+
+    for number, drive in enumerate(drives):
+        file = drive.path / DRIVE if drive.path.is_dir() else drive.path
+        if isinstance(drive.track, Track):
+            first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
+            if last_m < drive.track.start_m or first_m > drive.track.end_m:
+                raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
+                               f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
+        check_record(drive, file, drives[:number])
+        if not drive.track.timed:
+            check_distances(drive, file)
+    runs = [run for one in drives for run in driven_stretches(one)]
+    kept = thinned_runs(runs, vehicle) if thin else runs
+    return SimulatedRuns(kept) if vehicle is None else SimulatedRuns(kept, steps_hz(vehicle))
+
+
+def check_distances(drive: Drive, file: Path) -> None:
+    """Raise BadInput for distances that are none: they fall, leap, or have nothing to do with the speed."""
+    import numpy as np
+
+    from logger.bounds import SPEED
+    from logger.roads.plausible import likely_unit
+
+    distance_m = drive.distance_m
+    for wrong, words in (
+        (np.diff(distance_m) > SPEED.largest / drive.rate_hz + _BACK_M, "that grow steadily"),
+        (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > _BACK_M, "that grow, as the car drives forward"),
+    ):
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise BadInput(f"{file}:{at + 3}: expected distances {words}, found {distance_m[at + 1]:.6g} m after "
+                           f"{distance_m[:at + 1].max():.6g} m")
+    way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
+    if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
+        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m of way "
+                       f"by the one and {way_m:.4g} m by the other ({likely_unit(by_speed_m, way_m)})")
+
+
+def driven_stretches(drive: DriveOnRoad) -> list[Run]:
+    """The parts of a drive in which the car moved, or stood on a rig, and there were readings (``driven_parts``), each
+    a run; of one that stood or had none nowhere the whole. A part says in its name which seconds it is of. BadInput as
+    ``driven_parts``."""
+    from logger.runs import Run
+
+    parts = driven_parts(drive, drive.track.timed)
+    whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
+    cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
+    return [Run(str(drive.path) if whole else
+                f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
+                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part],
+                drive.track.begun(part.start / drive.rate_hz), facts=drive.facts,
+                usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
+            for part in parts]
+
+
+def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
+    """Where in a drive the car moved, or stood ``on_rig``, and there were readings.
+
+    A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
+    well. One that lasts longer than that is cut out, and so are those at the ends of a part.
+
+    Raises BadInput where no part has readings for ``LEAST_S``.
+    """
+    import numpy as np
+
+    from logger.dsp.stretches import stretches_of
+    from logger.lab.likelihood.lag import SLOWEST_MPS
+    from logger.runs import NO_READING, SKIP_S
+
+    driven = (drive.speed_mps >= SLOWEST_MPS) | on_rig
+    read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
+    kept = read.copy()
+    for gap in map(slice, *stretches_of(driven & ~read)):
+        between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
+        kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
+    parts = [part for part in map(slice, *stretches_of(kept))
+             if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
+    if not parts:
+        moving = "" if on_rig else f" at {SLOWEST_MPS:g} m/s or faster"
+        raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings{moving}, without a break of more than "
+                       f"{SKIP_S:g} s")
+    return parts
+
+
+def _more(drive: Drive, part: slice) -> Array:
+    """The other signals (s, n) of a part of a drive, without their means."""
+    import numpy as np
+
+    columns = [drive.more[one.name][part] for one in drive.facts.signals]
+    return np.stack([one - one.mean() for one in columns]) if columns else np.empty((0, 0))
+
+
+def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Run]:
+    """Runs of one rate, of about 100 samples a second, or as many as the ``vehicle`` needs, if they had many more. What
+    is thinned is no longer rounded; a sample is as usable as the least of those beside it.
+
+    Little of a car's motion lies where the recorder's filter begins; what jerks a rig of little mass is there as well,
+    so that its record goes through the filter that its model goes through.
+    """
+    import numpy as np
+
+    from logger.dsp.thinning import thinned
+    from logger.vehicle.simulate import resampled
+
+    factor = int(runs[0].rate_hz / _needed_hz(vehicle) + _NEARLY)
+    if factor < 2:
+        return list(runs)
+
+    def fewer(one: Run, samples: Array) -> Array:
+        return resampled(samples, factor) if one.timed else thinned(samples, factor)
+
+    return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=fewer(one, one.measured_mps2),
+                    distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor],
+                    facts=replace(one.facts, step_mps2=None), usable=_thinned_marks(one.usable, factor),
+                    more=np.array([fewer(one, samples) for samples in one.more])) for one in runs]
+
+
+def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
+    """What every ``factor``-th sample is (n,), with those within reach of it: none where one has no reading, else
+    clipped where one is."""
+    import numpy as np
+
+    from logger.runs import CLIPPED, NO_READING, READING
+
+    if usable is None:
+        return None
+
+    def near(mark: float) -> Bools:
+        around = np.pad(np.asarray(usable == mark, bool), factor)
+        return np.asarray(np.lib.stride_tricks.sliding_window_view(around, 2 * factor + 1)[::factor].max(axis=1))
+
+    return np.where(near(NO_READING), NO_READING, np.where(near(CLIPPED), CLIPPED, READING))
+
+
+def _needed_hz(vehicle: Vehicle | None) -> float:
+    """Samples a second that the lab needs: what it looks at reaches an octave above the vehicle's quickest vibration.
+    """
+    from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.modes import undamped_frequencies_hz
+
+    if vehicle is None:
+        return _RATE_HZ
+    return max(_RATE_HZ, 2 * float(undamped_frequencies_hz(structure_of(vehicle))[-1]) / HIGHEST_OF_RATE)
+
+
+def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
+    """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
+    others, recorded nothing, or repeats samples."""
+    import numpy as np
+
+    from logger.bounds import time_hint
+    from logger.dsp.repeated_samples import find_repeats
+    from logger.runs import READING, SKIP_S
+
+    if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
+        raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "
+                       f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
+    lasts_s = len(drive.time_s) / drive.rate_hz
+    if lasts_s < LEAST_S:
+        raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")
+    if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
+        raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
+                       f"{drive.rate_hz:g}")
+    counted = drive.accel_z_mps2[int(SKIP_S * drive.rate_hz):]
+    if np.ptp(counted) == 0:
+        found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"
+        raise BadInput(f"{file}: expected accelerations after the first {SKIP_S:g} s, found {found}")
+    if counted.std() < _RUN_CHECKS_LEAST_MPS2:
+        raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
+    if abs(counted.mean()) > _MOST_MEAN_MPS2:
+        raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
+    # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
+    read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]
+    if repeats := find_repeats(read[:, None]):
+        raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")

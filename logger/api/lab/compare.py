@@ -1,0 +1,668 @@
+"""Model against measurement, and what an effect that is added changes: answers, words, JSON and pages.
+
+``Comparison`` and ``AddedEffect`` are what Python gets. A page opens with no network and runs no script.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.lab.bench import Bench, bench_with, slow_words
+from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuestion
+from logger.api.lab.words import (
+    band_json,
+    drift_tile,
+    error_text,
+    error_words,
+    errors_json,
+    falling,
+    paired,
+    removed_json,
+    removed_section,
+    removed_words,
+)
+from logger.api.question import function, named_numbers
+from logger.api.shown import CommandResult
+from logger.api.vehicles import Model, model_of
+from logger.chart_data import Chart, Curves, Line, line
+from logger.lab.compare import Comparison as LabComparison
+from logger.lab.compare import Standing
+from logger.lab.residual_tests.tests import ResidualTestResult
+from logger.lab.residuals.block_statistics import rms
+from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
+from logger.lab.residuals.force_state_map import Curve, ForceMap
+from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
+from logger.lab.selection.add_effect import Number as ShiftedNumber
+from logger.lab.selection.error_scale import JUDGED_ON, fit_percent
+from logger.left_out import left_out_json, left_out_paragraph
+from logger.report.charts import chart
+from logger.report.document import (
+    EMPTY,
+    Html,
+    bullets,
+    concatenated,
+    document,
+    grid,
+    heading,
+    hint,
+    html,
+    paragraphs,
+    section,
+    tiles,
+)
+from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, wrapped
+from logger.runs import normalised_rms_error, runs_left_out, short_names
+from logger.store.formats import vehicle_file
+from logger.vehicle.effect import Effect
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(CommandResult):
+    """A model compared with its measurements. Errors are rms(measured - model) / rms(measured), the first 2 s of each
+    run left out.
+
+    found            all that the lab found
+    error            as the model stands
+    refitted_error   with its numbers and the distances refitted within their tolerance
+    run_errors       by name of the run, as the model stands
+    evidence         sentences
+    """
+
+    found: LabComparison
+    error: float
+    refitted_error: float
+    run_errors: Mapping[str, float]
+    evidence: tuple[str, ...]
+
+    @property
+    def missing(self) -> bool:
+        """Whether the residual depends on the road and the car's motion."""
+        return self.found.missing
+
+    @property
+    def moves(self) -> Mapping[str, float]:
+        """By which share each number moved for the refit."""
+        return self.found.moves
+
+    @property
+    def moved_far(self) -> tuple[str, ...]:
+        """Numbers that moved farther than their tolerance."""
+        return self.found.far
+
+    def charts(self) -> Sequence[Chart]:
+        """Spectra of measurement, model and residual after the refit."""
+        return spectra(self.found.refitted.residuals)
+
+    def as_page(self, of: str) -> Html:
+        """The comparison as one HTML document."""
+        return page(self.found)
+
+
+def compared(question: CompareQuestion) -> Comparison:
+    """The answer to ``CompareQuestion``, which says what is raised."""
+    return comparison_of(bench_with(question, thin=False).compared())  # an error is that of all samples
+
+
+compare = function("compare", CompareQuestion, compared)
+
+
+def comparison_of(found: LabComparison) -> Comparison:
+    """What the lab found, as it is shown."""
+    summary = comparison_json(found)
+    return Comparison("\n".join(comparison_lines(found)), summary, found, found.plain.error, found.steps[-1].error,
+                      {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AddedEffect(CommandResult):
+    """A model with one more effect, fitted with the car's numbers on all of the runs.
+
+    found               all that the lab found
+    effect              its name; ``parameters`` and ``standard_errors`` by name
+    error_before        of the model as it was; ``error_refitted`` of it with its numbers and the distances refitted
+    error_after         of the model with the effect, refitted likewise
+    noise_floor_error   that the sensor's noise alone makes
+    p_value             how often noise alone would improve the fit as much
+    helps               whether that is improbable, and the error on what no fit saw does not rise
+    numbers             of the car, those that the effect moved most first
+    model               with the effect
+    """
+
+    found: AddedEffects
+    effect: str
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    error_before: float
+    error_refitted: float
+    error_after: float
+    noise_floor_error: float
+    p_value: float
+    helps: bool
+    numbers: tuple[ShiftedNumber, ...]
+    model: Model
+
+    def figures(self) -> list[Html]:
+        """How the error fell."""
+        return [falling("How the error fell", [
+            ("as it was given", self.error_before), ("numbers refitted", self.error_refitted),
+            (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
+
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the new vehicle file."""
+        vehicle_file.write_model(path, self.model)
+        self._json["vehicle"] = str(path)
+
+
+def added(question: AddEffectQuestion) -> AddedEffect:
+    """The answer to ``AddEffectQuestion``, which says what is raised."""
+    bench = bench_with(question)
+    effect, file, values = asked_for(str(question.name), bench, question)
+    values |= dict(question.start or {})
+    bench = bench.with_effect(effect, file)
+    is_given = set(values) >= {one.name for one in effect.parameters}
+    found = bench.added(bench.search_values(effect, values, question.progress),
+                        1 if is_given else len(effect.trials()), question.progress)
+    return addition_of(found, model_of(bench.model_with(found)))
+
+
+add_effect = function("add_effect", AddEffectQuestion, added)
+
+
+def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
+              ) -> tuple[Effect, str | None, dict[str, float]]:
+    """An effect as it was asked for, the file it is from, and what was said of its numbers. BadInput as
+    ``Bench.asked_for``."""
+    name, values = named_numbers(text, "add-effect")
+    start = getattr(question, "start", None) or {}
+    effect, file = bench.asked_for(name, values | start, text)
+    if words := slow_words([effect]):
+        question.warn(words)
+    return effect, file, values
+
+
+def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
+    """What the lab found, as it is shown; the model with it."""
+    new = found.new[-1]
+    return AddedEffect(
+        "\n".join(addition_lines(found)), addition_json(found), found, new.effect.name, dict(new.values),
+        dict(new.standard_errors), found.error_before, found.error_refitted, found.error_after,
+        found.noise_floor_error, found.p_value, found.helps, tuple(found.moved), model)
+
+
+_HELPS = 0.97
+_MOST_MOVES = 3
+
+
+def headline(found: LabComparison) -> list[str]:
+    """How well the model does, with its numbers as they stand and refitted."""
+    plain, refitted = found.plain, found.refitted
+    residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
+    lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
+             f"error {plain.error:.3f}, their ratio."]
+    refit = "with masses, springs, dampers and distances refitted within their tolerance"
+    if any(one.effect.parameters for one in found.effects):
+        refit += " (and the numbers of its effects)"
+    before, after = (one.error for one in found.steps)
+    if after < _HELPS * before:
+        lines.append(f"{refit.capitalize()}, the error is {after:.3f}: the refit removes {1 - (after / before)**2:.0%} "
+                     "of the residual's power.")
+    else:
+        lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {after:.3f}.")
+    lines += error_words(found.steps, found.floor)
+    lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
+                           "{}, refitted {}")
+    lines += removed_words(found.removed, found.band)
+    if found.repeats is not None:
+        apart = found.repeats.deviation_mps2
+        lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} m/s2 r.m.s. "
+                     f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
+    if found.far:
+        named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
+        lines.append(f"The refit moved {named}, which is beyond their tolerance. Measure them: the vehicle's file is "
+                     "wrong there, or an effect that the model lacks biases them.")
+    return lines
+
+
+def evidence(found: LabComparison) -> list[str]:
+    """What speaks for a missing effect, or against one."""
+    if not found.exceeds_discrepancy:
+        return ["The residual is smaller than the difference between two correct simulations of one car: it is no "
+                "evidence."]
+    if not found.tests_found:
+        return ["No test finds more than noise in the residual."]
+    return [test.sentence for test in found.tests_found]
+
+
+def conclusion(found: LabComparison) -> str:
+    """What it comes to, and what to do next."""
+    if found.missing and not any(test.road for test in found.tests_found):
+        return ("The residual is hardly more than noise, but only with numbers far from those of the vehicle's file. "
+                "Either the file is wrong, or such numbers imitate an effect that is missing. Next: ridelog diagnose "
+                f"with the same arguments; where it finds none, ridelog identify --free {','.join(found.far)} with "
+                "them finds the numbers from the runs alone.")
+    if found.missing:
+        return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
+                "diagnose with the same arguments says which physical effect would explain it.")
+    if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
+        return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
+                "Nothing here asks for another effect of the car.")
+    if found.removed.drifting_sensors or found.removed.distance_error_m > 0:
+        return ("Nothing else is missing: apart from what is removed above, the residual asks for no effect of the "
+                "car. Rougher roads or other speeds would test the model harder.")
+    return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
+
+
+# --- for a program ---
+
+
+def comparison_json(found: LabComparison) -> dict[str, Any]:
+    """The comparison as one JSON object; error and where are of the model as it stands."""
+    return {
+        **_standing_json(found.plain), **left_out_json(runs_left_out(found.plain.residuals.runs)),
+        "evidence": [*headline(found), *evidence(found), conclusion(found)],
+        "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
+        **errors_json(found.steps, found.floor),
+        "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
+                     "moves": dict(found.moves), "moved_far": list(found.far)},
+        "repeats": None if found.repeats is None else {
+            "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
+        "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
+    }
+
+
+def _standing_json(standing: Standing) -> dict[str, Any]:
+    residuals, where = standing.residuals, standing.where
+    return {
+        "error": standing.error, "signals": dict(standing.signals),
+        "runs": [{"run": run.name, "error": _finite(normalised_rms_error([run], [prediction])),
+                  "samples": run.count - run.first}
+                 for run, prediction in zip(residuals.runs, residuals.predictions, strict=True)],
+        "where": {
+            "frequency": [{**_part_json(part, "hz"), "name": part.name} for part in where.frequency],
+            "speed": [_part_json(part, "mps") for part in where.speed],
+            "amplitude": [_part_json(part, "mps2") for part in where.amplitude],
+            "place": [{**_part_json(part, "m"), "run": part.name}
+                      for part in sorted(where.place, key=lambda part: -part.share)],
+        },
+    }
+
+
+def _part_json(part: Part, unit: str) -> dict[str, Any]:
+    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": _finite(part.error),
+            "error_power_share": part.share}
+
+
+def _test_json(test: ResidualTestResult, found: bool) -> dict[str, Any]:
+    return {"name": test.name, "found": found, "value": _finite(test.value), "unit": test.unit,
+            "standard_error": _finite(test.standard_error), "p_value": _finite(test.p_value)}
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else value
+
+
+_PLACES = 5
+
+
+def comparison_lines(found: LabComparison) -> list[str]:
+    """What a person reads of a comparison."""
+    residuals = found.plain.residuals
+    seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
+    return [
+        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
+        wrapped(headline(found)), "", "After the refit:", wrapped(evidence(found), "- "), "",
+        wrapped([conclusion(found)]), "",
+        *_comparison_tables(found), *left_out_paragraph(runs_left_out(residuals.runs)),
+    ]
+
+
+def _comparison_tables(found: LabComparison) -> list[str]:
+    """Where the residual is, before any fit and after the refit."""
+    lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
+                                                                    f"{'refit':>8}"]
+    plain, refitted = found.plain.where, found.refitted.where
+    for title, unit, one, other in (
+        ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
+    ):
+        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))] if other else []
+    lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
+    names = short_names(found.plain.residuals.runs)
+    places = [_place(part, names[part.name]) for part in refitted.worst_places(_PLACES)]
+    return [*lines, "Worst places", *places] if places else lines
+
+
+def _row(plain: Part | None, refitted: Part, unit: str) -> str:
+    name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
+    share, error = (f"{plain.share:.1%}", error_text(plain, 3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{error_text(refitted, 3):>8}"
+
+
+def _place(part: Part, run: str) -> str:
+    name = f"  {run}, {part.low:g} to {part.high:g} m"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{error_text(part, 3):>8}"
+
+
+Array = npt.NDArray[np.float64]
+
+_BODY_HZ = 5.0
+_QUIET_DB = -80.0
+_MOST_RUNS = 8
+_WORST = 8
+
+
+def page(found: LabComparison) -> Html:
+    """The comparison as one HTML document."""
+    residuals = found.refitted.residuals
+    title = f"{found.vehicle}: model against measurement"
+    return document(title, [
+        heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found), paragraphs(headline(found)),
+        section("After the refit", bullets(evidence(found)) + paragraphs([conclusion(found)])),
+        removed_section(found.removed, found.band),
+        whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals),
+        _comparison_page_tables(found),
+        _places(found.refitted),
+        forces_section(found.tests.forces), _alignment(found), _tests(found), _numbers(found),
+    ])
+
+
+def _tiles(found: LabComparison) -> Html:
+    residuals = found.plain.residuals
+    return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
+                  ("Error after the refit", f"{found.steps[-1].error:.3f}", ""),
+                  *drift_tile(found.removed),
+                  ("Tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
+                  ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
+
+
+# --- pictures ---
+
+
+def whole_drives(residuals: ModelResiduals) -> Html:
+    """What was measured and what the model leaves of it, over the whole of each run."""
+    names, drawn = short_names(residuals.runs), []
+    for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
+        time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
+        lines = tuple(line(word, time_s, values[index]) for word, values in (
+            ("measured", residuals.measured), ("residual", residuals.residual)))
+        drawn.append(chart(Curves(names[run.name], "time in the run [s]", "acceleration [m/s2]", lines)))
+    return section("The whole drive", concatenated(drawn))
+
+
+def _worst_place(standing: Standing) -> Html:
+    residuals, worst = standing.residuals, worst_moment(standing)
+    index, part = worst.run, worst.part
+    time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
+    lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
+        ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
+    return section("The worst place", chart(Curves(worst.words, "time in the run [s]", "acceleration [m/s2]", lines)))
+
+
+def spectra_section(residuals: ModelResiduals) -> Html:
+    """Spectra of measurement, model and residual."""
+    return section("By frequency", concatenated(map(chart, spectra(residuals))))
+
+
+def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
+    """The charts of it: of the body, and of the wheels and above."""
+    f_hz = frequencies(residuals)
+    density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
+               for one in (residuals.measured, residuals.residual, residuals.model)]
+
+    def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
+        inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
+        return Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
+            Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
+            for name, one in zip(("measured", "residual", "model"), density, strict=True)))
+
+    return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
+
+
+def _places(standing: Standing) -> Html:
+    if not standing.where.place:
+        return EMPTY
+    lines, names = [], short_names(standing.residuals.runs)
+    for run in standing.residuals.runs[:_MOST_RUNS]:
+        parts = [part for part in standing.where.place if part.name == run.name]
+        if len(parts) > 1:
+            lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
+                              np.array([part.residual_mps2 for part in parts])))
+    along = Curves("Residual along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
+    rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
+             error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
+    return section("By place", (chart(along) if lines else EMPTY) + grid(
+        ("Run", "From, to [m]", "Share of the residual", "Residual [m/s2]", "Error"), rows))
+
+
+def forces_section(forces: ForceMap) -> Html:
+    """The force that is missing in the suspensions, by speed and by travel."""
+    drawn = concatenated(
+        chart(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
+                                                         errors=curve.error_n),), (0.0, "nothing missing")))
+        for title, x_name, curve, factor in (
+            (_titled("By speed of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
+            (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
+    return section("The missing force", drawn + hint(
+        "The force in each suspension that would explain the residual, with its standard error, in addition to a "
+        "linear spring or damper. Above 0 it pulls body and wheel together; compression is on the left, extension on "
+        "the right. Do not believe a curve that explains little of the residual."))
+
+
+def _alignment(found: LabComparison) -> Html:
+    windows, runs = found.tests.alignment, found.plain.residuals.runs
+    names = short_names(runs)
+    lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
+             for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
+    if not lines or all(run.timed for run in runs):
+        return EMPTY
+    drawn = chart(Curves("How far the model runs ahead of the measurement", "way into the run [m]", "time [ms]",
+                           tuple(lines), (0.0, "together")))
+    return section("Alignment", drawn + hint(
+        "The same everywhere: a clock or a place that is off. Growing along the way: a wrong speed. As the model "
+        "stands, before the refit."))
+
+
+# --- tables ---
+
+
+def _comparison_page_tables(found: LabComparison) -> Html:
+    plain, refitted = found.plain.where, found.refitted.where
+    return (_table("By band", "Hz", plain.frequency, refitted.frequency)
+            + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
+            + _table("By how strongly the road moves the car", "m/s2", plain.amplitude, refitted.amplitude))
+
+
+def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> Html:
+    """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
+    pairs = paired(plain, refitted)
+    named, stands = bool(refitted[0].name), any(one is not None for one, _ in pairs)
+
+    def cells(one: Part | None, part: Part) -> Html:
+        bar = html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
+        before = html("<td class=n>{}</td>", error_text(one, 3) if one else "") if stands else EMPTY
+        return ((html("<td>{}</td>", part.name) if named else EMPTY)
+                + html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
+                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
+
+    heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
+             + Html("<th>Share of the residual</th><th></th><th class=n>Error</th>")
+             + (Html("<th class=n>Before the refit</th>") if stands else EMPTY))
+    rows = concatenated(html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
+    return section(title, html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
+
+
+def _tests(found: LabComparison) -> Html:
+    rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error), _chance(test.p_value),
+             "found" if test in found.tests_found else "") for test in found.tests.tests]
+    return section("All tests of the residual", grid(("Test", "Value", "Standard error", "p-value", ""), rows,
+                                                                words=(0, 4))
+                   + hint("A test is found when it is improbable in noise and large enough to matter."))
+
+
+def _numbers(found: LabComparison) -> Html:
+    rows = [(name, f"{move:+.1%}", "farther than usual" if name in found.far else "")
+            for name, move in found.moves.items()]
+    return section("What the refit moved", grid(("Number", "By", ""), rows, words=(0, 2)))
+
+
+def _titled(title: str, curve: Curve) -> str:
+    return f"{title}: would explain {curve.share:.0%} of the residual"
+
+
+def _measured(value: float | None, unit: str = "1") -> str:
+    """A number with its unit; nothing where it is not known."""
+    if value is None or not np.isfinite(value):
+        return ""
+    return f"{value:.3g} {unit}" if unit != "1" else f"{value:.3g}"
+
+
+def _chance(p_value: float) -> str:
+    if not np.isfinite(p_value):
+        return "cannot tell"
+    return "below 1e-9" if p_value < 1e-9 else f"{p_value:.2g}"
+
+
+_AROUND_S = 1.5
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The samples ``part`` of those that count in a run, by its number, and where that is in words."""
+
+    run: int
+    part: slice
+    words: str
+
+
+def worst_moment(standing: Standing) -> Moment:
+    """Around the largest residual in the worst place; on rigs, which stand where they are, of all."""
+    residuals, worst = standing.residuals, standing.where.worst_places(1)
+    names = short_names(residuals.runs)
+    if worst:
+        index = next(i for i, run in enumerate(residuals.runs) if run.name == worst[0].name)
+        run = residuals.runs[index]
+        at_m = run.distance_m[run.first:]
+        inside = np.flatnonzero((at_m >= worst[0].low) & (at_m < worst[0].high))
+    else:
+        index = int(np.argmax([np.abs(one).max() for one in residuals.residual]))
+        run = residuals.runs[index]
+        inside = np.arange(len(residuals.residual[index]))
+    middle = int(inside[np.abs(residuals.residual[index][inside]).argmax()])
+    where = f"{at_m[middle]:.0f} m" if worst else f"{(run.first + middle) / residuals.rate_hz:.1f} s"
+    reach = round(_AROUND_S * residuals.rate_hz)
+    return Moment(index, slice(max(0, middle - reach), middle + reach), f"{names[run.name]}, around {where}")
+
+
+_AT_BOUND = 1e-6
+_NAMED = 4
+
+
+def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
+    """The error before, after and of the noise: which of them, the error, and what it is of."""
+    return [
+        ("before", found.error_before, "as the file says, distances as recorded: where ridelog compare begins"),
+        ("", found.error_refitted, f"its numbers and the distances refitted within their tolerance, on {JUDGED_ON}"),
+        ("after", found.error_after, f"with {' and '.join(found.names)}, all refitted and judged in the same way"),
+        ("", found.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
+        ("of noise", found.noise_floor_error, "about, from the sensor's noise alone"),
+    ]
+
+
+def judgement(found: AddedEffects) -> list[str]:
+    """The effect's numbers, and whether it is to be kept."""
+    lines = [*removed_words(found.removed, found.band)]
+    lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
+    lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
+                           "{} refitted without it, {} with it, its noise alone about {}")
+    for one in found.new:
+        at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
+              and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
+                      if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
+        if at:
+            lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
+    if found.helps:
+        lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
+        lines += error_words(found.steps, found.noise_floor_error)[1:]
+    elif found.gains:
+        lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but on stretches "
+                     f"that no fit saw the error rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and "
+                     "so does what is weighed by its noise: it imitates something else.")
+    else:
+        lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
+                     f"{chance(found.p_value)}; these runs are no reason to keep it.")
+    return lines
+
+
+def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
+    """What the car's numbers, most moved first, had been taken for without the effects."""
+    together = " and ".join(names)
+    biased = [one for one in moved if one.biased]
+    if not biased:
+        return f"No number of the car moved by more than {BIAS_SIGMA:g} standard errors when {together} was added."
+    listed = ", ".join(one.name for one in biased[:_NAMED])
+    more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
+    worst = biased[0]
+    return (f"Without {together} these were biased: {listed}{more}. {worst.name} came out {_too_much(worst)}, "
+            f"{abs(worst.shift):.1f} standard errors away from what it is with {'it' if len(names) == 1 else 'them'}.")
+
+
+def _too_much(one: Number) -> str:
+    """By how much a number came out wrong without the effects."""
+    return f"{abs(one.without / one.found - 1):.1%} too {'high' if one.without > one.found else 'low'}"
+
+
+MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
+MOVED_HINT = ("Without, With: refitted without and with the effect, as a difference from the given value, ± "
+              "standard error. Now: the value in the new file. Shift: from Without to With, "
+              "in standard errors; above two the number was biased because the effect was missing.")
+
+
+def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, str, str]]:
+    """Under ``MOVED_HEADS``."""
+    for one in moved:
+        yield (one.name, f"{one.found:.5g}", f"{one.without / one.nominal - 1:+.1%}",
+               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}", f"{one.shift:+.1f}",
+               "was biased" if one.biased else "")
+
+
+# --- for a program ---
+
+
+def addition_json(found: AddedEffects) -> dict[str, Any]:
+    """The contract's object, of the effect that was added last."""
+    new = found.new[-1]
+    return {
+        "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
+        "error_before": found.error_before, "error_after": found.error_after,
+        "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
+        "error_unseen_before": found.error_refitted, "error_unseen_after": found.error_after,
+        **errors_json(found.steps, found.noise_floor_error),
+        **band_json(found.band), **removed_json(found.removed), "tolerance": found.tolerance,
+        "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
+        "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
+                     "without_standard_error": one.without_standard_error, "with": one.found,
+                     "with_standard_error": one.standard_error, "shift_standard_errors": one.shift,
+                     "written": one.found}
+                    for one in found.moved],
+        "signals": {name: {"error_refitted": one.before, "error_after": one.after,
+                           "noise_floor_error": one.noise_floor} for name, one in found.signals.items()},
+        "biased": [one.name for one in found.moved if one.biased],
+    }
+
+
+def addition_lines(found: AddedEffects) -> list[str]:
+    """What a person reads of an effect that was added."""
+    rows = [("", "Error", "Fit", "")]
+    rows += [(f"Error {which}:" if which else "", f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
+             for which, error, what in errors(found)]
+    return [
+        wrapped(judgement(found)), "", *columns(rows), "",
+        wrapped([bias(found.names, found.moved)]), "",
+        *columns([MOVED_HEADS, *moved_rows(found.moved)]), "", wrapped([MOVED_HINT]),
+    ]

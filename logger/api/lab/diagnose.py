@@ -1,0 +1,704 @@
+"""Which physical effect a model lacks: from drives over measured roads, or over one road that nobody measured.
+
+The answers, their words for a person and for a program, and the page: what is missing, how certain that is, and the
+shape of what no effect explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.drives import Run
+from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, word_of
+from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
+from logger.api.lab.compare import forces_section, spectra_section
+from logger.api.lab.question import DiagnoseQuestion
+from logger.api.lab.words import (
+    band_json,
+    drift_tile,
+    error_text,
+    error_words,
+    errors_json,
+    falling,
+    removed_json,
+    removed_section,
+    removed_words,
+)
+from logger.api.lab.words import looks_like as residual_looks_like
+from logger.api.question import Notify, Runs, each, function, silent
+from logger.api.shown import CommandResult
+from logger.api.vehicles import Model, model_of
+from logger.chart_data import Bars, Curves, Line
+from logger.errors import BadInput
+from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.lab.diagnosis import Diagnosis as LabDiagnosis
+from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
+from logger.lab.residuals.unexplained import Shape
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
+from logger.lab.selection.error_scale import JUDGED_ON
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
+from logger.lab.unknown_road import diagnosis
+from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
+from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
+from logger.lab.unknown_road.one_road import placed_by_road
+from logger.left_out import left_out_json, left_out_paragraph
+from logger.printable import percent
+from logger.profiles.track import Track
+from logger.report.charts import chart
+from logger.report.document import (
+    EMPTY,
+    Html,
+    bullets,
+    concatenated,
+    document,
+    grid,
+    heading,
+    hint,
+    paragraphs,
+    section,
+    tiles,
+)
+from logger.report.quantities import chance, columns, enumerated, finite, numbers_of, signal_errors, wrapped
+from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
+from logger.runs import Run as Record
+from logger.store.formats import drive_file
+from logger.vehicle.effect import Chosen
+
+Array = npt.NDArray[np.float64]
+
+_SHOWN = 8
+_PLACES_EVERY_M = 10.0
+_LEAST_SHARED_M = 50.0
+"""Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that was tried.
+
+    parameters       fitted, by name; ``standard_errors`` of those that are known
+    error            on stretches that no fit saw
+    p_value          how often noise alone would look like it, all candidates together
+    confused_with    effects that explain as much
+    """
+
+    effect: str
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    error: float
+    p_value: float
+    confused_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(CommandResult):
+    """Which physical effects a model lacks.
+
+    found                all that the lab found
+    baseline_error       of the model as it stands
+    noise_floor_error    that the sensor's noise alone makes
+    candidates           best first
+    verdict              names of the effects that are missing, the most certain first; empty: none
+    unexplained          whether something is left that no candidate explains
+    steps                models on the way, each with its error on what no fit saw
+    vehicle              its name
+    """
+
+    found: Any
+    baseline_error: float
+    noise_floor_error: float
+    candidates: tuple[Candidate, ...]
+    verdict: tuple[str, ...]
+    unexplained: bool
+    steps: tuple[tuple[str, float], ...]
+    vehicle: str
+    next_command: str
+
+    def figures(self) -> list[Html]:
+        """How the error fell."""
+        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+
+    def as_page(self, of: str) -> Html:
+        """The diagnosis as one HTML document."""
+        return page(self.found, self.vehicle)
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """What to do now; a command in one piece, so that it can be copied."""
+        return self.next_command
+
+
+def diagnosed(question: DiagnoseQuestion) -> Diagnosis:
+    """The answer to ``DiagnoseQuestion``, which says what is raised."""
+    if question.same_road:
+        return _diagnosed_same_road(question)
+    bench = bench_with(question, None if question.candidates is not None else "ridelog diagnose")
+    bench = replace(bench, effects=among(bench.effects, question.candidates))
+    found = bench.diagnosed(question.progress)
+    return diagnosis_of(found, bench, None if question.list_all else _SHOWN, _next(question, bench, found))
+
+
+diagnose = function("diagnose", DiagnoseQuestion, diagnosed)
+
+
+def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, next_command: str = ""
+                 ) -> Diagnosis:
+    """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
+    left_out = runs_left_out(bench.runs.runs)
+    text = [wrapped([_compared(bench)]), "", *diagnosis_lines(found, most), *left_out_paragraph(left_out)]
+    errors = {one.effect.name: one.standard_errors for one in found.missing}
+    candidates = tuple(Candidate(one.effect.name, dict(one.values), dict(errors.get(one.effect.name, {})), one.error,
+                                 one.p_value, tuple(one.confused_with)) for one in found.candidates)
+    return Diagnosis("\n".join(text), diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
+                     found.noise_floor_error, candidates, found.verdict, found.unexplained,
+                     tuple((one.words, one.error) for one in found.steps), bench.model.vehicle.name, next_command)
+
+
+def _compared(bench: Bench) -> str:
+    runs, model = bench.runs.runs, bench.model
+    seconds = sum((run.count - run.first) / run.rate_hz for run in runs)
+    has = f", with {', '.join(one.effect.name for one in model.effects)}," if model.effects else ""
+    return (f"{model.vehicle.name}{has} on {len(runs)} run{'s' * (len(runs) != 1)}, {seconds:.0f} s. "
+            f"{len(bench.effects)} effects are known.")
+
+
+def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
+    if found.missing:
+        one = found.missing[0].effect.name
+        return "Next: " + question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
+    if found.conflicts and not found.exceeds_noise:
+        words = (f"Next: see whether {', '.join(found.conflicts)} of the vehicle's file can be right. From the runs "
+                 "alone they are found by")
+        return wrapped([words]) + "\n" + question.command(f"identify --free {','.join(found.conflicts)} {{}}")
+    if found.unexplained:
+        return wrapped(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
+                           "ridelog compare shows where the residual is."])
+    return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."
+
+
+# --- without a profile ---
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SameRoadDiagnosis(Diagnosis):
+    """Which physical effects a model lacks, as far as drives over an unmeasured road show it.
+
+    An error is rms(measured - model) / rms(measured) of each drive over the road estimated from the other drives.
+
+    run_errors       by name of the run: error before, and with the effects that were found
+    taken_by_road    effects that another road would imitate, and the share of their information that remains with it
+    not_tried        effects that could not be tried, and why
+    undecided        effects that explain a little, but may only imitate something else that is missing
+    cannot_tell      sentences: what these drives do not show
+    """
+
+    run_errors: Mapping[str, tuple[float, float]]
+    taken_by_road: Mapping[str, float]
+    not_tried: Mapping[str, str]
+    undecided: tuple[str, ...]
+    cannot_tell: tuple[str, ...]
+
+
+def diagnose_same_road(
+    vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
+    effect_files: Sequence[Path | str] = (), tolerance: float | None = None, progress: Notify = silent,
+) -> SameRoadDiagnosis:
+    """As ``diagnose`` with ``same_road``: from two drives or more over one road that nobody measured.
+
+    Raises BadInput for fewer than two runs, drives that are plainly over two roads, and as ``diagnose``. Source: the
+    road is random as ISO 8608 lets expect it, and its waves are found with the car (``logger.lab.unknown_road``).
+
+    >>> found = diagnose_same_road(car, runs, candidates=["sensor_offset", "sensor_gain"])
+    >>> found.verdict, list(found.taken_by_road)
+    ((), ['sensor_gain'])
+    """
+    return _diagnosed_same_road(DiagnoseQuestion(
+        vehicle, runs, candidates=candidates, effect_files=effect_files, tolerance=tolerance, progress=progress,
+        same_road=True, list_all=True))
+
+
+def _diagnosed_same_road(question: DiagnoseQuestion) -> SameRoadDiagnosis:
+    """The answer to ``DiagnoseQuestion`` with ``same_road``."""
+    names = [str(one.path if isinstance(one, Run) else one) for one in each(question.runs)]
+    if not 2 <= len(names) == len(set(names)):
+        raise question.wrong("same_road", ": expected two runs or more, each once")
+    model = model_of(question.vehicle)
+    records = records_of([_drive(one) for one in each(question.runs)])
+    found = _diagnosed(model, records, question)
+    summary = same_road_json(found)
+    most = None if question.list_all else _SHOWN
+    return SameRoadDiagnosis(
+        "\n".join(same_road_lines(found, names, most)), summary, found, summary["baseline_error"],
+        summary["noise_floor_error"], tuple(
+            Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
+                      tuple(one["confused_with"])) for one in summary["candidates"]),
+        tuple(summary["verdict"]), found.unexplained, tuple((one["step"], one["error"]) for one in summary["steps"]),
+        model.vehicle.name, "", run_errors=dict(zip(names, found.by_run, strict=True)),
+        taken_by_road=summary["taken_by_road"], not_tried=summary["not_tried"],
+        undecided=tuple(summary["undecided"]), cannot_tell=tuple(cannot_tell(found)))
+
+
+def _drive(given: Run | Path | str) -> tuple[drive_file.Drive, str]:
+    """A drive and its name; a profile beside it is not read."""
+    if isinstance(given, Run):
+        return given, str(given.path)
+    file = Path(given) / drive_file.DRIVE if Path(given).is_dir() else Path(given)
+    return drive_file.read_drive(file), str(given)
+
+
+def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
+    """Drives and their names, checked together; on a flat road, for none is known. BadInput for fewer than two, or one
+    that the others cannot be used with."""
+    if len(drives) < 2:
+        raise BadInput("expected two runs or more over one road, found one")
+    flat = Track(1.0, np.zeros(2))
+    for number, (drive, _) in enumerate(drives):
+        file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
+        check_record(drive, file, [one for one, _ in drives[:number]])
+        check_distances(drive, file)
+    by_receiver = any(one.facts.places_by == BY_RECEIVER for one, _ in drives)
+    if any(_counts_for_itself(one) for one, _ in drives) and all(_was_extracted(one) for one, _ in drives):
+        drives, by_receiver = _on_one_distance(drives), True
+    facts = replace(UNKNOWN, places_by=BY_RECEIVER) if by_receiver else UNKNOWN
+    return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat, facts=facts)
+                         for one, name in drives])
+
+
+def _was_extracted(drive: drive_file.Drive) -> bool:
+    """Whether a drive was extracted, and has positions."""
+    return drive.facts.source is not None and drive.lat_deg is not None and bool(np.isfinite(drive.lat_deg).all())
+
+
+def _counts_for_itself(drive: drive_file.Drive) -> bool:
+    """Whether that was without a profile, so that its distance begins where it did."""
+    return _was_extracted(drive) and drive.facts.places_by is None
+
+
+def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tuple[drive_file.Drive, str]]:
+    """The longest part of each drive in which the car moved, on the distance of the one that goes farthest, by the
+    start that comes nearest to their positions: what these wander by, over a minute or so, is no motion, and ways by a
+    receiver's speeds have no factor.
+
+    BadInput for a drive that goes elsewhere.
+    """
+    driven = [(_longest_part(one), name) for one, name in drives]
+    along, _ = max(driven, key=lambda pair: float(np.ptp(pair[0].distance_m)))
+    metres = np.arange(along.distance_m[0], along.distance_m[-1], _PLACES_EVERY_M)
+    line = MeasuredLine.of(metres, *(np.interp(metres, along.distance_m, one) for one in _places(along)))
+    found = []
+    for drive, name in driven:
+        along_m, aside_m = line.passed(*_places(drive))
+        near = (aside_m < ASIDE_M) & (along_m > metres[0]) & (along_m < metres[-1])
+        if np.ptp(drive.distance_m[near]) < _LEAST_SHARED_M if near.any() else True:
+            raise BadInput(f"{name}: expected a drive over the road of {along.path}, found none of its positions there "
+                           f"for {_LEAST_SHARED_M:g} m")
+        farther_m = float(np.median((along_m - drive.distance_m)[near]))
+        found.append((replace(drive, distance_m=drive.distance_m + farther_m), name))
+    return found
+
+
+def _places(drive: drive_file.Drive) -> tuple[Array, Array]:
+    assert drive.lat_deg is not None and drive.lon_deg is not None
+    return drive.lat_deg, drive.lon_deg
+
+
+def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
+    """BadInput where the car hardly moved."""
+    part = max(driven_parts(drive), key=lambda one: one.stop - one.start)
+    rows = ("time_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg")
+    return replace(drive, usable=None if drive.usable is None else drive.usable[part],
+                   **{name: getattr(drive, name)[part] for name in rows})
+
+
+def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuestion) -> UnknownRoadDiagnosis:
+    """Which effects the model lacks. BadInput as ``diagnose_same_road``."""
+    off, given = tolerance_of(question.tolerance), model.given or model.vehicle
+    word, notify = word_of(question.vehicle, model), question.progress
+    for one in model.effects:
+        if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
+            raise BadInput(f"{word}: its effect {one.effect.name} needs a road that is known under the right wheels "
+                           "too")
+    effects, _ = known_effects(model, list(map(str, question.effect_files)))
+    try:
+        if by_receiver := any(one.facts.places_by == BY_RECEIVER for one in records):
+            notify("laying the drives on one distance by the road that they felt")
+            records = placed_by_road(records, given, off, model.effects, model.vehicle)
+        problem = SameRoad(records, given, off, model.vehicle, exact_places=not by_receiver)
+        return diagnosis.diagnose_same_road(problem, among(effects, question.candidates), model.effects, notify)
+    except NotOneRoad as error:
+        raise BadInput(str(error)) from None
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None
+
+
+_MOST_HIDDEN = 6
+_SUSPECT = 0.1
+"""An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
+
+
+def diagnosis_summary(found: LabDiagnosis) -> list[str]:
+    """What is missing, how certain that is, and what it could be instead: paragraphs."""
+    lines = [*removed_words(found.removed, found.band)]
+    for one, group in zip(found.missing, groups(found), strict=True):
+        lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
+    if not found.missing and not found.unexplained:
+        more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
+        lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
+                     "is hardly more than the sensor's noise.")
+    if found.coloured and not found.exceeds_noise:
+        lines.append("The sensor's noise is louder at some frequencies than at others: it is as loud where the car is "
+                     "shaken little as where it is shaken much, and has nothing to do with the road.")
+    if found.exceeds_noise:
+        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
+                     f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
+        if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
+            lines.append(f"Candidates that improve the fit by less than {IMITATION:.0%} of what a full explanation "
+                         "would are not named: they may only imitate what is missing.")
+    if found.conflicts:
+        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
+        lines.append(f"These numbers of the vehicle's file are beyond their tolerance: {off}. Measure them: the file "
+                     "is wrong there, or an effect is missing that no candidate explains.")
+    lines += error_words(found.steps, found.noise_floor_error)
+    lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
+                           "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
+    lines += _faint(found)
+    dropped = [name for name in _on_the_way(found) if name not in found.verdict]
+    if dropped:
+        why = "because the others explain it" if found.verdict else "at an end of its range, or where it does nothing"
+        lines.append(f"Added during the search and dropped again, {why}: {', '.join(dropped)}.")
+    return lines
+
+
+def looks_like(found: LabDiagnosis) -> list[str]:
+    """What no candidate explains, described; nothing where no more than noise is left."""
+    return [] if found.shape is None else residual_looks_like(found.shape)
+
+
+def untested(found: LabDiagnosis) -> list[str]:
+    """Effects that these runs cannot show, and which drive would."""
+    lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
+    lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
+              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed{_alike(one)}. To see it: "
+              f"{one.effect.shown_by}."
+              for one in found.undetectable[:_MOST_HIDDEN]]
+    if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
+        lines.append(f"These runs could also miss: {', '.join(rest)}.")
+    return lines
+
+
+def _alike(one: Undetectable) -> str:
+    """What of the car hides an effect."""
+    return f": {one.alike}, within its tolerance, does nearly the same" if one.alike else ""
+
+
+def groups(found: LabDiagnosis) -> list[list[str]]:
+    """Each effect of the verdict with those that explain as well in its place, the likeliest first."""
+    return [[name, *found.candidate(name).confused_with] for name in found.verdict]
+
+
+def _missing(found: LabDiagnosis, one: Chosen) -> str:
+    name, numbers = one.effect.name, f": {numbers_of(one)}" if one.values else ""
+    candidate = found.candidate(name)
+    likely = f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}."
+    says = "would explain part of what is missing, or imitates something else" if found.unexplained else "is missing"
+    if candidate.confused_with:
+        group = enumerated([name, *candidate.confused_with], "or")
+        return (f"One of {group} {says}; these runs cannot distinguish them. The numbers are for {name} "
+                f"({one.effect.title}){numbers}. {likely}")
+    return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
+
+
+def _faint(found: LabDiagnosis) -> list[str]:
+    """What comes nearest to being named, where it is likelier than not to be more than noise."""
+    others = [one for one in found.candidates if one.effect.name not in found.verdict]
+    nearest = min(others, key=lambda one: one.p_value, default=None)
+    if found.unexplained or nearest is None or not FALSE_ALARM <= nearest.p_value < _SUSPECT:
+        return []
+    return [f"{nearest.effect.name} comes near to being named: noise alone would look like it in "
+            f"{percent(nearest.p_value)} of such searches, and {percent(FALSE_ALARM)} is the most that is allowed. To "
+            f"know: {nearest.effect.shown_by}."]
+
+
+def _confusion(names: list[str], found: LabDiagnosis) -> str:
+    """Which drive would separate effects that explain alike."""
+    drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
+    return (f"{enumerated(names, 'and')} explain about as much of the residual as each other. Drives that would "
+            f"separate them: {'; '.join(drives)}. ridelog plan says beforehand whether a drive would.")
+
+
+def _on_the_way(found: LabDiagnosis) -> list[str]:
+    return [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
+
+
+def table(found: LabDiagnosis, most: int | None = None) -> Iterator[tuple[str, str, str, str]]:
+    """The candidates, best first: name, error, chance, numbers."""
+    by_name = {one.effect.name: one for one in found.missing}
+    for one in found.candidates[:most]:
+        name = one.effect.name
+        numbers = numbers_of(by_name.get(name, Chosen(one.effect, one.values)))
+        yield name, f"{one.error:.3f}", chance(one.p_value), numbers
+
+
+# --- for a program ---
+
+
+def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
+    """The diagnosis as one JSON object."""
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    return {
+        "baseline_error": found.baseline_error, "noise_floor_error": found.noise_floor_error,
+        "unseen_noise_floor_error": found.noise_floor_error, "judged_on": JUDGED_ON,
+        "candidates": [
+            {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),
+             "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
+            for one in found.candidates],
+        "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
+        "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
+        "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
+                    for name, one in found.signals.items()},
+        "tolerance": found.tolerance, "coloured_noise": found.coloured,
+        "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        **errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
+        "not_tried": found.not_tried,
+        "hidden": {one.effect.name: one.deviations for one in found.undetectable},
+        "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
+        **band_json(found.band), **removed_json(found.removed),
+        "sentences": [*diagnosis_summary(found), *looks_like(found)],
+    }
+
+
+def _shape_json(shape: Shape) -> dict[str, Any]:
+    forces, line = shape.tests.forces, shape.line
+    return {
+        "sentences": residual_looks_like(shape),
+        "force_by_rate": {"rate_mps": forces.by_rate.at.tolist(), "force_n": forces.by_rate.force_n.tolist(),
+                          "standard_error_n": forces.by_rate.error_n.tolist(), "share": forces.by_rate.share},
+        "force_by_travel": {"travel_m": forces.by_travel.at.tolist(), "force_n": forces.by_travel.force_n.tolist(),
+                            "standard_error_n": forces.by_travel.error_n.tolist(), "share": forces.by_travel.share},
+        "frequency": [{"from_hz": part.low, "to_hz": part.high, "error_power_share": part.share, "name": part.name}
+                      for part in shape.where.frequency],
+        "repeats_every_m": 1 / line.at_per_m if line is not None and line.found and not line.steady else None,
+    }
+
+
+def diagnosis_lines(found: LabDiagnosis, most: int | None) -> list[str]:
+    """What a person reads of a diagnosis."""
+    shown = [wrapped(diagnosis_summary(found))]
+    if described := looks_like(found):
+        shown += ["", "What it looks like:", wrapped(described, "- ")]
+    rows = [("Effect", "Error", "p-value", "Numbers"), *table(found, most)]
+    more = len(found.candidates) - len(rows) + 1
+    shown += ["", "One effect at a time on the refitted model, those of the verdict first; p-values are for all",
+              "candidates together:", *columns(rows)]
+    if more > 0:
+        shown.append(f"and {more} more (ridelog diagnose --all)")
+    if found.no_better:
+        shown.append(wrapped([f"No better than the numbers refitted: {', '.join(found.no_better)}."]))
+    if hidden := untested(found):
+        shown += ["", "What these runs cannot tell:", wrapped(hidden, "- ")]
+    return shown
+
+
+_LEAST_SHARE, _MOST_BARS = 0.01, 12
+_MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
+
+
+def page(found: LabDiagnosis, vehicle: str) -> Html:
+    """The diagnosis as one HTML document."""
+    title = f"{vehicle}: which effect is missing"
+    return document(title, [
+        heading(title, ", ".join(found.runs)),
+        _tiles(found), paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
+        shape_sections(found),
+        section("How the error fell", _diagnosis_steps(found)), car_sections(found),
+        section("All candidates", _candidates(found)),
+        section("What these runs cannot tell", bullets(untested(found))),
+        section("Where this is from", bullets(sources(found))),
+    ])
+
+
+def sources(found: LabDiagnosis) -> list[str]:
+    """What to cite for the effects that are missing."""
+    return [f"{one.effect.name}: {one.effect.source}" for one in found.missing]
+
+
+def shape_sections(found: LabDiagnosis) -> Html:
+    """What no candidate explains: sentences and pictures; nothing where nothing is unexplained."""
+    if found.shape is None:
+        return EMPTY
+    return (section("What no effect explains", bullets(looks_like(found)))
+            + section("Where it sits", _where(found.shape)) + spectra_section(found.shape.residuals)
+            + _forces(found.shape))
+
+
+def _forces(shape: Shape) -> Html:
+    """The missing force; a sentence where no force in the suspensions would do."""
+    forces = shape.tests.forces
+    if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
+        return section("The missing force", paragraphs([
+            "No force in the suspensions that goes with their speed or travel would explain it: it comes from "
+            "elsewhere."]))
+    return forces_section(forces)
+
+
+def _tiles(found: LabDiagnosis) -> Html:
+    missing = len(found.verdict)
+    count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
+    unknown = "something unknown" if not missing else f"{count}, and more"
+    return tiles([
+        ("Error of the model as it stands", f"{found.baseline_error:.3f}", "as recorded"),
+        ("With what is missing" if missing else "With its numbers refitted", f"{found.final_error:.3f}", "refitted"),
+        *drift_tile(found.removed),
+        ("The sensor's noise alone", f"{found.noise_floor_error:.3f}", ""),
+        ("Missing", unknown if found.unexplained else count, ""),
+    ])
+
+
+def _diagnosis_steps(found: LabDiagnosis) -> Html:
+    drawn = falling(f"Error on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
+                    found.noise_floor_error)
+    rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(found.steps)]
+    return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
+
+
+def _candidates(found: LabDiagnosis) -> Html:
+    bars = Bars("The error with each candidate", "error", tuple(
+        (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
+        (found.baseline_error, "as it stands"))
+    return (chart(bars) + grid(("Effect", "Error", "p-value", "Numbers"), table(found), words=(0, 3))
+            + hint("One effect at a time on the refitted model, those that are missing first, then by p-value: how "
+                   "probable it is that noise looks like any of the candidates. The error is on "
+                   f"{JUDGED_ON}."))
+
+
+def car_sections(found: LabDiagnosis) -> Html:
+    """How far the car's numbers moved, as bars, and the forces of its springs and dampers as fitted, as curves."""
+    if found.car is None:
+        return EMPTY
+    bars = Bars("How far each number was refitted", "% of the file's value", tuple(
+        (name, 100 * share) for name, (share, _) in found.car.moved.items()))
+    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "more than it should" if name in found.conflicts else "")
+            for name, (share, tolerance) in found.car.moved.items()]
+    numbers = chart(bars) + grid(("Number", "Refitted by", "Usual", ""), rows, words=(0, 3)) + hint(
+        "A number that has to move far may stand in for an effect that is not among the candidates.")
+    curves = concatenated(map(_force, found.car.curves))
+    said = hint("Over what the model's suspensions reach in these runs, but for 0.1 % of the time. Forces with a "
+                "memory are not in it.") if curves else EMPTY
+    return (section("The car's own numbers", numbers if rows else EMPTY)
+            + section("Its springs and dampers", curves + said))
+
+
+def _force(one: ForceCurve) -> Html:
+    return chart(Curves(
+        f"{one.axle.capitalize()} suspension by its {one.motion}",
+        f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
+        (Line("as fitted", one.at, one.after_n), Line("as the file says", one.at, one.before_n))))
+
+
+def _where(shape: Shape) -> Html:
+    """By frequency, and along the way."""
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", error_text(part, 2))
+            for part in shape.where.frequency]
+    drawn = grid(("Band", "Hz", "Share of the residual", "Error"), rows)
+    if shape.line is not None and shape.line.found:
+        drawn += chart(Curves(f"What repeats along the way, in {shape.line.run}", "times per metre",
+                                "power over its mean", (Line("residual", shape.line.per_m, shape.line.power),)))
+    return drawn
+
+
+def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
+    """What is missing, how certain that is, and what it could be instead: paragraphs."""
+    lines = []
+    for one in found.missing:
+        candidate = next(other for other in found.candidates if other.name == one.effect.name)
+        numbers = f": {numbers_of(one)}" if one.values else ""
+        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
+                     f"looks like this, all candidates together: {chance(candidate.p_value)}.")
+        if candidate.confused_with:
+            names = enumerated([one.effect.name, *candidate.confused_with], "and")
+            lines.append(f"{names} explain about as much as each other: these drives cannot distinguish them.")
+        if candidate.stands_in:
+            lines.append(f"{one.effect.name} bends the laws of the car: in each drive over each stretch of road the "
+                         "linear car that comes nearest stood in for it, which its numbers are as right as.")
+    if found.undecided:
+        names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
+        lines.append(f"Not decided: {names} would explain a little, more than noise would, but less than a tenth of "
+                     f"what no road explains. {'They' if them else 'It'} may only imitate something else that is "
+                     "missing.")
+    elif not lines:
+        lines.append("None of the effects that can be tried without a profile is missing.")
+    by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
+               for index, (words, error) in enumerate(_same_road_steps(found))]
+    lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
+                 f"noise alone makes {found.floor_error:.3f}.")
+    if found.unexplained:
+        cause = ("something else is missing, maybe" if found.exact_places else
+                 "the distances of these drives, by a receiver, are off within seconds, or something is missing, maybe")
+        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: {cause} one of the "
+                     "effects that only a measured road can show.")
+    return lines
+
+
+def _same_road_steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
+    """Models on the way, each with its error."""
+    words = ["the vehicle as its file says", "its numbers refitted within their tolerance",
+             *(f"with {one.effect.name}" for one in found.missing)]
+    return list(zip(words, found.errors, strict=True))
+
+
+def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
+    """What these drives cannot show or identify, in sentences."""
+    lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
+             "noise." for one, other in found.doubtful]
+    if found.absorbed_by_road:
+        lines.append(f"{', '.join(found.absorbed_by_road)}: a road of another shape, which nobody measured, would look "
+                     "the same.")
+    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
+              for why in dict.fromkeys(found.untried.values())]
+    lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
+              "deviations."
+              for name, deviations in found.hidden.items()]
+    return [*lines, *(f"The car's numbers: {one.words}" for one in found.confounded)]
+
+
+def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
+    """What a person reads; ``most`` so many candidates, None: all."""
+    rows = [("Effect", "Error", "p-value", "Numbers")]
+    rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
+              numbers_of(one.one)) for one in found.candidates[:most]]
+    by_run = [("Run", "Error before", "after"),
+              *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
+                zip(runs, found.by_run, strict=True))]
+    return [wrapped(same_road_summary(found)), "",
+            "One effect at a time, those that are missing first; p-values are for all candidates together:",
+            *columns(rows), "", *columns(by_run), "",
+            "What these drives cannot tell:", wrapped(cannot_tell(found), "- ")]
+
+
+def same_road_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
+    """The diagnosis as one JSON object."""
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    values = {one.effect.name: dict(one.values) for one in found.missing}
+    return {
+        "baseline_error": found.errors[0], "noise_floor_error": found.floor_error,
+        "candidates": [
+            {"effect": one.name, "parameters": values.get(one.name, dict(one.one.values)),
+             "error": one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "fitted": one.fitted,
+             "standard_errors": errors.get(one.name, {}), "log_likelihood_gain": one.gain / 2}
+            for one in found.candidates],
+        "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
+        "left_over_noise": 1 + found.excess,
+        "steps": [{"step": words, "error": error} for words, error in _same_road_steps(found)],
+        "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
+        "undecided": [one.name for one in found.undecided],
+        "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "hidden": dict(found.hidden),
+        "sentences": [*same_road_summary(found), *cannot_tell(found)],
+    }

@@ -1,0 +1,365 @@
+"""A law learned where no known effect explains what a model lacks: answer, words, JSON, its file, and the page.
+
+The page has what the law is, its picture, what it brings, and what it may be instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from logger.api.lab.bench import Bench, bench_with
+from logger.api.lab.diagnose import looks_like, shape_sections
+from logger.api.lab.question import LearnQuestion
+from logger.api.lab.words import error_words, errors_json, falling, removed_json, removed_words
+from logger.api.question import Notify, function, silent
+from logger.api.shown import CommandResult
+from logger.chart_data import Chart, Curves
+from logger.files import write_text
+from logger.lab.diagnosis import Diagnosis as LabDiagnosis
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.learn import Law, Learning
+from logger.lab.laws.learn import learn as learn_law
+from logger.lab.laws.picture import picture
+from logger.lab.laws.refusals import Nearest, Refusal
+from logger.lab.selection.add_effect import AddedEffects, add
+from logger.lab.selection.error_scale import Step
+from logger.plugins import catalogue
+from logger.report.charts import chart
+from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.quantities import finite, measured, numbers_of, unit_of, wrapped
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_sizes import sized
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedModel:
+    """What was learned on a bench, and the model with it, fitted on all of the runs; None where no law is learned."""
+
+    learning: Learning
+    addition: AddedEffects | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LearnedLaw(CommandResult):
+    """A law out of the data, or why there is none.
+
+    found                all that was learned
+    vehicle              name of the one that it is of
+    family               that it is of; None: no law is learned
+    words                what it is, in a sentence; or why there is none
+    source               text of the Python file that holds it as an own effect; empty: none
+    parameters           with ``standard_errors``, by name
+    error_before         of the model as it was; ``error_after`` with the law, ``error_after_unseen`` on what no fit saw
+    noise_floor_error    that the sensor's noise alone makes
+    verdict              known effects that are missing, together with the law or instead of one
+    """
+
+    found: LearnedModel
+    vehicle: str
+    family: str | None
+    words: str
+    source: str
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    error_before: float
+    error_after: float
+    error_after_unseen: float
+    noise_floor_error: float
+    verdict: tuple[str, ...]
+    curves: tuple[Chart, ...]
+    steps: tuple[tuple[str, float], ...]
+
+    def charts(self) -> Sequence[Chart]:
+        """The law over the motions that the runs had."""
+        return self.curves
+
+    def figures(self) -> list[Html]:
+        """How the error fell, and the law."""
+        return [falling("How the error fell", self.steps, self.noise_floor_error),
+                *super().figures()]
+
+    def write(self, path: Path | str, option: str = "--out") -> None:
+        """Write the law's file (.py), or the page (.html). Without a law there is no file: ``source`` is empty."""
+        if Path(path).suffix == ".html":
+            write_text(Path(path), self.as_page(""))
+        elif self.source:
+            write_text(Path(path), self.source)
+            self._json["law"] = str(path)
+
+    def as_page(self, of: str) -> Html:
+        """What was learned as one HTML document."""
+        return page(self.found.learning, self.found.addition, self.curves[0] if self.curves else None, self.vehicle,
+                    str(self._json["law"] or "law.py"))
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """How to add the law."""
+        law = next(iter(written.get("--out", ())), None)
+        if not self.source or law is None:
+            return ""
+        return "Next: " + question.command(
+            f"add-effect {law if law.is_absolute() else f'./{law}'} {{}} --out with-law.yaml")
+
+
+def law_of(question: LearnQuestion) -> LearnedLaw:
+    """The answer to ``LearnQuestion``, which says what is raised."""
+    bench = bench_with(question, "ridelog learn")
+    found = learned(bench, question.progress)
+    summary = as_json(found.learning, found.addition, None)
+    drawn = picture_of(found)
+    steps = tuple((one["step"], one["error"]) for one in summary["steps"])
+    return LearnedLaw(
+        "\n".join(law_lines(found.learning, found.addition)), summary, found, bench.model.vehicle.name,
+        summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
+        summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
+        summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
+
+
+learn = function("learn", LearnQuestion, law_of)
+
+
+def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
+    """What is learned on a bench."""
+    families = catalogue("logger.lab.laws.families", "FAMILY")
+    known = {name: sized(one, bench.model.vehicle) for name, one in shipped_effects().items()}
+    with bench.blamed():
+        found = learn_law(bench.posterior(searches=True), bench.effects, families, {**known, **bench.effects},
+                          bench.model.effects, notify)
+        if found.law is None:
+            return LearnedModel(found, None)
+        notify("fitting the car without and with the law")
+        added = [bench.filed(one) for one in found.law.effects]
+        return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
+                                       len(found.law.draft.effect.trials()), found.law.state))
+
+
+def with_law(given: Bench, addition: AddedEffects, law: Path) -> tuple[Bench, AddedEffects]:
+    """A bench that knows the law of a file, and what was added with the effect of that file in it."""
+    effect, file = given.asked_for(str(law), {}, str(law))
+    effects = tuple(replace(one, effect=effect, file=file) if one.effect.name == effect.name else one
+                    for one in addition.effects)
+    return given.with_effect(effect, file), replace(addition, effects=effects)
+
+
+def picture_of(found: LearnedModel) -> Curves | None:
+    """The law over the motions that the runs had; None where there is none, or it is no force."""
+    law, addition = found.learning.law, found.addition
+    if law is None or addition is None:
+        return None
+    draft: Draft = law.draft
+    one = next(one for one in addition.new if one.effect.name == draft.name)
+    return picture(draft, one, addition.errors, found.learning.context)
+
+
+NOTHING = "nothing is missing; no law is learned"
+
+
+def words(law: Law, addition: AddedEffects) -> str:
+    """What it is: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm, front axle only"."""
+    one = law_learned(law, addition)
+    said = law.family.words(law.draft, one, partial(_number, one))
+    return said + (f", {law.draft.axle} axle only" if law.draft.axle else "")
+
+
+def _number(one: Chosen, name: str, factor: float = 1.0, unit: str | None = None) -> str:
+    error = one.standard_errors.get(name)
+    said = measured(one.values[name] * factor, None if error is None else error * factor)
+    return f"{said} {unit_of(name) if unit is None else unit}".rstrip()
+
+
+def law_learned(law: Law, addition: AddedEffects) -> Chosen:
+    """The law with its numbers and their errors."""
+    return next(one for one in addition.new if one.effect.name == law.draft.name)
+
+
+def why_none(found: Learning) -> str:
+    """Why no law is learned."""
+    if found.refused is not None:
+        return _refused(found.refused)
+    if not found.verdict and not found.unexplained:
+        return NOTHING
+    if not found.verdict:
+        return "something is missing that no known effect and no law of these families explains; no law is learned"
+    names = " and ".join(found.verdict)
+    many = len(found.verdict) > 1
+    if found.unexplained:
+        return (f"{names} explain{'s' * (not many)} part of what is missing, and no law of these families explains it "
+                "better; no law is learned")
+    return f"{names} explain{'s' * (not many)} it; no law is learned"
+
+
+def _refused(one: Refusal) -> str:
+    add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
+    return f"{one.title} would explain it best, but {one.why}{add}; no law is learned"
+
+
+def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
+    """What a person reads."""
+    if found.law is None or addition is None:
+        assert found.diagnosis is not None
+        said = why_none(found)
+        removed = removed_words(found.diagnosis.removed, found.diagnosis.band)
+        lines = [wrapped([*removed, f"{said[0].upper()}{said[1:]}."])]
+        lines += [f"  {one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values]
+        if shape := looks_like(found.diagnosis):
+            lines += ["", wrapped(shape, "- ")]
+        return [*lines, "", wrapped([_without(found.diagnosis)])]
+    return [wrapped(sentences(found.law, addition))]
+
+
+def sentences(law: Law, addition: AddedEffects) -> list[str]:
+    """The law, what it brings, and what it may be instead: paragraphs."""
+    said = words(law, addition)
+    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.",
+             _errors(addition)]
+    if law.effects:
+        beside = [one for one in addition.new if one.effect.name != law.draft.name]
+        lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
+                     + ". The law was fitted with these: they belong in the vehicle as well.")
+    share = max(law.listed, 0.0) / law.with_law
+    lines.append(f"The known effects alone explain {share:.0%} of what the model with the law does (2 ln of the "
+                 f"evidence {law.listed:.0f} of {law.with_law:.0f}).")
+    lines += _nearest(law.nearest, law)
+    if law.rivals:
+        others = [f"{one.draft.title}: {one.family.shown_by}" for one in law.rivals]
+        lines.append(f"These runs cannot distinguish it from {' or '.join(one.draft.title for one in law.rivals)}: "
+                     "each explains about as much of the residual. Drives that would: "
+                     + "; ".join([f"{law.draft.title}: {law.family.shown_by}", *others]) + ".")
+    return lines
+
+
+def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
+    if nearest is None:
+        return ["No known effect of its kind explains any part of it."]
+    name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
+    numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
+    if nearest.as_good:
+        return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
+                f"runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
+                f"ridelog add-effect {name}."]
+    return [f"The known effect that comes nearest is {name}{numbers}: in its place it explains {nearest.share:.0%} of "
+            f"what it does (2 ln of the evidence {gap:.0f} less)."]
+
+
+def _errors(addition: AddedEffects) -> str:
+    steps = (*addition.steps[:-1], Step("with the law", addition.error_after))
+    return " ".join(error_words(steps, addition.noise_floor_error))
+
+
+def _without(diagnosis: LabDiagnosis) -> str:
+    return " ".join(error_words(diagnosis.steps, diagnosis.noise_floor_error))
+
+
+def source_of(found: Learning, addition: AddedEffects | None) -> str:
+    """The law's file; empty where there is none."""
+    law = found.law
+    if law is None or addition is None:
+        return ""
+    said = words(law, addition)
+    seconds = sum((run.count - run.first) / run.rate_hz for run in found.context.runs)
+    count = len(found.context.runs)
+    head = [f"{said[0].upper()}{said[1:]}.",
+            f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
+            "Its numbers begin where that fit ended: ridelog add-effect with this file fits them again, with the car."]
+    return law.draft.text(law_learned(law, addition).values, head)
+
+
+# --- for a program ---
+
+
+def as_json(found: Learning, addition: AddedEffects | None, path: str | None) -> dict[str, Any]:
+    """What was learned as one JSON object; ``path``: of the law's file."""
+    law, diagnosis = found.law, found.diagnosis
+    if law is None or addition is None:
+        assert diagnosis is not None
+        return {
+            "law": None, "family": None, "words": why_none(found), "parameters": {}, "standard_errors": {},
+            "error_before": diagnosis.baseline_error, "error_after": diagnosis.final_error,
+            "error_after_unseen": diagnosis.steps[-1].error, "noise_floor_error": diagnosis.noise_floor_error,
+            "verdict": list(found.verdict), "unexplained": diagnosis.unexplained,
+            "refused": found.refused and {"law": found.refused.title, "why": found.refused.why},
+            "nearest": _nearest_json(found.refused.known if found.refused else None),
+            "steps": [{"step": one.words, "error": one.error} for one in diagnosis.steps],
+            **removed_json(diagnosis.removed),
+        }
+    one = law_learned(law, addition)
+    return {
+        "law": path, "family": law.family.name, "words": words(law, addition), "effect": law.draft.name,
+        "axle": law.draft.axle or None, "parameters": dict(one.values),
+        "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
+        "error_refitted": addition.error_refitted, "error_after": addition.error_after,
+        "error_after_unseen": addition.error_after, "error_before_unseen": addition.error_refitted,
+        **errors_json(addition.steps, addition.noise_floor_error),
+        "noise_floor_error": addition.noise_floor_error,
+        "verdict": [other.effect.name for other in law.effects], "unexplained": found.unexplained,
+        "log_likelihood_gain": law.gain / 2,
+        "listed": {"verdict": list(found.verdict), "error_unseen": found.listed_error,
+                   "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
+        "nearest": _nearest_json(law.nearest),
+        "confused_with": [other.family.name for other in law.rivals],
+        "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
+        **removed_json(addition.removed),
+        "sentences": sentences(law, addition),
+    }
+
+
+def _nearest_json(one: Nearest | None) -> dict[str, Any] | None:
+    return None if one is None else {
+        "effect": one.one.effect.name, "parameters": dict(one.one.values), "share": one.share, "as_good": one.as_good,
+        "log_likelihood_less": (one.law_gain - one.gain) / 2}
+
+
+def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
+    """How the error fell."""
+    return [("as it was given", addition.error_before), ("numbers refitted", addition.error_refitted),
+            (f"with {' and '.join([*(one.effect.name for one in law.effects), law.draft.title])}",
+             addition.error_after)]
+
+
+_BAND = "The band is one standard error either way; the curve ends where the runs' motions do."
+
+
+def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, vehicle: str, file: str) -> Html:
+    """What was learned as one HTML document; ``file``: of the law."""
+    title = f"{vehicle}: a law out of the data"
+    runs = ", ".join(run.name for run in found.context.runs)
+    summary = as_json(found, addition, file)
+    law = found.law
+    if law is None or addition is None:
+        assert found.diagnosis is not None
+        return document(title, [
+            heading(title, runs), _tiles(summary), paragraphs(law_lines(found, addition)),
+            shape_sections(found.diagnosis)])
+    return document(title, [
+        heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)),
+        *law_sections(law, addition, drawn),
+        section("How the error fell", falling("Error on all samples", steps_of(law, addition),
+                                              addition.noise_floor_error)),
+        section("Where it is", paragraphs([f"{file}: an effect of your own, which compare, simulate, add-effect and "
+                                           "diagnose --effect-file take.", law.draft.source]))])
+
+
+def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[Html]:
+    """A law's picture, if it has one, and its numbers."""
+    one = law_learned(law, addition)
+    numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
+               for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
+    table = section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3)))
+    if drawn is None:
+        return [table]
+    return [section("The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY)), table]
+
+
+def _tiles(summary: dict[str, object]) -> Html:
+    def error(key: str) -> str:
+        value = summary[key]
+        return f"{value:.3f}" if isinstance(value, float) else "not known"
+
+    return tiles([("Error of the model as it stands", error("error_before"), "as recorded"),
+                  ("As it ends", error("error_after"), "refitted"),
+                  ("On what no fit saw", error("error_after_unseen"), ""),
+                  ("The sensor's noise alone", error("noise_floor_error"), "")])

@@ -1,0 +1,548 @@
+"""The lab's loop: how a model comes to what it lacked, from the first comparison to the last effect.
+
+The steps, the story of them in words and for a program, and its page; beside it the page of ``demo --field``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from logger.api.lab.bench import Bench, among, bench_with
+from logger.api.lab.compare import (
+    MOVED_HEADS,
+    MOVED_HINT,
+    AddedEffect,
+    Comparison,
+    addition_lines,
+    addition_of,
+    bias,
+    comparison_of,
+    conclusion,
+    errors,
+    evidence,
+    headline,
+    judgement,
+    moved_rows,
+    worst_moment,
+)
+from logger.api.lab.diagnose import (
+    Diagnosis,
+    diagnosis_lines,
+    diagnosis_of,
+    diagnosis_summary,
+    shape_sections,
+    untested,
+)
+from logger.api.lab.learn import law_lines, law_sections, learned, picture_of, sentences, source_of, why_none, with_law
+from logger.api.lab.question import LabLoopQuestion
+from logger.api.lab.words import falling
+from logger.api.question import Notify, function
+from logger.api.shown import CommandResult, check_out
+from logger.api.vehicles import Model, model_of, read_vehicle
+from logger.chart_data import Array, Curves, Line
+from logger.errors import BadInput
+from logger.estimation.assessment import Assessment, figures
+from logger.files import make_folder, write_text
+from logger.lab import compare, diagnosis
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
+from logger.lab.selection.add_effect import AddedEffects
+from logger.lab.session import LawSearch, Round, Story
+from logger.report.charts import chart
+from logger.report.document import (
+    EMPTY,
+    Html,
+    bullets,
+    concatenated,
+    document,
+    grid,
+    heading,
+    hint,
+    paragraphs,
+    section,
+    tiles,
+)
+from logger.report.maps import Way, ways_map
+from logger.report.quantities import columns, wrapped
+from logger.store.formats import vehicle_file as vehicle_format
+from logger.vehicle.effect import Chosen
+
+STORY, LAW = "story.html", "law.py"
+MOST_ROUNDS = 6
+_SHOWN = 5
+
+Say = Callable[[Iterable[str]], None]
+Ask = Callable[[Bench, str], str | None]
+"""Which effect to add where one was found missing: its name or another's, or None for none."""
+Learns = Callable[[], bool]
+"""Whether a law is to be learned where no effect explains what is missing."""
+Progress = Callable[[], AbstractContextManager[Notify]]
+Explain = Callable[[str, str, str], str]
+"""What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
+added, and the vehicle file that is read, or written where an effect is added; of learn the law's file."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LabStory(CommandResult):
+    """What the loop came to.
+
+    story                all of it, as the lab has it
+    model                with all that was added, as the last file has it
+    first                comparison of the model as it was given
+    diagnoses            at least one
+    additions            effects that were added, in order, and ``comparisons`` with them
+    refused              effects that were found missing and not wanted
+    law                  file of the law that was learned; None: none was
+    error_before         of the model as it was given; ``error_after`` of the last one, refitted
+    noise_floor_error    that the sensor's noise alone makes
+    steps                models on the way, each with its error on all samples
+    page                 the file with all of it
+    """
+
+    story: Story
+    model: Model
+    first: Comparison
+    diagnoses: tuple[Diagnosis, ...]
+    additions: tuple[AddedEffect, ...]
+    comparisons: tuple[Comparison, ...]
+    refused: tuple[str, ...]
+    law: Path | None
+    error_before: float
+    error_after: float
+    noise_floor_error: float
+    steps: tuple[tuple[str, float], ...]
+    page: Path
+
+    def figures(self) -> list[Html]:
+        """How the error fell."""
+        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+
+
+def story_of(question: LabLoopQuestion) -> LabStory:
+    """The answer to ``LabLoopQuestion``, which says what is raised."""
+    place, bench = Path(question.out), bench_with(question, None if question.candidates is not None else "ridelog lab")
+    bench = replace(bench, effects=among(bench.effects, question.candidates))
+    make_ready(bench, place)
+    return walk(bench, place, _asking(question.ask), unsaid_lines, lambda: nullcontext(question.progress),
+                learns=lambda: question.learns)
+
+
+lab = function("lab", LabLoopQuestion, story_of)
+
+
+def _asking(ask: Callable[[str], str | None]) -> Ask:
+    def wanted(given: Bench, name: str) -> str | None:
+        answer = ask(name)
+        if answer is not None and answer != name:
+            if answer not in given.effects:
+                raise BadInput(f"{answer}: expected one of {', '.join(given.effects)}")
+            given.asked_for(answer, {}, answer)
+        return answer
+
+    return wanted
+
+
+def unsaid_lines(_lines: Iterable[str]) -> None:
+    """Drop the lines: a loop that prints nothing."""
+
+
+def make_ready(given: Bench, out: Path, option: str = "") -> None:
+    """Make the folder for the files. BadInput where there cannot be one, and for files that are read, or cannot be
+    written; ``option``: how the folder was asked for."""
+    try:
+        make_folder(out)
+    except FileExistsError:
+        raise BadInput(f"{option} {out}: expected a folder".lstrip()) from None
+    for file in (out / STORY, out / LAW, *(_vehicle_file(out, number + 1) for number in range(MOST_ROUNDS))):
+        check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
+
+
+def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
+    """No explanation in addition to what is found."""
+    return ""
+
+
+def always() -> bool:
+    """A law is to be learned."""
+    return True
+
+
+def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = unexplained,
+         learns: Learns = always) -> LabStory:
+    """Go through the loop; write the vehicle files and the page into ``out``.
+
+    learns      asked once, where no effect explains what is missing
+    notify        called with what was found
+    progress    context around what takes long, called with what is under way
+    explain     what to say of each step in addition to what it finds
+    """
+    story, model = go_through(given, out, ask, notify, progress, explain, learns)
+    write_text(out / STORY, story_page(story))
+    notify(chapter("The end", explain("end", "", "")))
+    notify([wrapped(ending(story)), "", f"The whole story as a page: {out / STORY}"])
+    rows = [(words, f"{error:.3f}") for words, error in steps(story)]
+    summary = as_json(story) | {"story": str(out / STORY)}
+    return LabStory(
+        "\n".join([*columns([("Model", "Error"), *rows]), "", wrapped(ending(story))]), summary, story,
+        model_of(model), comparison_of(story.first), tuple(diagnosis_of(one, given) for one in story.diagnoses),
+        tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
+        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused,
+        Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
+        story.floor, tuple(steps(story)), out / STORY)
+
+
+def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,
+               learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
+    """The same without its end and its page."""
+    word = given.word
+    notify(chapter("Compare", explain("compare", "", word)))
+    first = _compared(given, progress)
+    notify(_comparison_lines(first))
+    diagnoses: list[diagnosis.Diagnosis] = []
+    rounds: list[Round] = []
+    refused: list[str] = []
+    law: LawSearch | None = None
+    step = _Step(given, out, notify, progress, explain)
+    going = asked = True
+    while going and len(rounds) < MOST_ROUNDS:
+        going = False
+        notify(chapter("Diagnose", explain("diagnose", "", word)))
+        diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
+        notify(diagnosis_lines(diagnoses[-1], _SHOWN))
+        if diagnoses[-1].exceeds_noise and asked:
+            asked = False
+            if learns():
+                step, law, made = step.learned()
+                rounds += made
+                if made:
+                    word, going = made[-1].file, True
+                    continue
+        for one in diagnoses[-1].missing:
+            if len(rounds) == MOST_ROUNDS:
+                break
+            wanted = ask(step.given, one.effect.name)
+            if wanted is None:
+                refused.append(one.effect.name)
+                continue
+            same = wanted == one.effect.name
+            step, made_now = step.added(wanted, one if same else None, len(rounds) + 1)
+            rounds.append(made_now)
+            word = made_now.file
+            if not same:  # with another effect, what is missing is searched again
+                going = True
+                break
+    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused), law), step.given.model
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Where the loop stands: the bench, and how what is done is reported."""
+
+    given: Bench
+    out: Path
+    notify: Say
+    progress: Progress
+    explain: Explain
+
+    def added(self, name: str, start: Chosen | None, number: int) -> tuple[_Step, Round]:
+        """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
+        file = _vehicle_file(self.out, number)
+        self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
+        begin = start or _searched(self.given, name, self.progress)
+        with self.progress() as notify:
+            addition = self.given.added(begin, len(begin.effect.trials()), notify)
+        return self._with(addition, name, file)
+
+    def learned(self) -> tuple[_Step, LawSearch, list[Round]]:
+        """A law learned, written and added, with what is missing beside it; or none."""
+        file = self.out / LAW
+        self.notify(chapter("Learn a law", self.explain("learn", "", str(file))))
+        with self.progress() as notify:
+            found = learned(self.given, notify)
+        self.notify(law_lines(found.learning, found.addition))
+        if found.addition is None:
+            return self, LawSearch(found.learning, None, None, ""), []
+        write_text(file, source_of(found.learning, found.addition))
+        self.notify(["", f"Law: {file}"])
+        knows, addition = with_law(self.given, found.addition, file)
+        name = " and ".join(addition.names)
+        vehicle = _vehicle_file(self.out, 1)
+        self.notify(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
+        step, made = replace(self, given=knows)._with(addition, name, vehicle)
+        return step, LawSearch(found.learning, found.addition, picture_of(found), str(file)), [made]
+
+    def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
+        """The vehicle with what was added written and compared."""
+        model = self.given.model_with(addition)
+        vehicle_format.write_model(file, model)
+        self.notify([*addition_lines(addition), "", f"Vehicle: {file}"])
+        self.notify(chapter("Compare again", self.explain("again", name, str(file))))
+        given = replace(self.given, model=model)
+        made = Round(addition, _compared(given, self.progress), str(file))
+        self.notify(_comparison_lines(made.comparison))
+        return replace(self, given=given), made
+
+
+def _vehicle_file(out: Path, number: int) -> Path:
+    return out / f"vehicle-{number}.yaml"
+
+
+def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
+    with progress() as notify:
+        return given.search_values(given.effects[name], {}, notify)
+
+
+def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:
+    with progress() as notify:
+        return given.diagnosed(notify, left_out)
+
+
+def _compared(given: Bench, progress: Progress) -> compare.Comparison:
+    with progress() as notify:
+        notify("comparing")
+        return given.compared()
+
+
+def chapter(title: str, explained: str = "") -> list[str]:
+    """The lines of a heading, with what stands under it."""
+    return ["", f"=== {title} ===", *([explained] if explained else []), ""]
+
+
+def _comparison_lines(found: compare.Comparison) -> list[str]:
+    return [wrapped(headline(found)), "", "After the refit:", wrapped(evidence(found), "- "), "",
+            wrapped([conclusion(found).partition(" Next: ")[0]])]
+
+
+def steps(story: Story) -> list[tuple[str, float]]:
+    """Models on the way, each with its error on what no fit saw."""
+    start = story.rounds[0].addition if story.rounds else None
+    return [("as its file says", start.error_before if start else story.first.plain.error),
+            ("numbers refitted", start.error_refitted if start else story.first.steps[-1].error),
+            *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
+
+
+def ending(story: Story) -> list[str]:
+    """What it came to."""
+    diagnosis, models = story.diagnoses[-1], steps(story)
+    with_what = [bias(story.added, story.moved)] if story.added else []
+    lines = []
+    if story.added:
+        lines.append(f"{' and '.join(story.added)} reduced the error from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
+                     "both with the car's numbers and the distances refitted within their tolerance. With the last "
+                     f"file as it is, and the distances as recorded, the error is {story.last.plain.error:.3f}.")
+    lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
+    if story.refused:
+        lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
+    if story.not_added:
+        lines.append(f"Found missing and not added: {', '.join(story.not_added)}. Go on with the last file.")
+    if story.refused or story.not_added:
+        return [*lines, *with_what]
+    if diagnosis.conflicts and not diagnosis.exceeds_noise:
+        lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
+    elif diagnosis.unexplained and story.law is None:
+        lines.append("Something is missing still that no effect explains: ridelog learn may find a law, or an effect "
+                     "of your own may do it.")
+    elif diagnosis.unexplained:
+        lines.append("Something is missing still that no effect and no law out of the data explains: an effect of your "
+                     "own may do it.")
+    else:
+        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
+    return [*lines, *with_what]
+
+
+def as_json(story: Story) -> dict[str, Any]:
+    """The story as one JSON object."""
+    models = steps(story)
+    return {
+        "error_before": models[0][1], "error_after": models[-1][1], "noise_floor_error": story.floor,
+        "added": story.added, "refused": list(story.refused), "left": story.not_added,
+        "unexplained": story.diagnoses[-1].unexplained,
+        "steps": [{"step": words, "error": error} for words, error in models],
+        "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
+        "biased": [one.name for one in story.moved if one.biased],
+        "vehicles": [one.file for one in story.rounds], "law": story.law.file or None if story.law else None,
+        "sentences": ending(story),
+    }
+
+
+STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
+              "the files are written, and on the distances as recorded, errors are larger.")
+_HIGHEST_OF_RATE = 0.4
+_QUIET_DB = -80.0
+
+
+def story_page(story: Story) -> Html:
+    """The story as one HTML document."""
+    title = f"{story.first.vehicle}: from the first comparison to the last effect"
+    runs = story.first.plain.residuals.runs
+    last = story.diagnoses[-1]
+    at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
+    before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
+    return document(title, [
+        heading(title, ", ".join(run.name for run in runs)),
+        _story_tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
+        section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
+        section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in before)),
+        *_law(story), *map(_added, story.rounds),
+        section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
+        section("What the car's numbers had been taken for", _moved(story)),
+        section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))
+                + concatenated(paragraphs(diagnosis_summary(one)) for one in at_last)) if story.rounds else "",
+        shape_sections(last),
+        section("What these runs cannot tell, and which drive would", bullets(untested(last))),
+        section("Where the effects are from", bullets(
+            f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects)),
+    ])
+
+
+def _story_tiles(story: Story) -> Html:
+    return tiles([
+        ("Error as the file says", f"{steps(story)[0][1]:.3f}", "as recorded"),
+        ("Error at last", f"{steps(story)[-1][1]:.3f}", "refitted"),
+        ("The sensor's noise alone", f"{story.floor:.3f}", ""),
+        ("Effects added", f"{len(story.added)}", ""),
+    ])
+
+
+def _steps(story: Story) -> Html:
+    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
+    return (falling("Error of each model, on all samples", steps(story), story.floor)
+            + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + hint(STEPS_HINT))
+
+
+def _law(story: Story) -> list[Html]:
+    """The law that was looked for; nothing where none was."""
+    sought = story.law
+    if sought is None:
+        return []
+    if sought.learning.law is None or sought.addition is None:
+        said = why_none(sought.learning)
+        return [section("A law out of the data", paragraphs([f"{said[0].upper()}{said[1:]}."]))]
+    return [section("A law out of the data", paragraphs(
+        [*sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."])),
+        *law_sections(sought.learning.law, sought.addition, sought.picture)]
+
+
+def _added(one: Round) -> Html:
+    effects = [f"It leaves: {new.effect.signature}." for new in one.addition.new]
+    rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.addition)]
+    said = paragraphs([*judgement(one.addition), *effects, f"Written to {one.file}."])
+    return section(f"Added: {' and '.join(one.addition.names)}",
+                   said + grid(("Error", "", "of"), rows, words=(0, 2)))
+
+
+def _moved(story: Story) -> Html:
+    if not story.moved:
+        return EMPTY
+    return grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5)) + hint(MOVED_HINT)
+
+
+def residual_spectra(story: Story) -> Html:
+    """The residual before and after, by frequency."""
+    before, after = story.first.refitted.residuals, story.last.refitted.residuals
+    f_hz = frequencies(before)
+    kept = (f_hz > 0) & (f_hz <= _HIGHEST_OF_RATE * before.rate_hz)
+
+    def line(name: str, residuals: ModelResiduals, measured: bool) -> Line:
+        signals = residuals.measured if measured else residuals.residual
+        power = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / f_hz[1]
+        return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
+
+    lines = (line("measured", before, True), line("residual at first", before, False),
+             line("residual at last", after, False))
+    return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", lines))
+
+
+def _place(story: Story) -> Html:
+    """The place that was worst at first, then and now."""
+    before, after = story.first.refitted, story.last.refitted
+    worst, residuals = worst_moment(before), before.residuals
+    index, part = worst.run, worst.part
+    residual = residuals.residual[index]
+    time_s = (residuals.runs[index].first + np.arange(len(residual)))[part] / residuals.rate_hz
+    lines = (Line("measured", time_s, residuals.measured[index][part]),
+             Line("residual at first", time_s, residual[part]),
+             Line("residual at last", time_s, after.residuals.residual[index][part]))
+    return chart(Curves(f"Where it was worst at first: {worst.words}", "time in the run [s]",
+                          "acceleration [m/s2]", lines))
+
+
+HEADS = ("IRI", "Mean [m/km]", "Bias", "R2", "Within 1", "Within 2")
+IN_HINT = ("Within 1 and 2: the share of windows whose truth lies within one and two standard errors of the estimate "
+           "(right: 68 % and 95 %).")
+
+
+def figures_of(found: Assessment) -> dict[str, Any]:
+    """Figures of the windows in which the car moved; its ``comparison`` with the profile must be there."""
+    return figures(found, found.windows.speed_mps > 0)
+
+
+def rows(before: Assessment, after: Assessment) -> list[tuple[str, ...]]:
+    """The table of ``HEADS``: by the file as it was given, by the last one, and the truth."""
+    estimated = [_row("by the file as it was", figures_of(before)), _row("by the last file", figures_of(after))]
+    known = after.exact_m_per_km[np.isfinite(after.exact_m_per_km)]
+    return [*estimated, ("as it was measured", f"{known.mean():.2f}", "", "", "", "")]
+
+
+def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
+    beside = found["comparison"]
+    return (name, f"{found['iri_m_per_km']:.2f}", f"{beside['bias']:+.1%}", f"{beside['r2']:.3f}",
+            f"{beside['within_one']:.0%}", f"{beside['within_two']:.0%}")
+
+
+def field_page(title: str, about: Sequence[str], measured: Sequence[Way], driven: Sequence[Way], story: Story,
+         before: Assessment, after: Assessment, answer: Sequence[str]) -> Html:
+    """The whole of it as one HTML document.
+
+    about             what the drives are, a paragraph each
+    measured          lines that were measured, and ``driven`` the drives on them
+    before, after     the road of a drive that the lab did not see, by the file as it was and by the last one
+    answer            what is true, where that is known
+    """
+    return document(title, [
+        heading(title, ", ".join(one.name for one in driven)),
+        _field_tiles(story, before, after), paragraphs(about),
+        section("The drives", ways_map(measured, driven) + hint(
+            "Wide: what was measured. Dots: where the receiver saw the car, once a second.")),
+        section("How the error fell", falling("Error of each model, on all samples", steps(story), story.floor)
+                + paragraphs(ending(story))),
+        section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in story.diagnoses[:1])),
+        section("Before and after", residual_spectra(story)) if story.rounds else "",
+        section("The IRI of a drive that the lab did not see", _iri(before, after)
+                + grid(HEADS, rows(before, after), words=(0,)) + hint(IN_HINT)),
+        section("The answer", bullets(answer)),
+    ])
+
+
+def _field_tiles(story: Story, before: Assessment, after: Assessment) -> Html:
+    first, last = (figures_of(one)["comparison"] for one in (before, after))
+    return tiles([
+        ("IRI is off by, at first", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
+        ("At last", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
+        ("Error of the model, at first", f"{steps(story)[0][1]:.3f}", "as its file says"),
+        ("At last", f"{steps(story)[-1][1]:.3f}", "refitted"),
+    ])
+
+
+def _iri(before: Assessment, after: Assessment) -> Html:
+    exact = np.isfinite(after.exact_m_per_km)
+    lines = (_line("at last", after, True), _line("at first", before, False),
+             Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]))
+    return chart(Curves(f"In windows of {after.window_m:.4g} m, at last with its standard error",
+                        "distance along the line [m]", "IRI [m/km]", lines))
+
+
+def _line(name: str, one: Assessment, band: bool) -> Line:
+    windows = one.windows
+    known = np.isfinite(windows.iri_m_per_km)
+    return Line(name, _middles_m(one)[known], windows.iri_m_per_km[known],
+                windows.iri_std_m_per_km[known] if band else None)
+
+
+def _middles_m(one: Assessment) -> Array:
+    return np.asarray((one.windows.edges_m[1:] + one.windows.edges_m[:-1]) / 2)

@@ -1,0 +1,348 @@
+"""Before anybody drives: which effects drives could show and distinguish, and which drive would add most.
+
+The answer, its words for a person and for a program, and the page with numbers of pairs as shaded cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from logger.api.lab.bench import Bench, among, bench_with, planned_bench, tolerance_of, word_of
+from logger.api.lab.checks import LEAST_S
+from logger.api.lab.question import PlanQuestion
+from logger.api.question import each, function
+from logger.api.roads import read_profile
+from logger.api.shown import CommandResult
+from logger.api.vehicles import model_of
+from logger.chart_data import Array
+from logger.errors import BadInput
+from logger.estimation.sensor_noise import NOISE_MPS2
+from logger.lab.planning.outlook import ISOLABLE_SIGMA
+from logger.lab.planning.plan import NextDrive as LabNextDrive
+from logger.lab.planning.plan import Plan as LabPlan
+from logger.lab.planning.plan import plan as planned_by_lab
+from logger.lab.planning.planned_drive import Option, PlannedCar, SensorNoise, at_speed
+from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.profiles.track import Track
+from logger.report.document import (
+    EMPTY,
+    Html,
+    bullets,
+    concatenated,
+    document,
+    grid,
+    heading,
+    hint,
+    html,
+    paragraphs,
+    section,
+    tiles,
+)
+from logger.report.quantities import columns, wrapped
+from logger.runs import Run
+from logger.store.formats import drive_file, profile_file, vehicle_file
+
+
+@dataclass(frozen=True)
+class NextDrive:
+    """A drive that may come next.
+
+    do            in words
+    gains         deviations by which effects would be separated better from what is most like them
+    more_named    how many more effects ``diagnose`` would name, were each of them there by itself
+    """
+
+    do: str
+    gains: Mapping[str, float]
+    more_named: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(CommandResult):
+    """What drives could show of effects at their usual strength, in standard deviations, the car's numbers and the
+    distances being free within their tolerance.
+
+    found            all that the lab says, of the ``vehicle`` of this name
+    detectability    by how much each effect stands out, by name
+    isolability      what of the first effect remains when the second one is fitted in its place, by both names
+    groups           effects that would be detected, but not separated from each other
+    next             drives that may come next, those that add most first
+    noise_mps2       of the accelerometer, rounding in it [m/s2]
+    """
+
+    found: LabPlan
+    vehicle: str
+    detectability: Mapping[str, float]
+    isolability: Mapping[str, Mapping[str, float]]
+    groups: tuple[tuple[str, ...], ...]
+    next: tuple[NextDrive, ...]
+    noise_mps2: float
+
+    def figures(self) -> list[Html]:
+        """The matrix of what remains of one effect when another is fitted."""
+        return [figure(self.found)]
+
+    def as_page(self, of: str) -> Html:
+        """The plan as one HTML document."""
+        return page(self.found, self.vehicle)
+
+
+def plan_by(question: PlanQuestion) -> Plan:
+    """The answer to ``PlanQuestion``, which says what is raised."""
+    model, tolerance, bench = model_of(question.vehicle), tolerance_of(question.tolerance), None
+    road = None if question.profile is None else drive_file.track_of(
+        question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile))
+    if each(question.runs):
+        bench = bench_with(question, "ridelog plan")
+    elif not question.speeds_mps:
+        raise BadInput("plan: expected a run, or --profile and --speed of a planned drive")
+    drives = _empty_drives(model, road, question)
+    ready = bench or planned_bench(word_of(question.vehicle, model), model, drives,
+                                   list(map(str, question.effect_files)), tolerance)
+    posterior = ready.posterior(searches=True)
+    there = PlannedCar(posterior.vehicle, posterior.start_vehicle, tolerance, model.effects,
+                       posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
+    usual = SensorNoise(NOISE_MPS2, question.step_mps2)
+    noise = None if question.noise_mps2 is None else SensorNoise(question.noise_mps2, question.step_mps2)
+    with ready.blamed():
+        found = planned_by_lab(there, None if bench is None else posterior, drives,
+                               among(ready.effects, question.candidates), noise, usual, road or _longest_road(bench),
+                               question.progress)
+    return plan_of(found, model.vehicle.name)
+
+
+plan = function("plan", PlanQuestion, plan_by)
+
+
+def plan_of(found: LabPlan, vehicle: str) -> Plan:
+    """What the lab found, as it is shown."""
+    summary = as_json(found)
+    return Plan("\n".join(plan_lines(found)), summary, found, vehicle, summary["detectability"],
+                summary["isolability"], tuple(map(tuple, found.groups)),
+                tuple(NextDrive(do_words(one.option), dict(one.gains), one.more_named) for one in found.next),
+                summary["noise_mps2"])
+
+
+def _empty_drives(model: vehicle_file.Model, road: Track | None, question: PlanQuestion) -> list[Run]:
+    """The drives that are planned. WrongOption for one that is too short, or too long to be simulated."""
+    name = str(question.profile) if isinstance(question.profile, Path | str) else "profile"
+    found = []
+    for speed in question.speeds_mps:
+        assert road is not None
+        seconds = (road.end_m - road.start_m) / speed
+        if seconds < LEAST_S:
+            raise question.wrong("speeds_mps", f" {speed:g}: expected a drive of {LEAST_S:g} s or longer, found "
+                                               f"{seconds:.3g} s over {name}")
+        try:
+            found.append(at_speed(f"{name} at {speed:g} m/s", road, model.vehicle, speed))
+        except ValueError as error:
+            raise question.wrong("speeds_mps", f" {speed:g}: {error}") from None
+    return found
+
+
+def _longest_road(bench: Bench | None) -> Track | None:
+    """Of the runs; None where none has one."""
+    roads = [] if bench is None else [run.track for run in bench.runs.runs if isinstance(run.track, Track)]
+    return max(roads, key=lambda one: float(np.subtract(one.end_m, one.start_m)), default=None)
+
+
+_MOST_NEXT, _MOST_GAINS = 5, 4
+HEADS = ("Effect", "Stands out by", "Separated by", "Most like", "")
+GAIN_HINT = "Effects more: how many more could be named, in expectation."
+SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
+               "gyroscope to 0.001 rad/s.")
+_OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
+              "plate": "a plank {height_m:g} m high and {length_m:g} m long"}
+_SENSES = {"acceleration": "an accelerometer on", "travel": "a travel sensor at", "pitch_rate": "a pitch gyroscope on"}
+
+
+def summary(found: LabPlan) -> list[str]:
+    """What the drives could show, all together: paragraphs."""
+    seconds = sum(each for _, each in found.drives)
+    count = len(found.drives)
+    chances = found.now.chances
+    named = int((chances > 0.5).sum())
+    from_where = ("as in the runs" if found.measured else "as given or usual")
+    lines = [f"{count} drive{'s' * (count != 1)}, {seconds:.0f} s; noise {found.noise.variance**0.5:.3g} m/s2 r.m.s., "
+             f"{from_where}. Of {len(found.names)} effects at their usual strength, each by itself, "
+             f"ridelog diagnose would name {named}."]
+    if found.groups:
+        lines.append("Detected, but not separable: " + "; ".join(", ".join(one) for one in found.groups) + ".")
+    hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
+    if hidden:
+        lines.append(f"Too faint to be seen in these drives: {', '.join(hidden)}.")
+    lines += [f"{name} is left out: {why}." for name, why in found.obstacles.items()]
+    return lines
+
+
+def rows(found: LabPlan) -> list[tuple[str, str, str, str, str]]:
+    """Each effect, those that stand out most first: by how much, by how much it is separated from what, and what that
+    means."""
+    made = []
+    for index in sorted(range(len(found.names)), key=lambda one: -found.now.detectability[one]):
+        alone, apart = float(found.now.detectability[index]), float(found.now.isolability[index])
+        near = int(found.now.nearest[index])
+        like = found.names[near] if near != index and alone >= DETECTABLE_SIGMA else ""
+        made.append((found.names[index], number(alone), number(apart), like, _judged(alone, apart)))
+    return made
+
+
+def _judged(alone: float, apart: float) -> str:
+    if alone < DETECTABLE_SIGMA:
+        return "too faint"
+    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be separated"
+
+
+def number(deviations: float) -> str:
+    """Of standard deviations."""
+    return f"{deviations:.1f}" if deviations < 100 else f"{deviations:.0f}"
+
+
+def meaning() -> str:
+    """What the numbers are."""
+    return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
+            f"effect is detected from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
+            "remain when that one is fitted in its place.")
+
+
+def plan_lines(found: LabPlan) -> list[str]:
+    """What a person reads of a plan."""
+    lines = [wrapped(summary(found)), "", *columns([HEADS, *rows(found)]), "", wrapped([meaning()])]
+    if found.next:
+        lines += ["", "Next, the drive that adds most first:"]
+        lines += [wrapped([f"{number}. {next_words(one)}"]) for number, one in enumerate(found.next[:_MOST_NEXT], 1)]
+        lines.append(wrapped([SENSOR_HINT]))
+    else:
+        lines += ["", wrapped(["No next drive can be proposed: the road is too short, or too rough to be driven at "
+                                  "these speeds."])]
+    return lines
+
+
+def do_words(option: Option) -> str:
+    """What is to be done."""
+    words = (f"The same excitation again, {option.seconds:.0f} s" if option.speed_mps is None else
+             f"{option.seconds:.0f} s over this road at {option.speed_mps:.3g} m/s")
+    if option.obstacle is not None:
+        laid = _OBSTACLES[option.obstacle.name].format(**option.obstacle.parameters)
+        words += f", with {laid} on it at {option.obstacle.parameters['start_m']:.0f} m"
+    if option.signal is not None:
+        place = (f"the body {option.signal.ahead_m:.2f} m ahead of its centre of gravity" if option.signal.ahead_m else
+                 f"the {option.signal.of.replace('_', ' ')}")
+        words += f", with {_SENSES[option.signal.measures]} {place}"
+    return words
+
+
+def next_words(one: LabNextDrive) -> str:
+    """What is to be done, and what it brings."""
+    if not one.gains:
+        return f"{do_words(one.option)}: adds next to nothing."
+    shown = _most(one.gains)
+    more = len(one.gains) - len(shown)
+    gains = ", ".join(f"{name} by {number(each)}" for name, each in shown.items())
+    count = f"{one.more_named:.1f} effects more could be named" if one.more_named >= 0.05 else "no more can be named"
+    return f"{do_words(one.option)}: {count}. Better separated: {gains}{f' and {more} more' if more else ''}."
+
+
+def _most(gains: Mapping[str, float]) -> dict[str, float]:
+    return dict(list(gains.items())[:_MOST_GAINS])
+
+
+def as_json(found: LabPlan) -> dict[str, Any]:
+    """One object: see the formats of ridelog. What remains of an effect after itself is fitted is not in it."""
+    now, names = found.now, found.names
+    return {
+        "drives": [{"drive": name, "seconds": seconds} for name, seconds in found.drives],
+        "noise_mps2": found.noise.variance**0.5, "noise_measured": found.measured,
+        "effects": {one.effect.name: dict(one.values) for one in found.effects},
+        "detectability": dict(zip(names, map(float, now.detectability), strict=True)),
+        "isolability": {name: {other: float(now.pairwise[row, column]) for column, other in enumerate(names)
+                               if column != row} for row, name in enumerate(names)},
+        "groups": [list(one) for one in found.groups], "left_out": dict(found.obstacles),
+        "next": [{"do": do_words(one.option), "gains": dict(one.gains), "more_named": one.more_named}
+                 for one in found.next],
+    }
+
+
+_FULL = 100.0  # deviations that are drawn as dark as any
+
+
+def page(found: LabPlan, vehicle: str) -> Html:
+    """The plan as one HTML document."""
+    title = f"{vehicle}: what these drives could show"
+    chances = found.now.chances
+    return document(title, [
+        heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
+        tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
+               ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
+               ("Groups that cannot be separated", f"{len(found.groups)}", ""),
+               ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2")]),
+        paragraphs(summary(found)),
+        section("What remains of one effect when another is fitted", figure(found) + hint(meaning())),
+        section("Each effect", grid(HEADS, rows(found), words=(0, 3, 4))),
+        section("What a next drive would add", _next(found)),
+        section("Where this is from", bullets([
+            "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected "
+            "to be found, from one data set without noise."])),
+    ])
+
+
+def figure(found: LabPlan) -> Html:
+    """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
+    when that one is fitted in its place. Those that stand out most first."""
+    order = np.argsort(-found.now.detectability, kind="stable")
+    return heat_map("Standard deviations that remain of the effect of a row when that of a column is fitted in its "
+                    "place; framed: by how much it stands out",
+                    [found.names[one] for one in order], found.now.pairwise[np.ix_(order, order)],
+                    ISOLABLE_SIGMA, _FULL)
+
+
+def _next(found: LabPlan) -> Html:
+    """Nothing where there is none."""
+    if not found.next:
+        return EMPTY
+    drawn = grid(("Drive", "Effects more", "Better separated, in standard deviations"), [
+        (do_words(one.option), f"{one.more_named:.1f}",
+         ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
+        words=(0, 2))
+    return drawn + hint(f"{GAIN_HINT} {SENSOR_HINT}")
+
+
+_CELL_PX, _HIGH_PX, _LEFT_PX, _TOP_PX, _ROOM_PX = 40, 24, 190, 150, 60
+_FAINTEST, _DARKEST = 0.12, 0.9
+_WHITE_FROM = 0.5
+
+
+def heat_map(title: str, names: Sequence[str], values: Array, least: float, full: float) -> Html:
+    """The figure element of values (n, n): one row and one column for each name, the diagonal framed.
+
+    What is below ``least`` is red, what is above it blue, and darker up to ``full``.
+    """
+    width, height = _LEFT_PX + _CELL_PX * len(names) + _ROOM_PX, _TOP_PX + _HIGH_PX * len(names) + 8
+    heads = concatenated(
+        html('<text transform="translate({:.0f} {}) rotate(-55)">{}</text>', _LEFT_PX + _CELL_PX * (column + 0.5),
+             _TOP_PX - 8, name) for column, name in enumerate(names))
+    rows = concatenated(
+        html('<text x="{}" y="{}" text-anchor="end">{}</text>', _LEFT_PX - 8, _TOP_PX + _HIGH_PX * row + 17, name)
+        + concatenated(_cell(row, column, float(values[row, column]), least, full) for column in range(len(names)))
+        for row, name in enumerate(names))
+    return html('<figure><figcaption>{}</figcaption><svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">'
+                "{}{}</svg></figure>", title, width, height, title, heads, rows)
+
+
+def _cell(row: int, column: int, value: float, least: float, full: float) -> Html:
+    x, y = _LEFT_PX + _CELL_PX * column, _TOP_PX + _HIGH_PX * row
+    share = min(max(log(max(value, least) / least) / log(full / least), 0.0), 1.0)
+    shade = _FAINTEST + (_DARKEST - _FAINTEST) * share if value >= least else 0.35 * (1 - value / least) + _FAINTEST
+    colour = "--c0" if value >= least else "--c4"
+    frame = "stroke:var(--ink);stroke-width:1.5" if row == column else "stroke:none"
+    ink = "#fff" if shade > _WHITE_FROM else "var(--ink)"
+    return html('<rect x="{}" y="{}" width="{}" height="{}" style="fill:var({});fill-opacity:{:.2f};{}"/>'
+                '<text x="{}" y="{}" text-anchor="middle" style="fill:{};font-size:11px">{}</text>',
+                x + 1, y + 1, _CELL_PX - 2, _HIGH_PX - 2, colour, shade, frame, x + _CELL_PX // 2, y + 16, ink,
+                f"{value:.1f}" if value < 10 else f"{value:.0f}")

@@ -1,0 +1,279 @@
+"""What the lab's verbs are asked: compare, diagnose, add-effect, learn, plan and lab."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+from logger.api.question import (
+    ADDED,
+    NOISE,
+    SPEED,
+    Anyway,
+    Argument,
+    Candidates,
+    EffectFiles,
+    LongQuestion,
+    LowPass,
+    Option,
+    Out,
+    Runs,
+    Tolerance,
+    TrackedRuns,
+    VehicleName,
+    Verb,
+    files_of,
+    paths_of,
+)
+
+if TYPE_CHECKING:
+    from logger.store.formats.profile_file import Profile
+
+
+PAGE = Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabQuestion(LongQuestion):
+    """What the lab's verbs have in common; each has a ``vehicle``, ``runs`` and maybe ``effect_files`` as well."""
+
+    tolerance: Tolerance = None
+    low_pass_hz: LowPass = None
+    anyway: Anyway = False
+
+    def files_read(self) -> Sequence[Path]:
+        given: Any = self
+        return [*super().files_read(), *files_of(given.vehicle)]
+
+    def command(self, words: str) -> str:
+        """A command line about the same vehicle and runs."""
+        given: Any = self
+        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {' '.join(map(str, paths_of(given.runs)))}"
+
+
+@dataclass(frozen=True)
+class CompareQuestion(LabQuestion):
+    """Compare a vehicle's model with measurements: the error, where it sits, and what kind of thing is missing.
+
+    Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on,
+    or, of a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m]) that drove
+    it. Runs are of one sample rate of 50 Hz or more, and of 5 s or longer.
+
+      ridelog compare --vehicle mycar.yaml run1 run2
+      ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
+
+    The error is rms(measured - model) / rms(measured), the first 2 s of each run left out. Then the car's numbers and
+    the distances are refitted within their usual errors, and the residual is analysed: only that is evidence of physics
+    that the model lacks. ridelog diagnose says which.
+
+    In Python: raises BadInput where these do not fit together, and as ``read_vehicle`` and ``read_run``.
+
+    >>> found = compare(car, runs)
+    >>> found.refitted_error < found.error, found.missing
+    (True, True)
+    """
+
+    vehicle: VehicleName
+    runs: TrackedRuns
+
+
+@dataclass(frozen=True)
+class DiagnoseQuestion(LabQuestion):
+    """Which physical effect a vehicle's model lacks: every one that is known is tried, the evidence decides.
+
+    Each RUN is a folder as in ridelog compare.
+
+      ridelog diagnose --vehicle mycar.yaml run1 run2
+      ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html
+
+    Errors are rms(measured - model) / rms(measured), on stretches that no fit saw: three sets of them are held out in
+    turn. The car's numbers may be off (--tolerance) and the distances by as much as the runs show: both are refitted
+    first, so that no small mistake passes for an effect. It takes from seconds to minutes, and the compiler of the
+    ``lab`` extra.
+
+    With --same-road each RUN is a drive.csv, or a folder with one; a profile.csv in it is not read. The runs are drives
+    over the same road at different speeds, their distances counted from the same place (to about 3 m); those that were
+    extracted without a profile count from where each began, and are laid on one distance by their positions. Drives
+    that are plainly over two roads are refused. An error is then that of each drive over the road that the other drives
+    tell.
+
+    In Python: raises BadInput as ``compare``, for effects that there are not, and where the compiler is missing.
+
+    >>> found = diagnose(car, runs, candidates=["sensor_gain", "sensor_offset", "time_offset"])
+    >>> found.verdict, found.unexplained
+    (('sensor_gain',), False)
+    >>> found.candidates[0].effect, round(found.candidates[0].parameters["gain"], 1)
+    ('sensor_gain', 1.1)
+    """
+
+    vehicle: VehicleName
+    runs: TrackedRuns
+    _: KW_ONLY
+    candidates: Candidates = None
+    effect_files: EffectFiles = ()
+    list_all: Annotated[bool, Option("list all candidates, not the first 8", flag="--all")] = False
+    same_road: Annotated[bool, Option(
+        "no profile is known: two runs or more (folders, or drive.csv files) over one road, at different speeds; what "
+        "bends its laws is tried by linear stand-ins")] = False
+
+
+@dataclass(frozen=True)
+class AddEffectQuestion(LabQuestion):
+    """Add a physical effect to a vehicle: fit it with the car's numbers on all of the runs, and show what that changed.
+
+      ridelog add-effect dry_friction --vehicle mycar.yaml --out mycar-2.yaml run1 run2
+      ridelog add-effect sensor_bandwidth:order=2,cutoff_hz=20 --vehicle mycar.yaml --out mycar-2.yaml run1 run2
+      ridelog add-effect ./my_effect.py --vehicle mycar.yaml --out mycar-2.yaml run1 run2
+
+    What is said of the effect's numbers is where the fit begins; the rest is searched for. The new vehicle file holds
+    the effects with their standard errors, the car's refitted numbers, and the history of the model. The old one stays
+    as it is unless --out names it.
+
+    In Python: raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot
+    be there.
+
+    >>> found = add_effect("sensor_gain", car, runs, start={"gain": 1.1})
+    >>> found.helps, found.error_after < 0.5 * found.error_before
+    (True, True)
+    >>> [one.effect.name for one in found.model.effects]
+    ['sensor_gain']
+    """
+
+    name: Annotated[Path | str, Argument(
+        "an effect that comes with ridelog, or the path of the Python file of one of your own",
+        metavar="NAME[:PARAM=VALUE,...]", read=str)]
+    vehicle: VehicleName
+    runs: TrackedRuns
+    _: KW_ONLY
+    start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
+    effect_files: EffectFiles = ()
+
+    def files_read(self) -> Sequence[Path]:
+        own = Path(str(self.name).partition(":")[0])
+        read = [one for one in super().files_read() if one not in files_of(self.vehicle)[:1]]
+        return [*read, *([own] if own.is_file() else [])]
+
+
+@dataclass(frozen=True)
+class LearnQuestion(LabQuestion):
+    """Learn a law out of the data, where no known effect explains what a vehicle's model lacks.
+
+      ridelog learn --vehicle mycar.yaml --out law.py run1 run2
+      ridelog learn --vehicle mycar.yaml --out law.py run1 run2 --page law.html
+
+    First every known effect is tried, as ridelog diagnose does. Where these explain all, or nothing is missing, no law
+    is learned and nothing is written. Otherwise families of laws are tried (forces by travel and rate, of the tires,
+    with a memory, a mass on a spring, ...), by the same evidence, in which every number counts. The law is written as
+    an effect of your own: one Python file, which compare, simulate, diagnose --effect-file and add-effect take. It
+    takes minutes, and the compiler of the ``lab`` extra:
+
+      ridelog add-effect ./law.py --vehicle mycar.yaml --out with-law.yaml run1 run2
+
+    In Python: raises BadInput as ``diagnose``.
+
+    >>> learn(car, runs).family is None    # a known effect explains it: the sensor's gain
+    True
+    """
+
+    vehicle: VehicleName
+    runs: TrackedRuns
+    _: KW_ONLY
+    effect_files: EffectFiles = ()
+
+
+@dataclass(frozen=True)
+class PlanQuestion(LabQuestion):
+    """Before anybody drives: which physical effects runs, or planned drives, could show and distinguish, and which
+    drive would add most.
+
+    Each RUN is a folder as in 'ridelog compare'. Planned drives go over all of a profile, one at each speed, with 100
+    samples a second and for 5 s or longer.
+
+      ridelog plan --vehicle mycar.yaml --profile road.csv --speed 8 --speed 15
+      ridelog plan --vehicle mycar.yaml run1 run2 --out plan.html
+
+    Numbers are standard deviations of each effect at its usual strength, the car's numbers and the distances being free
+    within their tolerance. Next drives are tried over the known road: other speeds, a speed bump or a plank on it, a
+    second sensor. It takes the compiler of the ``lab`` extra.
+
+    In Python: raises BadInput as ``diagnose``, where there is neither a run nor a planned drive, and for a drive that
+    is shorter than 5 s.
+
+    >>> found = plan(car, profile=runs[0].profile, speeds_mps=[9.0], candidates=["sensor_gain", "sensor_offset"])
+    >>> found.isolability["sensor_offset"]["sensor_gain"] > 6
+    True
+    >>> found.next[0].more_named > 0
+    True
+    """
+
+    vehicle: VehicleName
+    runs: Annotated[Runs, Argument(
+        "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)] = ()
+    _: KW_ONLY
+    profile: Annotated[Union["Profile", Path, str, None], Option(
+        "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
+        read=Path)] = None
+    speeds_mps: Annotated[Sequence[float], Option(
+        "plan a drive over all of the profile at this speed [m/s]; may repeat", SPEED, "MPS", many=list,
+        flag="--speed")] = ()
+    noise_mps2: Annotated[float | None, Option(
+        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", NOISE,
+        "MPS2")] = None
+    step_mps2: Annotated[float, Option(
+        "the planned sensor gives whole multiples of this only [m/s2]", ADDED, "MPS2")] = 0.0
+    candidates: Candidates = None
+    effect_files: EffectFiles = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.speeds_mps and self.profile is None:
+            raise self.wrong("speeds_mps", ": expected `profile` with it, the road to be driven")
+        if again := [one for number, one in enumerate(self.speeds_mps) if one in self.speeds_mps[:number]]:
+            raise self.wrong("speeds_mps", f" {again[0]:g}: expected each speed once")
+
+
+@dataclass(frozen=True)
+class LabLoopQuestion(LabQuestion):
+    """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is.
+
+      ridelog lab --vehicle mycar.yaml run1 run2
+      ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
+
+    Before an effect is added it asks: yes, no, or the name of another one; six effects are added at most. Where no
+    effect explains what is missing it offers to learn a law out of the data, as ridelog learn does. DIR gets a vehicle
+    file for each step (vehicle-1.yaml ...), the law (law.py), and story.html, the page of all of it. It takes minutes,
+    and the compiler of the ``lab`` extra.
+
+    In Python: raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer
+    that is no effect; OSError for files that cannot be written.
+
+    >>> story = lab(car, runs, folder / "lab", candidates=["sensor_gain", "time_offset"])
+    >>> [one.effect for one in story.additions], story.comparisons[-1].missing
+    (['sensor_gain'], False)
+    >>> [one.effect.name for one in read_vehicle(folder / "lab" / "vehicle-1.yaml").effects]
+    ['sensor_gain']
+    """
+
+    vehicle: VehicleName
+    runs: TrackedRuns
+    out: Annotated[Path | str, Option(
+        "folder for the vehicle files and the page", metavar="DIR", read=Path)] = Path("ridelog-lab")
+    _: KW_ONLY
+    ask: Annotated[Callable[[str], str | None],
+                   "given the name of an effect that was found missing, gives that of the one to be added, or None for "
+                   "none; without it all that is missing is added"] = str
+    candidates: Candidates = None
+    effect_files: EffectFiles = ()
+    learns: Annotated[bool, "whether a law is learned at all"] = True
+
+
+COMPARE = Verb(CompareQuestion, "logger.api.lab.compare:compared", (Out(
+    "write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat", others=("*",)),))
+DIAGNOSE = Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnosed", (PAGE,))
+ADD_EFFECT = Verb(AddEffectQuestion, "logger.api.lab.compare:added", (Out(
+    "the new vehicle file", metavar="V2.yaml", others=("*",), many=False, is_drawn=False, required=True),))
+LEARN = Verb(LearnQuestion, "logger.api.lab.learn:law_of", (
+    Out("the law's file", metavar="LAW.py", others=(".py",), many=False, is_drawn=False, required=True),
+    Out("write a page with pictures", "--page", others=(".html",), many=False, is_drawn=False)))
+PLAN = Verb(PlanQuestion, "logger.api.lab.plan:plan_by", (PAGE,))
+LAB = Verb(LabLoopQuestion, "logger.api.lab.loop:story_of")

@@ -1,0 +1,207 @@
+"""What the lab's answers share: errors on one scale, what is taken out of an error before anything is judged, which
+frequencies were compared, and what a residual looks like; in sentences, as rows, in pictures and for a program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from logger.chart_data import Curves, Line
+from logger.lab.likelihood.record_band import ComparedBand
+from logger.lab.likelihood.whittle import LOWEST_HZ
+from logger.lab.residuals.breakdown import Part
+from logger.lab.residuals.removed import Removed
+from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift
+from logger.lab.residuals.unexplained import Shape, SpatialLine
+from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, Step, fit_percent, rising
+from logger.printable import percent
+from logger.report.charts import Steps, chart, steps_figure
+from logger.report.document import EMPTY, Html, grid, hint, section
+from logger.report.quantities import enumerated
+from logger.runs import shortened
+
+_WHEEL_RADII_M = (0.22, 0.5)
+
+
+def looks_like(shape: Shape) -> list[str]:
+    """What a residual that no candidate explains looks like."""
+    turns = [line_sentence(shape.line)] if shape.line is not None and shape.line.found else []
+    found = turns + [test.sentence for test in shape.tests.found]
+    return found or ["No test says more: it is spread over all frequencies, speeds and places."]
+
+
+def line_sentence(line: SpatialLine) -> str:
+    """What repeats along the way, and what may do so."""
+    every_m = 1 / line.at_per_m
+    if line.steady:
+        return (f"It repeats every {every_m:.2f} m of the way or {line.at_per_m * line.speed_mps:.1f} times a second: "
+                f"at a steady speed that is the same (clearest in {line.run}). A drive at another speed would show "
+                "which.")
+    radius_m = 1 / (2 * np.pi * line.at_per_m)
+    wheel = (f" A wheel of {radius_m:.2f} m radius turns at that rate: look at its balance and roundness."
+             if _WHEEL_RADII_M[0] < radius_m < _WHEEL_RADII_M[1] else "")
+    return f"It repeats every {every_m:.2f} m of the way, at any speed (clearest in {line.run}).{wheel}"
+
+
+def error_text(part: Part, digits: int) -> str:
+    """The error of a part with so many digits behind the point; a dash where there is none."""
+    return f"{part.error:.{digits}f}" if np.isfinite(part.error) else "-"
+
+
+def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
+    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
+    numbers; others by their ends. None where there is no such part."""
+    known = {one.name or (one.low, one.high): one for one in before}
+    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
+
+
+_ALIKE = 0.15
+"""Drifts whose numbers differ by less are said at once."""
+_MOST = 4
+_REMOVED_WORDS = {
+    OFFSET: "a constant offset of {size:.2g} m/s2",
+    RAMP: "a ramp of {size:.2g} m/s2 in all",
+    STEP: "a step of {size:.2g} m/s2 at {time:.3g} s",
+    EXPONENTIAL: "exponential, {time:.2g} s, {size:.2g} m/s2",
+    WANDER: "a random walk, {size:.2g} m/s2 r.m.s.",
+}
+HEADS = ("What", "Share of the residual's power", "")
+
+
+def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
+    """What was filtered, drifted and lay elsewhere, with its share of the residual of the model as it stands; nothing
+    of what is no more than usual."""
+    lines = band_words(band)
+    if found.filter_share > 0 and lines:
+        lines[0] += (f" Outside of that lies {percent(found.filter_share)} of the power of their difference.")
+    if found.distance_error_m > 0:
+        lines.append(f"The distances of these runs are off by more than usual: up to {found.distance_error_m:.2g} m. "
+                     f"That makes {percent(found.distance_share)} of the residual's power before any fit; the fits "
+                     "take it into account.")
+    if found.drifting_sensors:
+        lines.append(f"The sensor drifts ({drift_words(found)}). That has nothing to do with the car, and makes "
+                     f"{percent(found.drift_share)} of the residual's power before any fit. Below {LOWEST_HZ:g} Hz "
+                     f"nothing is judged; without the drift the error of the refitted model is {found.error:.3f}.")
+    return lines
+
+
+def drift_words(found: Removed) -> str:
+    """How the sensors drift: at once where all runs are alike, else run by run."""
+    drifts = found.drifting_sensors
+    first = drifts[0]
+    if len(drifts) == len(found.drifts) and all(_alike(one, first) for one in drifts):
+        size = float(np.median([one.size_mps2 for one in drifts]))
+        times = [one.time_s for one in drifts if one.time_s is not None]
+        return _REMOVED_WORDS[first.form].format(size=size, time=float(np.median(times)) if times else np.nan)
+    names = shortened([one.run for one in found.drifts])
+    each = [f"{names[one.run]}: {_said(one)}" for one in drifts[:_MOST]]
+    more = len(drifts) - len(each)
+    return "; ".join([*each, f"and {more} more runs"] if more else each)
+
+
+def removed_json(found: Removed) -> dict[str, Any]:
+    """The same for a program; shares are of the power of the residual of the model as it stands, at all frequencies."""
+    return {
+        "removed": {
+            "drift": {"error_power_share": found.drift_share, "judged_from_hz": LOWEST_HZ, "runs": [
+                {"run": one.run, "form": one.form, "size_mps2": one.size_mps2, "time_s": one.time_s}
+                for one in found.drifts]},
+            "distance": {"error_power_share": found.distance_share, "off_m": found.distance_error_m},
+            "filter": {"error_power_share": found.filter_share},
+        },
+        "error_without_drift": found.error,
+    }
+
+
+def removed_section(found: Removed, band: ComparedBand | None) -> Html:
+    """A page's part on it; nothing where nothing was removed that is more than usual."""
+    if not removed_words(found, band):
+        return EMPTY
+    rows = []
+    if found.drifting_sensors:
+        rows.append(("drift of the sensor", percent(found.drift_share), drift_words(found)))
+    if found.distance_error_m > 0:
+        rows.append(("wrong distances", percent(found.distance_share), f"up to {found.distance_error_m:.2g} m"))
+    if band is not None:
+        rows.append(("outside of the pass band", percent(found.filter_share),
+                     f"compared from {band.low_hz:.3g} to {band.high_hz:.3g} Hz"))
+    return section("What is removed before anything is judged", grid(HEADS, rows, words=(0, 2)) + _picture(found)
+                   + hint("Shares are of the power by which the model as it stands and the record differ."))
+
+
+def drift_tile(found: Removed) -> list[tuple[str, str, str]]:
+    """The error without the drift, in large figures; nothing where nothing drifts."""
+    return [("Without the sensor's drift", f"{found.error:.3f}", "refitted")] if found.drifting_sensors else []
+
+
+def _picture(found: Removed) -> Html:
+    if not found.drifting_sensors:
+        return EMPTY
+    names = shortened([one.run for one in found.drifts])
+    lines = tuple(Line(names[one.run], np.arange(len(one.curve_mps2)) / one.rate_hz, one.curve_mps2)
+                  for one in found.drifting_sensors[:2 * _MOST])
+    return chart(Curves("The drift of the sensor", "time in the run [s]", "acceleration [m/s2]", lines))
+
+
+def _said(one: Drift) -> str:
+    return _REMOVED_WORDS[one.form].format(size=one.size_mps2, time=one.time_s)
+
+
+def _alike(one: Drift, other: Drift) -> bool:
+    pairs = ((one.size_mps2, other.size_mps2), (one.time_s, other.time_s))
+    return one.form == other.form and all(
+        a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
+
+
+_ERROR_WORDS = {AS_FILED: "as the vehicle's file says", REFITTED: "with its numbers refitted"}
+
+
+def error_words(steps: Sequence[Step], floor: float) -> list[str]:
+    """The errors of each step and of the noise alone, and why one rises."""
+    each = ", ".join(f"{error_and_fit(one.error)} {_ERROR_WORDS.get(one.words, one.words)}" for one in steps)
+    lines = [f"Error on {JUDGED_ON}: {each}. The sensor's noise alone makes about {error_and_fit(floor)}."]
+    if rises := rising(steps):
+        said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
+        lines.append(f"It rises {said}: the error counts all frequencies alike, and a fit weighs each by its noise. It "
+                     "gains where there is little noise, and loses where there is much.")
+    return lines
+
+
+def error_and_fit(error: float) -> str:
+    """An error with its fit per cent: "0.153 (fit 84.7 %)"."""
+    return f"{error:.3f} (fit {fit_percent(error):.1f} %)"
+
+
+def errors_json(steps: Sequence[Step], floor: float) -> dict[str, Any]:
+    """The same for a program."""
+    return {"errors": [{"model": one.words, "error": one.error, "fit_percent": fit_percent(one.error)}
+                       for one in (*steps, Step("noise alone", floor))]}
+
+
+def band_words(band: ComparedBand | None) -> list[str]:
+    """Which frequencies were compared, and why; nothing where all were."""
+    if band is None:
+        return []
+    errors = "errors compare measurement and model below that"
+    if band.low_hz > 0:
+        errors = f"nor below {band.low_hz:.3g} Hz; errors compare measurement and model in between"
+    if band.cutoff_hz is None:
+        return [f"Above {band.high_hz:.3g} Hz nothing is compared, as was asked or as run.yaml says; {errors}."]
+    which = "Some of the records were" if band.some else "The record was"
+    return [f"{which} low-passed at about {band.cutoff_hz:.2g} Hz: above {band.high_hz:.3g} Hz nothing is compared; "
+            f"{errors}."]
+
+
+def band_json(band: ComparedBand | None) -> dict[str, Any]:
+    """The same for a program; nothing where all were."""
+    if band is None:
+        return {}
+    return {"pass_band_hz": [band.low_hz, band.high_hz], "low_passed_at_hz": band.cutoff_hz}
+
+
+def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Html:
+    """The error of each step as a falling curve, down to the noise."""
+    return steps_figure(Steps(title, "error", tuple(steps), (floor, "noise alone")))
