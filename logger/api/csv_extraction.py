@@ -40,10 +40,24 @@ from logger.runs import RecordFacts
 from logger.service.config import Config
 from logger.service.doubted_spans import MOVING_MPS
 from logger.service.drive_readings import GridReadings
-from logger.service.frozen_sensor import MOVING_MPS
-from logger.store.formats.logger_columns import Named, Recognised, advice, plain
-from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
-from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, PLACE, SPEED_UNITS, units_of
+from logger.store.formats.logger_csv import (
+    ACCELERATION_UNITS,
+    AXES,
+    GRAVITY,
+    SPEED_UNITS,
+    Header,
+    LoggerTable,
+    Named,
+    Recognised,
+    advice,
+    plain,
+    read_header,
+    read_table,
+    recognised,
+    seconds,
+    units_of,
+)
+from logger.store.formats.logger_layouts import PLACE
 from logger.store.formats.record_checks import still_doubts
 from logger.units import STANDARD_GRAVITY_MPS2
 

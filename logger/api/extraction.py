@@ -18,23 +18,21 @@ import numpy.typing as npt
 
 from drivers.dump import open_dump
 from drivers.errors import SettingsError
-from drivers.recorded_words import folder_name
+from drivers.readings import folder_name
 from logger.errors import BadInput
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
+from logger.store.formats.drive_file import RUN, read_run_facts, write_run_facts
 from logger.store.formats.profile_file import Profile, read_places, read_profile
-from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief
-    from logger.extraction.along_track import Observations, TrackMotion
+    from logger.extraction.along_track import Observations, Predict, Registered, RunGrid, TrackMotion
     from logger.extraction.measured_line import MeasuredLine, Pass
-    from logger.extraction.registration import Predict, Registered
-    from logger.extraction.run_grid import RunGrid
     from logger.service.drive_readings import GridReadings
     from logger.service.wiring import Instrument
     from logger.store.formats.vehicle_file import Model
@@ -349,7 +347,7 @@ class _Drive:
 
 def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:
     """The runs of a dump, and what was left out of it."""
-    from logger.extraction.stretches import stretches
+    from logger.extraction.even_samples import stretches
 
     config, fixes, readings = recorded.config, recorded.fixes, recorded.readings
     found: list[_Drive] = []
@@ -422,8 +420,7 @@ def _speeds(fixes: Fixes, config: Config) -> Observations:
 def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, measured: MeasuredProfile
                 ) -> _Drive | None:
     """A pass, laid on the profile's distance and cut to it; None for one that is too short."""
-    from logger.extraction.along_track import Observations
-    from logger.extraction.registration import GPS_PLACE_M, registered
+    from logger.extraction.along_track import GPS_PLACE_M, Observations, registered
 
     part = slice(one.first, one.last)
     fixes, along_m = fixes.part(part), along_m[part]
@@ -470,7 +467,7 @@ def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMo
 def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
     """Samples on the grid of a run, within the fixes: accelerations without gravity and offset, and how usable they
     are, (n,) each."""
-    from logger.extraction.run_grid import run_grid
+    from logger.extraction.along_track import run_grid
 
     readings = recorded.readings
     inside = (readings.time_s >= fixes.time_s[0]) & (readings.time_s <= fixes.time_s[-1])

@@ -37,23 +37,24 @@ from logger.report.placed import column, iri_errors, placed, trace_of
 from logger.report.quantities import known
 from logger.report.summary import comfort_words, counts
 from logger.roads.iso8608 import iri_class
-from logger.roads.laid_traces import lay
-from logger.roads.places_to_visit import PlaceToVisit, places_to_visit
 from logger.roads.repeated_drives import (
     Changes,
     Means,
     Passes,
+    PlaceToVisit,
     Scatter,
     Trends,
     changes,
     means,
     passes_of,
+    places_to_visit,
     scatter_of,
     trends,
     way_and_cell,
 )
+from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.roads.sections import FAIR_TO_IN_PER_MI
 from logger.roads.window_errors import WindowErrors
 from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives, utc
 from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S

@@ -19,16 +19,16 @@ from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import line
 from logger.comfort import exposure
-from logger.comfort.exposure import CautionZone
 from logger.comfort.iso2631 import (
     COMFORT_FACTORS,
     HEALTH_FACTORS,
     AxisFigures,
+    CautionZone,
+    RideComfort,
     comfort_word,
     motion_sickness_dose,
     total,
 )
-from logger.comfort.ride_comfort import RideComfort
 from logger.errors import BadInput
 from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
@@ -138,7 +138,7 @@ def comfort_of(question: ComfortQuestion) -> Comfort:
     """The answer to ``ComfortQuestion``, which says what is raised."""
     from logger.api.shown import checks_json, checks_lines
     from logger.api.weightings import weighting_named, weightings
-    from logger.comfort.ride_comfort import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
+    from logger.comfort.iso2631 import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
 
     used, record = weighting_named(question.weighting), question.record
     name = "record" if isinstance(record, record_file.AccelerationRecord) else str(

@@ -36,7 +36,7 @@ from logger.extraction.measured_line import MeasuredLine, passes
 from logger.roads.agreement import Agreement, agreement, factor_to
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
-from logger.store.formats.logger_columns import named_columns
+from logger.store.formats.logger_csv import named_columns
 from logger.store.formats.vehicle_file import read_model
 from logger.studies.study import Cell, Column, Effort, Result, Table
 

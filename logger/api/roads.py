@@ -25,12 +25,11 @@ from logger.errors import BadInput
 from logger.files import write_text
 from logger.report.quantities import area_lines, area_values
 from logger.report.summary import IRI_CLASSES
+from logger.roads.elevation_spectrum import TrackClass
+from logger.roads.iri import Area, ProfileIri
 from logger.roads.iso8608 import iri_from_gd_n0
-from logger.roads.localized_roughness import Area
 from logger.roads.plausible import doubts_of, unit_doubt
-from logger.roads.profile_iri import ProfileIri
-from logger.roads.roughness_words import ride_words, road_kinds
-from logger.roads.track_class import TrackClass
+from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
@@ -165,7 +164,7 @@ class Iri(CommandResult):
 
 def iri_of(question: IriQuestion) -> Iri:
     """The answer to ``IriQuestion``, which says what is raised."""
-    from logger.roads.localized_roughness import areas
+    from logger.roads.iri import areas
     from logger.roads.plausible import spacing_hint, unit_complaint
     from logger.units import WINDOW_M
 
@@ -197,7 +196,7 @@ iri = function("iri", IriQuestion, iri_of)
 def asked_iri(question: IriCommand) -> CommandResult:
     """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
     2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
-    from logger.roads.wavelength import sinusoid_iri, slope_gain
+    from logger.roads.iri import sinusoid_iri, slope_gain
 
     if not question.response:
         return iri_of(question)

@@ -30,13 +30,12 @@ from logger.records import WindowRecord
 from logger.report.placed import column, iri_errors, placed, trace_of
 from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_values, known
 from logger.report.summary import counts, expected_square
+from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
-from logger.roads.linear_reference import ALONG, on_route
-from logger.roads.localized_roughness import Area, areas
+from logger.roads.road_matching import ALONG, on_route
 from logger.roads.road_network import RoadNetwork
-from logger.roads.roughness_words import FEDERAL_WORDS, federal_condition
+from logger.roads.sections import FEDERAL_WORDS, Windows, even_edges, federal_condition
 from logger.roads.sections import Sections as RoadSections
-from logger.roads.sections import Windows, even_edges
 from logger.roads.sections import sections as in_sections
 from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives
 from logger.units import FOOT_M, MILE_M
@@ -113,8 +112,8 @@ sections = function("sections", SectionsQuestion, sections_of)
 
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
-    from logger.roads.linear_reference import measures, route_network
-    from logger.store.formats.route_file import read_route
+    from logger.roads.road_matching import measures, route_network
+    from logger.store.formats.road_lines import read_route
 
     route = read_route(path)
     try:

@@ -132,8 +132,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
     runs      their folders
     option    how the file was asked for
     """
-    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE
-    from logger.store.formats.run_file import RUN
+    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE, RUN
 
     said = f"{option} {out}".lstrip()
     if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE, EXCITATION, RUN)}:

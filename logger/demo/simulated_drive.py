@@ -34,16 +34,16 @@ from scipy.signal import resample_poly
 from drivers.accelerometers import DEFAULT, accelerometers, line_reader
 from drivers.accelerometers.accelerometer import Accelerometer, SerialAccelerometer
 from drivers.dump import DumpHeader, DumpWriter, Event
-from drivers.events import GPS
+from drivers.readings import GPS
 from logger.profiles.track import Track
 from logger.roads import iri, iso8608
-from logger.roads.bumps import speed_bump
+from logger.roads.obstacles import speed_bump
 from logger.units import KMH_MPS, KNOT_MPS, STANDARD_GRAVITY_MPS2, US_PER_S
-from logger.vehicle import half_car
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen
-from logger.vehicle.passage import Passage
-from logger.vehicle.state_space import recursion, straight_step
+from logger.vehicle.models import half_car
+from logger.vehicle.simulate import Passage
+from logger.vehicle.structure import recursion, straight_step
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

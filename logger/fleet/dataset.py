@@ -30,7 +30,7 @@ import numpy.typing as npt
 from logger.errors import BadInput
 from logger.files import BESIDE, DISK, make_folder, naming, read_bounded, replace_bytes
 from logger.fleet.road_map import region_of
-from logger.store.log.folder_lock import FolderLock
+from logger.store.log.atomic_file import FolderLock
 
 if TYPE_CHECKING:
     import ibis.expr.types as ir

@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drivers.regular_file import open_regular
+from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.files import read_bounded, replace_bytes
 from logger.fleet.dataset import ROW_TYPES, Dataset

@@ -65,7 +65,7 @@ from logger.report.document import (
 from logger.report.placed import damaged
 from logger.report.quantities import known
 from logger.report.summary import distance_words
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI, federal_condition
+from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI, federal_condition
 from logger.store.log.log_reader import iso_utc, utc
 from logger.units import INCH_PER_MILE_M_PER_KM
 

@@ -27,7 +27,7 @@ import numpy.typing as npt
 from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
 from logger.fleet.dataset import Engine
 from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
-from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.roads.sections import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from logger.chart_data import Array
 from logger.left_out import LeftOut, counting
 from logger.records import WindowRecord
 from logger.report.summary import counts
-from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
+from logger.roads.road_matching import lay
 from logger.roads.road_network import Ints, RoadNetwork, Trace
 from logger.roads.window_errors import WindowErrors
 from logger.store.log.log_reader import LoggedFile

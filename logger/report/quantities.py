@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
 
 if TYPE_CHECKING:
-    from logger.roads.localized_roughness import Area
+    from logger.roads.iri import Area
     from logger.vehicle.effect import Chosen
 
 _SYMBOLS = {

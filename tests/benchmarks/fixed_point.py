@@ -16,8 +16,7 @@ import numpy as np
 from scipy import signal
 
 from logger.demo.simulated_drive import DrivePlan, RoadStretch, simulate_drive
-from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter
-from logger.dsp.fixed_scaling import fixed_cascade
+from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from drivers.dump import DumpWriter, open_dump
-from drivers.events import GPS, Event
+from drivers.readings import GPS, Event
 from logger.demo.simulated_drive import (
     LEAD_M,
     SPACING_M,

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from drivers.events import GPS, Event
+from drivers.readings import GPS, Event
 from logger.demo.simulated_drive import Drive, DrivePlan, Reception, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_drive

@@ -14,8 +14,7 @@ from logger.api.conversion import smoothness_layer
 from logger.commands.main import main
 from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
-from logger.roads.repeated_drives import Passes, Scatter
-from logger.roads.smoothness import suggestion, way_means
+from logger.roads.repeated_drives import Passes, Scatter, suggestion, way_means
 from logger.roads.window_errors import WindowErrors
 from logger.store.formats.road_lines import read_map_ways
 

@@ -13,7 +13,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
-from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import Passage
 
 
 def step_a_car() -> None:

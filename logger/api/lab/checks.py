@@ -335,7 +335,7 @@ def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
     """
     import numpy as np
 
-    from logger.dsp.stretches import stretches_of
+    from logger.dsp.repeated_samples import stretches_of
     from logger.lab.likelihood.lag import SLOWEST_MPS
     from logger.runs import NO_READING, SKIP_S
 
@@ -371,7 +371,7 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
     """
     import numpy as np
 
-    from logger.dsp.thinning import thinned
+    from logger.dsp.whole_record import thinned
     from logger.vehicle.simulate import resampled
 
     factor = int(runs[0].rate_hz / _needed_hz(vehicle) + _NEARLY)
