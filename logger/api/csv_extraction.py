@@ -44,6 +44,7 @@ from logger.store.formats.logger_csv import (
     ACCELERATION_UNITS,
     AXES,
     GRAVITY,
+    PLACE,
     SPEED_UNITS,
     Header,
     LoggerTable,
@@ -57,7 +58,6 @@ from logger.store.formats.logger_csv import (
     seconds,
     units_of,
 )
-from logger.store.formats.logger_layouts import PLACE
 from logger.store.formats.record_checks import still_doubts
 from logger.units import STANDARD_GRAVITY_MPS2
 

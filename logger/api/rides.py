@@ -9,24 +9,30 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import welch
 
 from logger.api.drive_questions import ComfortQuestion
 from logger.api.question import function
-from logger.api.shown import CommandResult, Shown, table
-from logger.chart_data import line
-from logger.comfort import exposure
+from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
+from logger.api.weightings import weighting_named, weightings
+from logger.chart_data import Chart, Curves, Line, line
+from logger.comfort import iso2631
 from logger.comfort.iso2631 import (
     COMFORT_FACTORS,
     HEALTH_FACTORS,
+    LEAST_TAKEN_HZ,
+    LOWEST_RATE_HZ,
     AxisFigures,
     CautionZone,
     RideComfort,
+    RunningRms,
     comfort_word,
     motion_sickness_dose,
+    ride_comfort,
     total,
 )
 from logger.errors import BadInput
@@ -35,10 +41,6 @@ from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
 from logger.store.formats.drive_file import facts_beside
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-
 
 Array = npt.NDArray[np.float64]
 
@@ -66,8 +68,6 @@ class Record(record_file.AccelerationRecord, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The axes over time."""
-        from logger.chart_data import Curves
-
         time_s = self.start_s + np.arange(len(self.accel_z_mps2)) / self.rate_hz
         return [Curves("Record", "time [s]", "acceleration [m/s2]", tuple(
             line(axis, time_s, one) for axis, one in self.by_axis.items() if one is not None))]
@@ -116,11 +116,6 @@ class Comfort(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The running r.m.s. over 1 s, beside a_w, and the spectrum of the weighted acceleration."""
-        from scipy.signal import welch
-
-        from logger.chart_data import Curves, Line
-        from logger.comfort.iso2631 import RunningRms
-
         time_s = np.arange(len(self.weighted_mps2)) / self.rate_hz
         running = RunningRms(self.rate_hz).process(self.weighted_mps2)
         frequency_hz, psd = welch(self.weighted_mps2, self.rate_hz,
@@ -136,10 +131,6 @@ class Comfort(CommandResult):
 
 def comfort_of(question: ComfortQuestion) -> Comfort:
     """The answer to ``ComfortQuestion``, which says what is raised."""
-    from logger.api.shown import checks_json, checks_lines
-    from logger.api.weightings import weighting_named, weightings
-    from logger.comfort.iso2631 import LEAST_TAKEN_HZ, LOWEST_RATE_HZ, ride_comfort
-
     used, record = weighting_named(question.weighting), question.record
     name = "record" if isinstance(record, record_file.AccelerationRecord) else str(
         record.path if isinstance(record, drive_file.Drive) else record)
@@ -242,20 +233,20 @@ def _health(result: RideComfort) -> dict[str, Any] | None:
     hours, seconds = result.daily_hours, result.vertical.duration_s
     a_w_mps2, a_w_axis = max((k * result.axes[axis].a_w_mps2, axis) for axis, k in factors.items())
     vdv, vdv_axis = max((k * result.axes[axis].vdv_mps175, axis) for axis, k in factors.items())
-    a8_mps2, dose = exposure.a8(a_w_mps2, hours), exposure.daily_vdv(vdv, seconds, hours)
-    a8_at, vdv_at = exposure.A8_MPS2, exposure.VDV_MPS175
+    a8_mps2, dose = iso2631.a8(a_w_mps2, hours), iso2631.daily_vdv(vdv, seconds, hours)
+    a8_at, vdv_at = iso2631.A8_MPS2, iso2631.VDV_MPS175
     return {
         "daily_hours": hours,
         "a8_mps2": a8_mps2, "a8_axis": a_w_axis, "a8_verdict": a8_at.verdict(a8_mps2),
-        "hours_to_a8_action": known(exposure.hours_to_a8(a_w_mps2, a8_at.action)),
-        "hours_to_a8_limit": known(exposure.hours_to_a8(a_w_mps2, a8_at.limit)),
+        "hours_to_a8_action": known(iso2631.hours_to_a8(a_w_mps2, a8_at.action)),
+        "hours_to_a8_limit": known(iso2631.hours_to_a8(a_w_mps2, a8_at.limit)),
         "daily_vdv_mps175": dose, "vdv_axis": vdv_axis, "vdv_verdict": vdv_at.verdict(dose),
-        "hours_to_vdv_action": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.action)),
-        "hours_to_vdv_limit": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.limit)),
+        "hours_to_vdv_action": known(iso2631.hours_to_vdv(vdv, seconds, vdv_at.action)),
+        "hours_to_vdv_limit": known(iso2631.hours_to_vdv(vdv, seconds, vdv_at.limit)),
         "caution_zone": {
-            "n2": _zone(exposure.caution_zone(hours, 2), a_w_mps2, "mps2"),
-            "n4": _zone(exposure.caution_zone(hours, 4), a_w_mps2, "mps2"),
-            "vdv": _zone(exposure.CAUTION_ZONE_VDV_MPS175, dose, "mps175"),
+            "n2": _zone(iso2631.caution_zone(hours, 2), a_w_mps2, "mps2"),
+            "n4": _zone(iso2631.caution_zone(hours, 4), a_w_mps2, "mps2"),
+            "vdv": _zone(iso2631.CAUTION_ZONE_VDV_MPS175, dose, "mps175"),
         },
     }
 

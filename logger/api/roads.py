@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,22 +20,19 @@ import numpy.typing as npt
 from logger.api.drive_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
-from logger.chart_data import line
+from logger.chart_data import Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.report.quantities import area_lines, area_values
 from logger.report.summary import IRI_CLASSES
-from logger.roads.elevation_spectrum import TrackClass
-from logger.roads.iri import Area, ProfileIri
-from logger.roads.iso8608 import iri_from_gd_n0
-from logger.roads.plausible import doubts_of, unit_doubt
+from logger.roads import elevation_spectrum, iso8608
+from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, acceleration_psd, track_class
+from logger.roads.iri import Area, ProfileIri, areas, continuous_iri, profile_iri, sinusoid_iri, slope_gain
+from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, iri_from_gd_n0
+from logger.roads.plausible import doubts_of, spacing_hint, unit_complaint, unit_doubt
 from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-    from logger.roads.elevation_spectrum import BandedSpectrum
-
+from logger.units import WINDOW_M
 
 Array = npt.NDArray[np.float64]
 
@@ -66,8 +63,6 @@ class Profile(profile_file.Profile, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The elevation of each track."""
-        from logger.chart_data import Curves
-
         tracks = {"left": self.elevation_m, "right": self.elevation_right_m}
         return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
             line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
@@ -99,8 +94,6 @@ def write_profile(path: Path | str, profile: Profile) -> None:
 
 def random_road_of(question: RandomRoadQuestion) -> Profile:
     """The answer to ``RandomRoadQuestion``, which says what is raised."""
-    from logger.roads.iso8608 import generate
-
     elevation_m = generate(roughness_of(question), question.length_m, question.spacing_m, question.seed,
                            question.waviness)
     return Profile(0.0, question.spacing_m, elevation_m, None)
@@ -111,8 +104,6 @@ random_road = function("random_road", RandomRoadQuestion, random_road_of)
 
 def roughness_of(question: RandomRoadQuestion) -> float:
     """Gd(n0) of the road that is asked for [cm3]."""
-    from logger.roads import elevation_spectrum, iso8608
-
     if question.iso_class is not None:
         return iso8608.CLASS_GD_N0_CM3[question.iso_class]
     if question.gd_n0_cm3 is not None:
@@ -149,10 +140,6 @@ class Iri(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the windows along the way, the continuous one over 25 ft (AASHTO R 54), and the profile."""
-        from logger.chart_data import Curves, Line
-        from logger.roads.iri import continuous_iri
-        from logger.units import WINDOW_M
-
         road = self.profile
         distance_m, continuous = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
         return [
@@ -164,10 +151,6 @@ class Iri(CommandResult):
 
 def iri_of(question: IriQuestion) -> Iri:
     """The answer to ``IriQuestion``, which says what is raised."""
-    from logger.roads.iri import areas
-    from logger.roads.plausible import spacing_hint, unit_complaint
-    from logger.units import WINDOW_M
-
     name, road = _named(question.profile, question.resample_m)
     localized_m_per_km = question.localized_m_per_km
     try:
@@ -196,8 +179,6 @@ iri = function("iri", IriQuestion, iri_of)
 def asked_iri(question: IriCommand) -> CommandResult:
     """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
     2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
-    from logger.roads.iri import sinusoid_iri, slope_gain
-
     if not question.response:
         return iri_of(question)
     wavelengths_m = 100.0 / 2.0 ** (np.arange(26) / 3.0)
@@ -230,8 +211,6 @@ class RoadClass(CommandResult):
 
     def write(self, path: Path, option: str = "--psd") -> None:
         """Write the spectrum as CSV."""
-        from logger.roads.elevation_spectrum import acceleration_psd
-
         found = self.spectrum
         columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,
                    acceleration_psd(found.centre_cpm, found.psd_m3), found.freedom)
@@ -241,9 +220,6 @@ class RoadClass(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""
-        from logger.chart_data import Curves, Line
-        from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd
-
         found = self.spectrum
         lines = [Line("measured", found.centre_cpm, found.psd_m3),
                  Line("line through it", found.centre_cpm,
@@ -258,8 +234,6 @@ class RoadClass(CommandResult):
 
 def road_class_of(question: ClassifyQuestion) -> RoadClass:
     """The answer to ``ClassifyQuestion``, which says what is raised."""
-    from logger.roads.plausible import spacing_hint
-
     name, road = _named(question.profile, question.resample_m)
     profile_file.check_road(road, name)
     tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]

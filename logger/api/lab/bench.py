@@ -35,7 +35,7 @@ from logger.store.formats import drive_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect, shipped_effects
 from logger.store.formats.vehicle_file import Model, Step
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
-from logger.vehicle.effect_sizes import sized
+from logger.vehicle.uncertain import sized
 
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones

@@ -33,7 +33,7 @@ from logger.report.document import EMPTY, Html, document, grid, heading, hint, p
 from logger.report.quantities import finite, measured, numbers_of, unit_of, wrapped
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_sizes import sized
+from logger.vehicle.uncertain import sized
 
 
 @dataclass(frozen=True, eq=False)
