@@ -15,6 +15,8 @@ from logger.dsp import weightings
 from logger.errors import BadInput
 from logger.plugins import blamed_on, catalogue, offered_by
 
+from .support.slow import slow
+
 
 def folder(root: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> str:
     package = root / f"offers_of_{root.name.replace('-', '_')}"
@@ -139,10 +141,10 @@ def test_an_installed_package_offers_an_effect_by_its_name(tmp_path: Path, ridel
 
 @pytest.mark.parametrize(("entry", "complaint"), [
     ("roll = their_package:EFFECT", "expected a name of its own, there is 'roll' already"),
-    ("others = their_package:EFFECT", "expected EFFECT to be named as its entry point is, found 'theirs'"),
-    ("theirs = their_package:NOWHERE", "found AttributeError"),
-    ("theirs = no_such_package:EFFECT", "found ModuleNotFoundError"),
-    ("theirs = their_package:WRONG", "expected EFFECT to be named as its entry point is, found 5"),
+    *slow(("others = their_package:EFFECT", "expected EFFECT to be named as its entry point is, found 'theirs'"),
+          ("theirs = their_package:NOWHERE", "found AttributeError"),
+          ("theirs = no_such_package:EFFECT", "found ModuleNotFoundError"),
+          ("theirs = their_package:WRONG", "expected EFFECT to be named as its entry point is, found 5")),
 ])
 def test_an_installed_package_that_offers_something_wrong_is_named(
     tmp_path: Path, ridelog: Path, entry: str, complaint: str

@@ -10,6 +10,8 @@ from logger.comfort.iso2631 import RunningRms, a_w, vdv
 from logger.comfort.uncertain_ride import NoiseFloor, RawFigures
 from logger.dsp.weightings.wk import WEIGHTING
 
+from ..support.slow import slow
+
 RATE_HZ = 100
 GAIN = np.abs(WEIGHTING.response(np.linspace(0.0, RATE_HZ / 2, 1025)))
 WINDOWS, COUNT = 1500, 60
@@ -57,8 +59,8 @@ def test_ride_is_found_under_noise_within_its_errors(rms_mps2: float, noise_mps2
         assert 0.90 < np.mean(off <= 2) < 0.99, name
 
 
-@pytest.mark.parametrize("count", [60, 200, 500])
-@pytest.mark.parametrize("rms_mps2", [0.1, 0.4])
+@pytest.mark.parametrize("count", [200, *slow(60, 500)])
+@pytest.mark.parametrize("rms_mps2", [0.1, *slow(0.4)])
 @pytest.mark.parametrize("is_even", [True, False])
 def test_the_largest_running_mean_is_of_the_ride(count: int, rms_mps2: float, is_even: bool) -> None:
     """A ride of one level, and one whose level swings within some seconds, below a noise of 0.15 m/s2."""

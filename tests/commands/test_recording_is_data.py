@@ -22,6 +22,7 @@ from logger.store.log.row_format import HEADER, format_row
 
 from ..support.command import called
 from ..support.drives.logged_rows import rows_of_drive
+from ..support.slow import slow
 
 _watched: list[tuple[Path, list[str]]] = []
 
@@ -99,7 +100,7 @@ READERS: dict[str, tuple[str, ...]] = {"replay": ("--out", "out"), "extract": ("
                                        "hil": ("--nmea-port", "/dev/null", "--accelerometer-port", "/dev/null")}
 
 
-@pytest.mark.parametrize("verb", READERS)
+@pytest.mark.parametrize("verb", ["replay", "verify", *slow("extract", "hil")])
 def test_a_dump_that_names_files_of_this_machine(verb: str, trap: Trap, dump_of: Callable[..., Path]) -> None:
     for word in trap.words():
         done = called(verb, dump_of(vehicle=word), *READERS[verb])

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from ..support.slow import slow
+
 COMMANDS = {
     "settings": ("status", "--config", "PIPE"),
     "vehicle": ("calibrate", "--vehicle", "PIPE"),
@@ -27,7 +29,7 @@ def pipe(tmp_path: Path) -> Path:
     return tmp_path / "pipe.yaml"
 
 
-@pytest.mark.parametrize("what", COMMANDS)
+@pytest.mark.parametrize("what", ["vehicle", *slow(*(name for name in COMMANDS if name != "vehicle"))])
 def test_a_pipe_is_refused_at_once_whatever_it_is_given_as(what: str, pipe: Path) -> None:
     words = [str(pipe) if word == "PIPE" else word for word in COMMANDS[what]]
     script = "from logger.commands.main import run; run()"

@@ -7,6 +7,8 @@ import pytest
 
 from drivers.sample_clock import NO_TIME, SampleClock, is_ticked
 
+from ..support.slow import slow
+
 
 @pytest.mark.parametrize("timer_us", [16_003.0, 8_010.0, 15_950.0])
 def test_a_timer_near_a_multiple_of_the_period_is_seen(timer_us: float) -> None:
@@ -57,7 +59,7 @@ def as_read(taken_us: np.ndarray, timer_us: float = 0.0) -> np.ndarray:
     return np.maximum.accumulate(arrivals_us)
 
 
-@pytest.mark.parametrize("rate_hz", [100, 110, 120, 150, 175, 200, 250, 400])
+@pytest.mark.parametrize("rate_hz", [100, 110, 250, *slow(120, 150, 175, 200, 400)])
 @pytest.mark.parametrize("timer_us", [0.0, 16_003.0])
 def test_no_loss_is_seen_where_there_is_none(rate_hz: int, timer_us: float) -> None:
     taken_us = np.arange(rate_hz * 40) * (1e6 / rate_hz)

@@ -47,7 +47,7 @@ def test_stored_sections_are_those_of_the_design() -> None:
         (WEIGHTING, 500.0),
         pytest.param(WEIGHTING, 2000.0, marks=pytest.mark.slow),
         (WD, 100.0),
-        (WJ, 128.0),
+        pytest.param(WJ, 128.0, marks=pytest.mark.slow),
         pytest.param(WF, 100.0, marks=pytest.mark.slow),
         pytest.param(WF, 200.0, marks=pytest.mark.slow),
     ],

@@ -230,8 +230,8 @@ def test_nothing_at_all() -> None:
     assert estimator.finish() == [] and estimator.finish() == []
 
 
-@pytest.mark.parametrize("count", [1, 2, 199, 200, 201, 900, 1500])
-@pytest.mark.parametrize("sensor", [FINE, COARSE])
+@pytest.mark.parametrize("count", [1, 2, 199, 200, 201, 900, *slow(1500)])
+@pytest.mark.parametrize("sensor", [FINE, *slow(COARSE)])
 def test_drives_shorter_than_a_block(count: int, sensor: Sensor) -> None:
     one = driven(steady(20.0))
     found = estimated(an_estimator(sensor), one.read(sensor)[:count], one.distance_m[:count])

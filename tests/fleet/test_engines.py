@@ -43,6 +43,7 @@ def test_spark_gives_the_same_figures(dataset: Path) -> None:
     assert (ours.roads.key == theirs.roads.key).all() and (ours.roads.visit == theirs.roads.visit).all()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(HAS_SPARK, reason="PySpark is here")
 def test_spark_that_is_missing_is_asked_for(dataset: Path) -> None:
     with pytest.raises(BadInput, match="--engine spark: expected the 'spark' extra: pip install"):

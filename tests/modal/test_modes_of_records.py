@@ -9,6 +9,8 @@ from logger.modal.analysis import decays, find_modes
 from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
 from logger.modal.mode import FoundMode, mac
 
+from ..support.slow import slow
+
 RATE_HZ = 100.0
 FREQUENCIES_HZ = 2.48 * np.sin((2 * np.arange(1, 6) - 1) * np.pi / 22) / np.sin(np.pi / 22)  # of a uniform chain
 
@@ -60,14 +62,14 @@ def test_the_truth_lies_within_two_errors_as_often_as_it_should() -> None:
     assert np.mean(inside) > 0.88  # of 120
 
 
-@pytest.mark.parametrize("digits", [3, 6, 10])
+@pytest.mark.parametrize("digits", [3, *slow(6, 10)])
 def test_noise_that_shrinks_with_the_signal_has_no_modes(digits: int) -> None:
     clean = free_decay(five([0.01] * 5), np.eye(5)[0], RATE_HZ, 2000)
     rounded = np.array([[float(f"{one:.{digits}g}") for one in row] for row in clean])
     check(find_modes(rounded, RATE_HZ).modes, [0.01] * 5, 6.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *slow(2, 3)])
 def test_a_sensor_that_errs_by_a_share_of_what_it_reads(seed: int) -> None:
     clean = free_decay(five([0.01] * 5), np.eye(5)[0], RATE_HZ, 2000)
     share = 0.02 * np.random.default_rng(seed).standard_normal(clean.shape)
@@ -119,8 +121,7 @@ def test_heavy_and_light_damping_under_random_forces() -> None:
     assert result.order == 10
 
 
-@pytest.mark.parametrize("frequency_hz", [2.0, 10.0])
-@pytest.mark.parametrize("ratio", [0.05, 0.4])
+@pytest.mark.parametrize(("ratio", "frequency_hz"), [(0.05, 10.0), *slow((0.05, 2.0), (0.4, 2.0), (0.4, 10.0))])
 def test_one_mode_under_random_forces(frequency_hz: float, ratio: float) -> None:
     """Errors near the Cramer-Rao bound of a second-order process in noise, computed by Whittle's formula."""
     bound = {(2.0, 0.05): (0.0083, 0.175), (2.0, 0.4): (0.044, 0.089),

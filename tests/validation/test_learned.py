@@ -10,6 +10,7 @@ import pytest
 
 from logger.plugins import catalogue
 
+from ..support.slow import slow
 from .cases import random_case as cases
 from .cases.kept_back import write_kept_back
 from .cases.random_case import case
@@ -94,7 +95,7 @@ def test_kinds_are_mixed_and_their_seeds_kept_apart() -> None:
         planned(KINDS, 2, 7000, release=False)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [2, *slow(1)])
 def test_what_is_kept_back_is_not_learned_from(count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = cases.draw_drives
     monkeypatch.setattr(cases, "draw_drives", lambda rng, rough: tuple(

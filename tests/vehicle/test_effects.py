@@ -102,7 +102,8 @@ def test_a_contact_patch_as_it_was_changes_nothing() -> None:
     assert np.array_equal(record(HALF, same), record(HALF))
 
 
-@pytest.mark.parametrize(("name", "model"), WHERE)
+@pytest.mark.parametrize(("name", "model"), [
+    one if one[1] == "half" else pytest.param(*one, marks=pytest.mark.slow) for one in WHERE])
 def test_it_is_finite_over_its_bounds_and_there(name: str, model: str) -> None:
     effect, plain, most = EFFECTS[name], record(CARS[model]), 0.0
     corners = product(*({one.low, one.start, one.high} if not one.choices else one.choices

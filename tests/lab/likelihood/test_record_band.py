@@ -27,6 +27,7 @@ from logger.vehicle.effect import Chosen
 
 from ...support.lab.runs_with_residual import CAR, a_run, measuring
 from ...support.lab.secret_runs import hidden
+from ...support.slow import slow
 
 Array = npt.NDArray[np.float64]
 RATE_HZ, NOISE = 100.0, 0.03
@@ -84,7 +85,7 @@ def test_what_a_car_does_is_no_filter(effects: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("beside", [NO_EFFECT, (hidden("tire_enveloping", contact_patch_m=0.45),),
                                     (hidden("cg_shift", shift_m=-0.2),)])
-@pytest.mark.parametrize("frequency_hz", [14.0, 20.0, 27.0])
+@pytest.mark.parametrize("frequency_hz", [14.0, *slow(20.0, 27.0)])
 def test_a_sensor_that_rings_is_no_filter_though_it_falls_as_steeply(frequency_hz: float,
                                                                      beside: Sequence[Chosen]) -> None:
     rings = hidden("sensor_mount_resonance", frequency_hz=frequency_hz, damping_ratio=0.11)
@@ -101,8 +102,8 @@ def test_a_filter_that_delays_is_found_with_its_cut_off(order: int, cutoff_hz: f
     assert seen.order == pytest.approx(order, rel=0.3)
 
 
-@pytest.mark.parametrize("cutoff_hz", [9.0, 15.0, 22.0, 30.0])
-@pytest.mark.parametrize("order", [3, 4, 8])
+@pytest.mark.parametrize("cutoff_hz", [9.0, 30.0, *slow(15.0, 22.0)])
+@pytest.mark.parametrize("order", [3, 8, *slow(4)])
 def test_a_filter_that_was_run_forth_and_back_is_found_without_delay(order: int, cutoff_hz: float) -> None:
     """Below where the pass band ends it takes a tenth of the amplitude at most."""
     seen = low_passed(sosfiltfilt, order, cutoff_hz)

@@ -52,8 +52,11 @@ def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "fsync", lambda _: None)
 
 
+LONG = ("stick pulled early", "stick that fails once", "stick pulled while it is paired")
+
+
 @pytest.mark.usefixtures("no_waiting")
-@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, quick=1), ids=label)
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS, 1, LONG), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
 

@@ -302,7 +302,7 @@ def test_the_last_clock_map_fills_and_small_corrections_wait_for_the_end(tmp_pat
     assert rows_of(tmp_path) == [kept(filled(row(1, utc=False)))]
 
 
-@pytest.mark.parametrize("power", [False, True])
+@pytest.mark.parametrize("power", [*slow(False), True])
 def test_cut_at_every_change_then_repair(tmp_path: Path, power: bool) -> None:
     total = changes_of(lambda files: Drive().run(_fresh(tmp_path, "whole"), files))
     assert total > 80
