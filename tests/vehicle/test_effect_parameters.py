@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.named_parameters import (
     FreeParameter,
@@ -29,6 +32,19 @@ def test_every_number_that_moves_is_found_by_its_name() -> None:
         one = USUAL[free.effect].effect
         assert free_parameter_named(USUAL, f"{one.name}.{one.parameters[free.parameter].name}") == free
     assert free_parameter_named(USUAL, "sprung_mass_kg") is None
+
+
+def test_what_a_number_may_be_is_said_in_words() -> None:
+    one = Parameter("order", 1.0, 1.0, 4.0, None, Scale.LINEAR, (), "how steep")
+    for choices, words in (((), "1 to 4"), ((1.0, 2.0), "1 or 2"), ((1.0, 2.0, 4.0), "one of 1, 2, 4")):
+        assert replace(one, choices=choices).allowed == words
+
+
+def test_what_needs_a_road_is_not_for_a_rig() -> None:
+    car = read_vehicle(vehicle_file("rav4-2009"))
+    assert "driven by time" in str(EFFECTS["speed_scale"].obstacle_on(car, False, timed=True))
+    assert EFFECTS["speed_scale"].obstacle_on(car, False, timed=False) is None
+    assert EFFECTS["dry_friction"].obstacle_on(car, False, timed=True) is None
 
 
 def test_every_number_is_free_from_where_it_stands() -> None:

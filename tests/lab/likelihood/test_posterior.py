@@ -1,0 +1,33 @@
+"""What a posterior predicts near a state, and when its readings are bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from logger.runs import RecordFacts
+from logger.simulation.simulated_runs import SimulatedRuns
+
+from ...support.lab.secret_runs import FINE_HZ, hidden, posterior_of, secret_runs
+
+
+def test_near_a_car_that_rubs_rough_simulations_are_corrected_by_what_they_lack_at_the_state() -> None:
+    rubbing = [hidden("dry_friction", friction_force_n=60.0)]
+    posterior = posterior_of(secret_runs(rubbing, lasts_s=6.0))
+    state = posterior.start(rubbing)
+    given = state.effects, state.logs, state.record
+    rough = posterior.predict(*given, rough=True)
+    for one, fine, roughly in zip(posterior.predictor(state)(*given), state.predictions, rough, strict=True):
+        assert np.abs(fine - roughly).max() > 1e-3 * fine.std()  # there is something to correct
+        np.testing.assert_allclose(one, fine, atol=1e-9)
+    assert posterior.predictor(posterior.start()) == posterior.predict
+
+
+def test_readings_are_bounds_where_a_step_is_large_beside_the_noise_and_nowhere_else() -> None:
+    runs = secret_runs(lasts_s=6.0).runs
+    stepped = [replace(one, measured_mps2=np.round(one.measured_mps2 / 0.6) * 0.6, facts=RecordFacts(
+        step_mps2=0.6, noise_mps2=0.05)) for one in runs]
+    plain, coarse = posterior_of(SimulatedRuns(runs, FINE_HZ)), posterior_of(SimulatedRuns(stepped, FINE_HZ))
+    assert plain.with_rounding_at(plain.start()) is plain
+    assert coarse.with_rounding_at(coarse.start()) is not coarse
