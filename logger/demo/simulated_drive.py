@@ -171,7 +171,7 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: DriveMotion) -> Arra
     The half car is stepped exactly at 1 kHz with the road as it passes under each wheel, at whatever speed, and then
     band-limited as the recorder does before it samples.
     """
-    structure = half_car.structure(vehicle)
+    structure = half_car(vehicle)
     patch_m = vehicle.contact_patch_m
     under = np.stack([road.under(motion.distance_m - behind, patch_m) for behind in structure.behind_m], axis=1)
     under = under - under[0].mean()
