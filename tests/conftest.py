@@ -19,7 +19,6 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from .support.drives.short_drive import SHORT_PLAN
-from .support.machine_code import make
 
 # Byte code is kept, of the tests with their asserts and for the commands that they start: to make it again costs each
 # worker 13 s of a processor and each command one.
@@ -29,6 +28,13 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # A busy machine is no fault of an example.
 hypothesis.settings.register_profile("any_machine", deadline=None)
 hypothesis.settings.load_profile("any_machine")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with slow tests come first, so that at the end no processor waits for the last long one."""
+    long = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in long)
 
 
 def pytest_collection_finish() -> None:
@@ -45,6 +51,8 @@ def machine_code(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     """The compiled loops are there before a worker's first test: to make both takes half a minute of a processor."""
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker is not None and len(request.session.items) > MANY_TESTS:
+        from .support.machine_code import make
+
         make(tmp_path_factory.getbasetemp().parent, int(worker.removeprefix("gw")))
 
 

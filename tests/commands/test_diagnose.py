@@ -82,7 +82,7 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     names = ("dry_friction", "sensor_bandwidth", "sensor_offset", "time_offset")
     few = {name: shipped_effects()[name] for name in names}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
-    right = write_runs(tmp_path / "right", [], noise_mps2=0.0)
+    right = write_runs(tmp_path / "right", [], lasts_s=12.0, noise_mps2=0.0)
     assert diagnose(*right, "--json") == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["verdict"] == [] and reported["unexplained"] is False
@@ -91,7 +91,7 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     compared = json.loads(capsys.readouterr().out)
     assert compared["missing"] is False and not any(mark["found"] for mark in compared["marks"])
     rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
-    assert diagnose(*write_runs(tmp_path / "rubbing", rubbing, noise_mps2=0.0), "--json") == 0
+    assert diagnose(*write_runs(tmp_path / "rubbing", rubbing, lasts_s=12.0, noise_mps2=0.0), "--json") == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["verdict"] == ["dry_friction"] and reported["unexplained"] is False
     assert reported["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)

@@ -13,13 +13,18 @@ from logger.errors import BadInput
 from .cases.case_files import write_case
 from .cases.same_road import same_road_case
 
+FEW = ("sensor_mount_resonance", "sensor_bandwidth", "sensor_offset", "sensor_gain", "tire_enveloping", "tire_damping",
+       "damper_asymmetry", "speed_scale", "roll")
+"""Those that are like the one that is hidden, and of each kind that cannot be tried; all of them are for an examination
+(``python -m tests.validation.same_road``)."""
+
 
 def reported_of(seed: int, effect: str | None, folder: Path) -> dict[str, Any]:
     write_case(same_road_case(seed, effect, length_m=90.0, speeds_mps=(9.0, 15.0)), folder)
     for profile in folder.glob("run*/profile.csv"):
         profile.unlink()
     return ridelog.diagnose(folder / "vehicle.yaml", sorted(folder.glob("run*")), tolerance=0.04,
-                            same_road=True).as_json()
+                            same_road=True, candidates=FEW).as_json()
 
 
 @pytest.mark.slow

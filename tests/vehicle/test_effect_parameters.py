@@ -47,6 +47,14 @@ def test_what_needs_a_road_is_not_for_a_rig() -> None:
     assert EFFECTS["dry_friction"].obstacle_on(car, False, timed=True) is None
 
 
+def test_an_effect_is_at_a_bound_by_its_shape_and_not_by_its_strength() -> None:
+    people = EFFECTS["occupant"]
+    highest = {one.name: one.high for one in people.parameters}
+    assert not chosen(people, people.usual).at_bound
+    assert chosen(people, people.usual | {"frequency_hz": highest["frequency_hz"]}).at_bound
+    assert not chosen(people, people.usual | {"mass_kg": highest["mass_kg"]}).at_bound
+
+
 def test_every_number_is_free_from_where_it_stands() -> None:
     for free in free_parameters_of(USUAL):
         parameter = USUAL[free.effect].effect.parameters[free.parameter]
