@@ -130,7 +130,9 @@ def test_every_option_that_names_a_file_to_write_is_tried() -> None:
 QUICK = ("convert --to",)
 
 
-RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out")  # the longest
+RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out", "calibrate --out",
+           "compare --out", "study --out", "extract --out", "report --out", "fleet summarise --out", "comfort --out")
+"""The longest, and those that write one page or table by the same writer as others (``logger.files``)."""
 
 
 @pytest.mark.parametrize("name", [

@@ -24,7 +24,7 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import Structure, body_point
 
-from ..support.slow import slow
+from ..support.slow import release, slow
 
 FINE, COARSE = Sensor(0.05, 0.0981), Sensor(0.1, 0.613)
 WINDOW_M, LEAD_M = 7.62, 20.0
@@ -253,9 +253,8 @@ def test_a_stop_of_minutes_costs_its_window_only() -> None:
     assert all(window.flags == {"faint"} for window in found if window.flags)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("garbage", [0.0, np.nan, 1e4])
-@pytest.mark.parametrize("sensor", [FINE, COARSE])
+@pytest.mark.parametrize(("garbage", "sensor"), [
+    *slow((0.0, FINE), (np.nan, COARSE), (1e4, FINE)), *release((0.0, COARSE), (np.nan, FINE), (1e4, COARSE))])
 def test_a_hole_in_the_readings(garbage: float, sensor: Sensor) -> None:
     """Windows in it are unsettled, those far from it as they were, whatever stands in the hole."""
     one = driven(steady(15.0, 50.0))

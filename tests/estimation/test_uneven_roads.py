@@ -21,6 +21,8 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
 
+from ..support.slow import release, slow
+
 FINE, COARSE = Sensor(0.05, 0.0), Sensor(0.1, 0.613)
 WINDOW_M, SPACING_M, BUMP_M = 7.62, 0.05, 300.3
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
@@ -81,11 +83,14 @@ def bumpy(iri: float, height_m: float, length_m: float, speed_mps: float) -> tup
     return road, *driven(road, speed_mps)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("sensor", "tolerance"), [(FINE, 0.1), (COARSE, 0.15)])
-@pytest.mark.parametrize("speed_mps", [9.0, 15.0, 22.0])
-@pytest.mark.parametrize(("height_m", "length_m"), [(0.08, 2.0), (0.05, 1.0), (-0.04, 0.6)])
-@pytest.mark.parametrize("iri", [0.0, 1.0])
+BUMPS = [(iri, *bump, speed_mps, *sensor) for bump in ((0.08, 2.0), (0.05, 1.0), (-0.04, 0.6))
+         for speed_mps in (9.0, 15.0, 22.0) for sensor in ((FINE, 0.1), (COARSE, 0.15)) for iri in (0.0, 1.0)]
+"""Every bump at every speed with every sensor, on a flat road and on another: on one of them sooner."""
+SOONER = [(number + number // 2 + number // 4) % 2 == 0 for number in range(len(BUMPS))]
+
+
+@pytest.mark.parametrize(("iri", "height_m", "length_m", "speed_mps", "sensor", "tolerance"), [
+    param for one, sooner in zip(BUMPS, SOONER, strict=True) for param in (slow if sooner else release)(one)])
 def test_a_lone_bump(
     iri: float, height_m: float, length_m: float, speed_mps: float, sensor: Sensor, tolerance: float
 ) -> None:

@@ -38,7 +38,8 @@ def short_drives(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "seed", "effect"), [
-    ("none", 3, None), ("one", 1, "dry_friction"), ("one", 2, "sensor_gain"),
+    ("none", 3, None), ("one", 1, "dry_friction"),
+    pytest.param("one", 2, "sensor_gain", marks=pytest.mark.release),
     pytest.param("one", 2, "sensor_bandwidth", marks=pytest.mark.release),
 ])
 @pytest.mark.usefixtures("short_drives")
