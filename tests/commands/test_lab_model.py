@@ -241,7 +241,7 @@ def test_a_car_that_was_refitted_is_judged_by_what_was_given(
         asked.extend((vehicle.sprung_mass_kg, stands.sprung_mass_kg))
         raise ValueError("enough")
 
-    monkeypatch.setattr("logger.lab.unknown_road.likelihood.SameRoad", same_road)
+    monkeypatch.setattr("logger.api.lab.diagnose.SameRoad", same_road)
     car = Path(car_with(tmp_path, ""))
     car.write_text(car.read_text("utf-8") + "given: {sprung_mass_kg: 800}\n", "utf-8")
     with pytest.raises(BadInput, match="enough"):

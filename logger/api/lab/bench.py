@@ -31,8 +31,8 @@ from logger.lab.selection.screening import misalignment, screen
 from logger.runs import Array, Run
 from logger.shipped import vehicle_path
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.formats import drive_file
-from logger.store.formats.effect_file import check_on, effect_named, own_effect, shipped_effects
+from logger.store.formats import drive_file, effect_file
+from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import Model, Step
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
 from logger.vehicle.uncertain import sized
@@ -230,8 +230,8 @@ def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
     for file in files:
-        is_shipped = file in shipped_effects()
-        effect = sized(shipped_effects()[file], model.vehicle) if is_shipped else own_effect(Path(file))
+        is_shipped = file in effect_file.shipped_effects()
+        effect = sized(effect_file.shipped_effects()[file], model.vehicle) if is_shipped else own_effect(Path(file))
         if effect.name in effects:
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
         effects[effect.name] = effect
@@ -246,7 +246,7 @@ def sought_effects(on_rig: bool = False) -> dict[str, Effect]:
     on_rig    whether the runs are of a test rig, and not of a road
     """
     where = (Sought.ALWAYS, Sought.ON_RIGS) if on_rig else (Sought.ALWAYS,)
-    return {name: one for name, one in shipped_effects().items() if one.sought in where}
+    return {name: one for name, one in effect_file.shipped_effects().items() if one.sought in where}
 
 
 def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:
@@ -254,7 +254,7 @@ def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[
     """
     if names is None:
         return dict(effects)
-    effects = dict(sorted({**shipped_effects(), **effects}.items()))
+    effects = dict(sorted({**effect_file.shipped_effects(), **effects}.items()))
     if unknown := set(names) - set(effects):
         raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
     return {name: effects[name] for name in sorted(names)}

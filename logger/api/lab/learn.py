@@ -31,7 +31,7 @@ from logger.plugins import catalogue
 from logger.report.charts import chart
 from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.quantities import finite, measured, numbers_of, unit_of, wrapped
-from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats import effect_file
 from logger.vehicle.effect import Chosen
 from logger.vehicle.uncertain import sized
 
@@ -125,7 +125,7 @@ learn = function("learn", LearnQuestion, law_of)
 def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
     """What is learned on a bench."""
     families = catalogue("logger.lab.laws.families", "FAMILY")
-    known = {name: sized(one, bench.model.vehicle) for name, one in shipped_effects().items()}
+    known = {name: sized(one, bench.model.vehicle) for name, one in effect_file.shipped_effects().items()}
     with bench.blamed():
         found = learn_law(bench.posterior(searches=True), bench.effects, families, {**known, **bench.effects},
                           bench.model.effects, notify)
