@@ -14,7 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import hypothesis
 import pytest
 
-from logger.demo.simulated_drive import Drive, record, simulate_drive
+from logger.demo.simulated_drive import DemoDrive, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
@@ -69,13 +69,13 @@ def ridelog() -> Path:
 
 
 @pytest.fixture(scope="session")
-def short_drive() -> Drive:
+def short_drive() -> DemoDrive:
     """70 s: standing, a short loss of fix, a halt, a bump."""
     return simulate_drive(SHORT_PLAN, read_vehicle(vehicle_file("rav4-2009")))
 
 
 @pytest.fixture(scope="session")
-def short_dump(short_drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def short_dump(short_drive: DemoDrive, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same drive as a recorded dump."""
     path = tmp_path_factory.mktemp("drive") / "short.dump.gz"
     record(short_drive, path)

@@ -16,7 +16,7 @@ from logger.api.log_questions import ConvertQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, check_out
 from logger.errors import BadInput
-from logger.exchange.layer import Feature, Field, Kind, Layer, cut
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut
 from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
 from logger.records import WindowRecord
@@ -89,10 +89,11 @@ def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
 
 _CELL_M = 25.0
 _TAGS = ("name", "highway", "surface")
-_FIELDS = (Field("osm_way", Kind.COUNT), *(Field(name, Kind.WORDS) for name in _TAGS),
-           Field("smoothness_tagged", Kind.WORDS), Field("smoothness_suggested", Kind.WORDS),
-           Field("confidence", Kind.NUMBER), Field("iri_m_per_km", Kind.NUMBER), Field("iri_std_m_per_km", Kind.NUMBER),
-           Field("covered_m", Kind.NUMBER), Field("length_m", Kind.NUMBER), Field("drives", Kind.COUNT))
+_FIELDS = (Attribute("osm_way", Kind.COUNT), *(Attribute(name, Kind.WORDS) for name in _TAGS),
+           Attribute("smoothness_tagged", Kind.WORDS), Attribute("smoothness_suggested", Kind.WORDS),
+           Attribute("confidence", Kind.NUMBER), Attribute("iri_m_per_km", Kind.NUMBER),
+           Attribute("iri_std_m_per_km", Kind.NUMBER),
+           Attribute("covered_m", Kind.NUMBER), Attribute("length_m", Kind.NUMBER), Attribute("drives", Kind.COUNT))
 
 
 def smoothness_layer(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Layer:

@@ -75,7 +75,7 @@ _DISORDER_S = 0.5
 
 
 @dataclass(frozen=True)
-class Asked:
+class CsvSettings:
     """What is said of recordings.
 
     columns      by role; None: known layouts are recognised
@@ -101,7 +101,7 @@ def run_name(source: Path) -> str:
     return folder_of(source, source.resolve().name if source.is_dir() else source.stem)
 
 
-def extract_csv(source: Path, out: Path, asked: Asked, given: Config | None = None,
+def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | None = None,
                 measured: MeasuredProfile | None = None, tell: Tell = lambda words: None) -> Extracted:
     """Write the runs of a recording, a CSV file or a folder of such files of one recording, as ``extract_dump``.
 
@@ -118,7 +118,7 @@ def extract_csv(source: Path, out: Path, asked: Asked, given: Config | None = No
     return write_runs(recorded, source, run_name(source), out, measured, tell)
 
 
-def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorded:
+def _recorded(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
     from logger.extraction.even_samples import SEEN, even_samples
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
@@ -172,7 +172,7 @@ class _Tables:
         return found + [one for one in (self.gravity, self.location) if one is not None and one not in found]
 
 
-def _tables(source: Path, asked: Asked, notes: list[str]) -> _Tables:
+def _tables(source: Path, asked: CsvSettings, notes: list[str]) -> _Tables:
     files = sorted(one for one in source.iterdir() if one.suffix.lower() == ".csv" and not one.is_symlink()
                    ) if source.is_dir() else [source]
     if not files:
@@ -271,7 +271,7 @@ def _listed(table: LoggerTable) -> str:
 # --- accelerations ---
 
 
-def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Array, Array, bool]:
+def _accelerations(tables: _Tables, asked: CsvSettings, notes: list[str]) -> tuple[Array, Array, bool]:
     """Times (n,) [s], samples (n, axes) [m/s2], and whether gravity is in them."""
     from logger.extraction.even_samples import felt
 
@@ -305,7 +305,7 @@ def _one_unit(table: LoggerTable, roles: tuple[str, ...]) -> str | None:
 
 
 def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, is_linear: bool,
-           roles: tuple[str, ...], asked: Asked, notes: list[str]) -> tuple[Array, bool]:
+           roles: tuple[str, ...], asked: CsvSettings, notes: list[str]) -> tuple[Array, bool]:
     """Samples in m/s2, and whether gravity is in them. A unit that is said holds; the size of gravity shows one only
     where none is. ``is_linear``: gravity was taken out, as the layout or --up says."""
     from logger.extraction.even_samples import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
@@ -404,7 +404,7 @@ def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tu
     return replace(even, present=even.present & ~still), lasts_s
 
 
-def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[str]) -> GridReadings:
+def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: list[str]) -> GridReadings:
     """What points up, part by part where the recorder turned in its mount."""
     from logger.extraction.even_samples import turns, upwards
 
@@ -445,7 +445,7 @@ def _step_mps2(samples: Array) -> float | None:
 # --- speed and place ---
 
 
-def _fixes(tables: _Tables, asked: Asked, config: Config, origin_s: float, even: EvenSamples) -> Fixes:
+def _fixes(tables: _Tables, asked: CsvSettings, config: Config, origin_s: float, even: EvenSamples) -> Fixes:
     """Fixes as they are written, late as the receiver was."""
     path = tables.acceleration.header.path
     if asked.speed_mps is not None:

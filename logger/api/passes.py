@@ -28,7 +28,7 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.exchange.layer import Feature, Field, Kind, Layer, cut, half_way, iri_title
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title
 from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
@@ -428,8 +428,8 @@ _VISIT = ("what", "length_m", "confidence", "comfort", "drives", "iri_m_per_km",
           "lat_deg", "lon_deg", "heading_deg", "first_utc", "last_utc")
 
 
-def _fields(names: tuple[str, ...]) -> tuple[Field, ...]:
-    return tuple(Field(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
+def _fields(names: tuple[str, ...]) -> tuple[Attribute, ...]:
+    return tuple(Attribute(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
 
 
 def cells_layer(found: CombinedDrives) -> Layer:

@@ -83,7 +83,7 @@ class Range(NamedTuple):
             raise BadInput(f"{name}{words}")
 
 
-class Limit(Range):
+class IriLimit(Range):
     """An IRI from which on a road is to be called rough [m/km]; one that no road has is refused."""
 
     @property
@@ -100,7 +100,7 @@ class Limit(Range):
         return f"{found}{hint}" + f" (at a terminal write {value:g}in/mi)" * bool(hint)
 
 
-LIMIT = Limit(0.01, float("inf"), "m/km")
+LIMIT = IriLimit(0.01, float("inf"), "m/km")
 
 
 TOLERANCE = Range(0.001, 0.5)
@@ -286,7 +286,7 @@ class Switches(Option):
 
 
 @dataclass(frozen=True)
-class Entries(Option):
+class NamedEntries(Option):
     """A field of entries by name, each an option of that name at the terminal: metavar and help ``by_name``."""
 
     by_name: Mapping[str, tuple[str, str]] | None = None

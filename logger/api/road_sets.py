@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
-from logger.api.csv_extraction import Asked, extract_csv
+from logger.api.csv_extraction import CsvSettings, extract_csv
 from logger.api.drives import assessed, read_run, sensor_of
 from logger.api.extraction import read_measured_profile
 from logger.chart_data import Curves, Line
@@ -38,7 +38,7 @@ from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.logger_csv import named_columns
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.study import Cell, Column, Effort, Result, Table
+from logger.studies.study import Cell, Column, Result, Table, Workload
 
 if TYPE_CHECKING:
     from logger.api.drives import Run
@@ -48,12 +48,12 @@ if TYPE_CHECKING:
 NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and claim nothing of them."
 
 
-def from_folder(called: str, download: str, read: Callable[[Path, Effort], Result]) -> Callable[[Effort], Result]:
+def from_folder(called: str, download: str, read: Callable[[Path, Workload], Result]) -> Callable[[Workload], Result]:
     """A study's ``run`` that reads a folder: where that is not what it should be, it says where to download it.
 
     ``read`` raises FileNotFoundError for a file that is not there, and BadInput for one that is something else.
     """
-    def run(effort: Effort) -> Result:
+    def run(effort: Workload) -> Result:
         if effort.folder is None or not effort.folder.is_dir():
             found = "a file" if effort.folder is not None and effort.folder.exists() else "nothing there"
             raise BadInput(f"{effort.folder}: expected a folder with {called}, found {found}: {download}")
@@ -85,7 +85,7 @@ _BETWEEN_UNITS = 5.0  # gravity is 1 g or 9.8 m/s2
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class RoadRecording:
     """What a device in a car wrote, each signal by one clock [s].
 
     name        of the pass
@@ -129,7 +129,7 @@ def unit_by_gravity(accel: Array) -> str:
     return "g" if float(np.median(np.linalg.norm(accel, axis=1))) < _BETWEEN_UNITS else "m/s2"
 
 
-def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
+def driven_windows(recording: RoadRecording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
                    profile: Path | None = None) -> list[DrivenWindows]:
     """The windows of a pass, for each length those of all its drives; the sensor's noise is learnt from each drive.
 
@@ -141,7 +141,7 @@ def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, .
     return [one for run in runs_of(recording, vehicle, profile) for one in windows_of(run, model, windows_m)]
 
 
-def runs_of(recording: Recording, vehicle: str, profile: Path | None = None) -> list[Run]:
+def runs_of(recording: RoadRecording, vehicle: str, profile: Path | None = None) -> list[Run]:
     """The drives of a pass, as ``extract --csv`` makes them. Raises BadInput."""
     with TemporaryDirectory() as scratch:
         return _runs(recording, Path(scratch), vehicle, profile)
@@ -171,13 +171,14 @@ def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
     return found
 
 
-def _runs(recording: Recording, scratch: Path, vehicle: str, profile: Path | None) -> list[Run]:
+def _runs(recording: RoadRecording, scratch: Path, vehicle: str, profile: Path | None) -> list[Run]:
     feeling, fixes = scratch / f"{recording.name}.csv", scratch / "fixes.csv"
     _write(feeling, "t_s,x,y,z", recording.time_s, *recording.accel.T)
     _write(fixes, "t_s,lat_deg,lon_deg,speed", recording.fix_s, recording.lat_deg, recording.lon_deg,
            recording.speed_mps)
     axes = ",".join(f"{axis}={axis}:{recording.unit}" for axis in "xyz")
-    asked = Asked(named_columns(f"t=t_s:s,{axes},lat=lat_deg,lon=lon_deg,speed=speed:m/s"), fixes, vehicle=vehicle)
+    asked = CsvSettings(named_columns(f"t=t_s:s,{axes},lat=lat_deg,lon=lon_deg,speed=speed:m/s"), fixes,
+                        vehicle=vehicle)
     measured = None if profile is None else read_measured_profile(profile)
     try:
         done = extract_csv(feeling, scratch / "runs", asked, measured=measured)
@@ -209,7 +210,8 @@ def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M)
     return found
 
 
-def each_pass(passes: list[Recording], windows: Callable[[Recording], list[T]], progress: Callable[[int, int], None]
+def each_pass(passes: list[RoadRecording], windows: Callable[[RoadRecording], list[T]],
+              progress: Callable[[int, int], None]
               ) -> tuple[list[T], list[str]]:
     """The windows of every pass that can be used, and a line for each that cannot, with its name."""
     found: list[T] = []

@@ -24,7 +24,7 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.exchange.layer import Feature, Field, Kind, Layer, chained, geometries, group_name, iri_title
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, chained, geometries, group_name, iri_title
 from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.placed import column, iri_errors, placed, trace_of
@@ -357,9 +357,9 @@ _KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known
           "iri_m_per_km": Kind.NUMBER, "iri_std_m_per_km": Kind.NUMBER, "a_w_mps2": Kind.NUMBER,
           "speed_mps": Kind.NUMBER, "worst_m_per_km": Kind.NUMBER, "worst_at_m": Kind.NUMBER,
           "condition": Kind.WORDS, "comfort": Kind.WORDS}
-FIELDS = (Field("log", Kind.WORDS), Field("drive", Kind.COUNT), Field("t_utc", Kind.TIME),
-          Field("direction", Kind.WORDS),
-          *(Field(name, kind) for name, kind in _KINDS.items()))
+FIELDS = (Attribute("log", Kind.WORDS), Attribute("drive", Kind.COUNT), Attribute("t_utc", Kind.TIME),
+          Attribute("direction", Kind.WORDS),
+          *(Attribute(name, kind) for name, kind in _KINDS.items()))
 
 
 def sections_layer(drives: Sequence[DriveSections]) -> Layer:

@@ -118,7 +118,7 @@ def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
 
 
 def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
-    from logger.api.csv_extraction import Asked, extract_csv, run_name
+    from logger.api.csv_extraction import CsvSettings, extract_csv, run_name
     from logger.api.extraction import read_measured_profile
     from logger.commands.options import on_screen
     from logger.service.config import load_config
@@ -129,7 +129,7 @@ def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
     if args.location is not None and len(args.csv) > 1:
         raise BadInput(f"extract: expected one recording with --location, found {len(args.csv)}")
     _refuse_again(args.csv, [run_name(one) for one in args.csv], "recordings")
-    asked = Asked(named_columns(args.columns) if args.columns is not None else None, args.location, args.up,
+    asked = CsvSettings(named_columns(args.columns) if args.columns is not None else None, args.location, args.up,
                   -1.0 if args.sign == "-" else 1.0, args.range, args.speed, args.vehicle)
     config = load_config(args.config) if args.config else None
     measured = read_measured_profile(args.profile) if args.profile else None

@@ -147,7 +147,7 @@ def main(arguments: list[str]) -> int:
 
 def command(verb: str) -> tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], int]]:
     """The parser of a verb, and what carries it out."""
-    module: Any = (importlib.import_module("logger.commands.options").Asked(f"logger.api.{ASKED[verb]}")
+    module: Any = (importlib.import_module("logger.commands.options").QuestionVerb(f"logger.api.{ASKED[verb]}")
                    if verb in ASKED else importlib.import_module(f"logger.commands.{verb.replace('-', '_')}"))
     parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__, formatter_class=_Help, allow_abbrev=False)
     module.add_arguments(parser)

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, get_args
 from logger.api.question import (
     Argument,
     Asking,
-    Entries,
     LongQuestion,
+    NamedEntries,
     Option,
     Out,
     Question,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
 
 
-class Asked:
+class QuestionVerb:
     """A verb that is declared by its question, as the modules of this folder declare one."""
 
     def __init__(self, place: str) -> None:
@@ -93,7 +93,7 @@ def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
     if isinstance(option, Switches):
         for value, (name, words) in (option.by_value or {}).items():
             parser.add_argument(f"--{name}", dest=f"{one.name}.{value}", action="store_true", help=words)
-    elif isinstance(option, Entries):
+    elif isinstance(option, NamedEntries):
         for name, (metavar, words) in (option.by_name or {}).items():
             parser.add_argument(f"--{name}", dest=f"{one.name}.{name}", metavar=metavar, help=words,
                                 type=_reader(f"--{name}", option, one.kind))
@@ -147,7 +147,7 @@ def asked(verb: Verb, args: argparse.Namespace) -> Any:
     """The question of a command line."""
     values: dict[str, Any] = {}
     for one in askings(verb.question):
-        if isinstance(one.option, Entries):
+        if isinstance(one.option, NamedEntries):
             entries = {name: getattr(args, f"{one.name}.{name}") for name in one.option.by_name or {}}
             given: Any = {name: value for name, value in entries.items() if value is not None} or None
         elif isinstance(one.option, Switches):

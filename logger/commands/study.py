@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _one(study: Study, args: argparse.Namespace) -> int:
-    from logger.studies.study import Effort
+    from logger.studies.study import Workload
 
     if study.data and args.folder is None:
         raise BadInput(f"study {study.called}: expected DIR, {study.data}")
@@ -79,7 +79,7 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
     check_outs([("--out", args.out)])
     show = show_progress if sys.stderr.isatty() else _show_nothing
-    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, show, args.folder, args.vehicle))
+    result = study.run(Workload(QUICK_SHARE if args.quick else 1.0, show, args.folder, args.vehicle))
     if args.out is not None:
         from logger.report.study_page import page
 

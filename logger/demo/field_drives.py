@@ -25,7 +25,7 @@ from logger.demo.simulated_drive import (
     LEAD_M,
     LINES,
     SPACING_M,
-    Drive,
+    DemoDrive,
     DrivePlan,
     Reception,
     Road,
@@ -95,14 +95,14 @@ def street() -> Road:
     return build_road(_STREET, (), _LENGTH_M, _SEED)
 
 
-def drive(name: str) -> Drive:
+def drive(name: str) -> DemoDrive:
     """One of the drives, with its truth."""
     given = read_vehicle(vehicle_file(VEHICLE))
     true = changed(given, {one: factor * read(given, one) for one, factor in OFF.items()})
     return simulate_drive(PLANS[name], true, [chosen(shipped_effects()[EFFECT], EFFECT_VALUES)], street())
 
 
-def line(name: str, driven: Drive) -> str:
+def line(name: str, driven: DemoDrive) -> str:
     """A measured line as CSV; ``driven``: a drive that goes over all of it. Heights are to a tenth of a millimetre."""
     at_m = SPACING_M * np.arange(len(driven.road.elevation_m)) - LEAD_M
     from_m, to_m = LINES_M[name]

@@ -366,7 +366,7 @@ class DrivePlan:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DemoDrive:
     """A drive as bytes, and its truth.
 
     header, events    of the recorded dump
@@ -387,7 +387,7 @@ class Drive:
 
 
 def simulate_drive(plan: DrivePlan, vehicle: Vehicle, effects: Sequence[Chosen] = (), road: Road | None = None
-                   ) -> Drive:
+                   ) -> DemoDrive:
     """Drive a half car along the plan. ValueError for a sensor that is not known.
 
     effects    physical effects of the car
@@ -408,7 +408,7 @@ def simulate_drive(plan: DrivePlan, vehicle: Vehicle, effects: Sequence[Chosen] 
     end_us = plan.start_us + round(motion.time_s[-1] * US_PER_S)
     gps_events = _read_in_chunks(GPS, data, plan.start_us + arrival_s * US_PER_S, wire_rng)
     sensor_events = _sensor_events(plan, kind, *_sampled(plan, motion, accel, sensor_rng), wire_rng)
-    return Drive(
+    return DemoDrive(
         header=DumpHeader(
             start_utc=plan.start_utc,
             accelerometer={"driver": kind.name, **_header(kind)},
@@ -423,7 +423,7 @@ def simulate_drive(plan: DrivePlan, vehicle: Vehicle, effects: Sequence[Chosen] 
     )
 
 
-def record(drive: Drive, path: str | os.PathLike[str]) -> None:
+def record(drive: DemoDrive, path: str | os.PathLike[str]) -> None:
     """Write a drive as a recorded dump. Errors are those of ``drivers.dump.DumpWriter``."""
     writer = DumpWriter(path, drive.header)
     try:

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import BadInput
-from logger.exchange.layer import Field, Kind, Layer, wkb
+from logger.exchange.layer import Attribute, Kind, Layer, wkb
 
 if TYPE_CHECKING:
     import pyarrow
@@ -29,7 +29,7 @@ def arrow_table(layer: Layer, file: str) -> pyarrow.Table:
     return pyarrow.table(table)
 
 
-def _column(pyarrow: Any, field: Field, values: tuple[Any, ...]) -> Any:
+def _column(pyarrow: Any, field: Attribute, values: tuple[Any, ...]) -> Any:
     if field.kind is Kind.TIME:
         times = [None if value is None else datetime.fromisoformat(value) for value in values]
         return pyarrow.array(times, pyarrow.timestamp("ms", "UTC"))

@@ -93,7 +93,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True)
-class Field:
+class Attribute:
     """A column; its name ends in its unit."""
 
     name: str
@@ -130,7 +130,7 @@ class Layer:
     to go to, and does not belong to a way."""
 
     name: str
-    fields: tuple[Field, ...]
+    fields: tuple[Attribute, ...]
     features: tuple[Feature, ...]
     points: bool = False
 
@@ -183,8 +183,8 @@ def _line(line: Line) -> bytes:
 LAYER = "windows"
 _KINDS = {"t_utc": Kind.TIME, "segment": Kind.COUNT, "drive": Kind.COUNT, "samples": Kind.COUNT,
           "clipped_samples": Kind.COUNT, "comfort": Kind.WORDS, "iri_class": Kind.WORDS, "flags": Kind.WORDS}
-FIELDS = (Field("log", Kind.WORDS),
-          *(Field(column.name, _KINDS.get(column.name, Kind.NUMBER)) for column in COLUMNS))
+FIELDS = (Attribute("log", Kind.WORDS),
+          *(Attribute(column.name, _KINDS.get(column.name, Kind.NUMBER)) for column in COLUMNS))
 
 
 def windows_layer(files: Sequence[LoggedFile]) -> Layer:

@@ -15,7 +15,7 @@ from multiprocessing import get_context
 from time import perf_counter
 
 from logger.errors import RidelogError
-from logger.studies.study import Effort, Result, Study, studies
+from logger.studies.study import Result, Study, Workload, studies
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -30,10 +30,10 @@ class Carried:
 
 
 def carry_out(name: str, share: float) -> Carried:
-    """One study, by the name that people write, with a share of the full effort (``Effort.share``)."""
+    """One study, by the name that people write, with a share of the full effort (``Workload.share``)."""
     began = perf_counter()
     study = studies()[name]
-    result = study.run(Effort(share))
+    result = study.run(Workload(share))
     return Carried(result, study.differs(result), perf_counter() - began)
 
 

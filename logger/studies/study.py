@@ -153,7 +153,7 @@ def _silent(_done: int, _of: int) -> None:
 
 
 @dataclass(frozen=True)
-class Effort:
+class Workload:
     """How much work to spend, and whom to tell how much of it is done.
 
     share       of the full number of draws and grid points, above 0, up to 1
@@ -311,7 +311,7 @@ class Study:
     title: str
     where: str
     how: str
-    run: Callable[[Effort], Result]
+    run: Callable[[Workload], Result]
     items: tuple[Item, ...]
     source: str = DISSERTATION
     data: str = ""

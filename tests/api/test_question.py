@@ -16,7 +16,7 @@ from logger.api.drive_questions import IriCommand, IriQuestion, ModesCommand, Mo
 from logger.api.question import (
     Argument,
     Asking,
-    Entries,
+    NamedEntries,
     Notify,
     Option,
     Question,
@@ -56,7 +56,7 @@ class Ask(Question):
     speeds_mps: Annotated[list[float] | tuple[float, ...], Option(
         "of a drive; may repeat", Range(1, 50, "m/s"), "MPS", read=float, many=list, flag="--speed")] = ()
     start: Annotated[Mapping[str, float] | None, Option("from where", read=_pair, many=dict)] = None
-    lies: Annotated[Mapping[str, Any] | None, Entries("what lies there", read=_pair, by_name={
+    lies: Annotated[Mapping[str, Any] | None, NamedEntries("what lies there", read=_pair, by_name={
         "bump": ("N=M", "a bump"), "hole": ("N=M", "a hole")})] = None
     surface: Annotated[str, Switches("of what it is", choices=("dry", "wet", "icy"), by_value={
         "wet": ("wet-road", "it rains"), "icy": ("ice", "it is cold")})] = "dry"

@@ -17,7 +17,7 @@ from drivers.readings import GPS, Event
 from logger.demo.simulated_drive import (
     LEAD_M,
     SPACING_M,
-    Drive,
+    DemoDrive,
     DrivePlan,
     Reception,
     RoadStretch,
@@ -39,19 +39,19 @@ FROM_M, TO_M, ZERO_M = 100.0, 800.0, 4000.0
 
 
 @pytest.fixture(scope="module")
-def drive() -> Drive:
+def drive() -> DemoDrive:
     return simulate_drive(PLAN, read_vehicle(vehicle_file("rav4-2009")))
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
+def place(tmp_path_factory: pytest.TempPathFactory, drive: DemoDrive) -> Path:
     folder = tmp_path_factory.mktemp("field")
     record(drive, folder / "town.dump")
     (folder / "line.csv").write_text(line(drive))
     return folder
 
 
-def line(drive: Drive, mirrored: bool = False, scale: float = 1.0) -> str:
+def line(drive: DemoDrive, mirrored: bool = False, scale: float = 1.0) -> str:
     at_m = SPACING_M * np.arange(len(drive.road.elevation_m)) - LEAD_M
     inside = (at_m >= FROM_M) & (at_m <= TO_M)
     at_m, height = at_m[inside], drive.road.elevation_m[inside]
@@ -68,7 +68,7 @@ def columns(run: Path) -> dict[str, np.ndarray]:
     return {name: table[name] for name in table.dtype.names}
 
 
-def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Drive, tmp_path: Path) -> None:
+def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: DemoDrive, tmp_path: Path) -> None:
     done = called("extract", place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv", "--json")
     assert done.returncode == 0, done.stderr
     (said,) = json.loads(done.stdout)["runs"]
@@ -91,7 +91,7 @@ def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Dri
 
 
 @pytest.mark.slow
-def test_a_line_whose_distance_is_too_long_is_said(place: Path, drive: Drive, tmp_path: Path) -> None:
+def test_a_line_whose_distance_is_too_long_is_said(place: Path, drive: DemoDrive, tmp_path: Path) -> None:
     (tmp_path / "line.csv").write_text(line(drive, scale=1.01))
     for profile, words in ((place / "line.csv", 0), (tmp_path / "line.csv", 1)):
         done = called("extract", place / "town.dump", "--out", tmp_path / "runs", "--profile", profile)
@@ -111,7 +111,7 @@ def test_the_lab_reads_what_was_extracted(place: Path, tmp_path: Path) -> None:
 
 
 def test_without_a_line_the_distance_begins_anywhere_and_the_way_is_right(
-        place: Path, drive: Drive, tmp_path: Path) -> None:
+        place: Path, drive: DemoDrive, tmp_path: Path) -> None:
     done = called("extract", place / "town.dump", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert "taken out: a receiver's delay" in done.stdout
@@ -158,7 +158,7 @@ def changed(place: Path, folder: Path, keep: object) -> Path:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: DemoDrive, tmp_path: Path) -> None:
     (tmp_path / "mirrored.csv").write_text(line(drive, mirrored=True))
     header, *rows = line(drive).splitlines()
     (tmp_path / "bare.csv").write_text("\n".join([header, *(row.rsplit(",", 2)[0] + ",," for row in rows)]) + "\n")
@@ -224,7 +224,7 @@ def test_dumps_without_speeds_or_with_three_readings_are_refused_in_one_line(pla
 @pytest.mark.parametrize(("length_m", "status", "said"), [
     (40, 2, "expected 5 s and 30 m of driving on the profile"), (150, 0, "s off the profile")])
 def test_of_a_line_that_is_shorter_than_the_drive_the_part_on_it_is_used(
-    place: Path, drive: Drive, tmp_path: Path, length_m: int, status: int, said: str
+    place: Path, drive: DemoDrive, tmp_path: Path, length_m: int, status: int, said: str
 ) -> None:
     header, *rows = line(drive).splitlines()
     (tmp_path / "short.csv").write_text("\n".join([header, *rows[2800 : 2801 + round(length_m / SPACING_M)]]) + "\n")

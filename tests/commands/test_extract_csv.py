@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.demo.simulated_drive import LEAD_M, SPACING_M, Drive, DrivePlan, RoadStretch, simulate_drive
+from logger.demo.simulated_drive import LEAD_M, SPACING_M, DemoDrive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
@@ -25,18 +25,18 @@ FROM_M, TO_M = 100.0, 800.0
 
 
 @pytest.fixture(scope="module")
-def drive() -> Drive:
+def drive() -> DemoDrive:
     return simulate_drive(PLAN, read_vehicle(vehicle_file("rav4-2009")))
 
 
 @pytest.fixture(scope="module")
-def phone(drive: Drive) -> Phone:
+def phone(drive: DemoDrive) -> Phone:
     rng = np.random.default_rng(4)
     return phone_in(drive, rng, rotation(rng))
 
 
 @pytest.fixture(scope="module")
-def line(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def line(drive: DemoDrive, tmp_path_factory: pytest.TempPathFactory) -> Path:
     at_m = SPACING_M * np.arange(len(drive.road.elevation_m)) - LEAD_M
     inside = (at_m >= FROM_M) & (at_m <= TO_M)
     lat, lon = (np.interp(at_m[inside], drive.motion.distance_m, one)
@@ -56,7 +56,7 @@ def run_of(done: CompletedProcess[str]) -> Path:
     return Path(one["run"])
 
 
-def truth(drive: Drive, time_s: np.ndarray) -> np.ndarray:
+def truth(drive: DemoDrive, time_s: np.ndarray) -> np.ndarray:
     accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
     return accel - accel.mean()
 
@@ -71,7 +71,7 @@ def refused(*words: object) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_at_any_angle_gives_what_the_car_did(
-        layout: str, drive: Drive, phone: Phone, tmp_path: Path) -> None:
+        layout: str, drive: DemoDrive, phone: Phone, tmp_path: Path) -> None:
     done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--json")
     run = run_of(done)
     found = columns(run)
@@ -88,7 +88,7 @@ def test_every_layout_at_any_angle_gives_what_the_car_did(
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", ["phyphox", pytest.param("own_names", marks=pytest.mark.release)])
 def test_the_lab_finds_the_same_error_as_on_the_true_drive(
-        layout: str, drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
+        layout: str, drive: DemoDrive, phone: Phone, line: Path, tmp_path: Path) -> None:
     done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs",
                   "--profile", line, "--json")
     run = run_of(done)
@@ -112,7 +112,7 @@ def test_the_lab_finds_the_same_error_as_on_the_true_drive(
         assert abs(errors[0] - errors[1]) < within, (vehicle, errors)
 
 
-def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: DemoDrive, phone: Phone, tmp_path: Path) -> None:
     slipped = phone.time_s > 55.0
     force = phone.force_mps2.copy()
     angle = np.radians(40)
@@ -130,7 +130,7 @@ def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: Drive, phone:
 
 
 @pytest.mark.slow
-def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: Drive, tmp_path: Path) -> None:
+def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: DemoDrive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     taken = phone_in(drive, rng, rotation(rng), rate_hz=102.0, jitter=0.0)
     time_s = np.arange(taken.time_s[0], taken.time_s[-1], 1 / 200)
@@ -144,7 +144,7 @@ def test_repeated_samples_are_dropped_and_the_true_rate_is_reported(drive: Drive
 
 
 @pytest.mark.slow
-def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
+def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: DemoDrive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     done = called("extract", "--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
                 "--out", tmp_path / "runs")
@@ -156,7 +156,7 @@ def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: Drive, tmp_pat
     assert "higher rate" in refused("--csv", *slow, "--out", tmp_path / "runs")
 
 
-def test_holes_and_clipped_samples_are_marked(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+def test_holes_and_clipped_samples_are_marked(drive: DemoDrive, phone: Phone, tmp_path: Path) -> None:
     hole = (phone.time_s > 30.0) & (phone.time_s < 30.3)
     kept = Phone(**{**vars(phone), "time_s": phone.time_s[~hole], "force_mps2": phone.force_mps2[~hole]})
     up = phone.gravity_mps2[0] / np.linalg.norm(phone.gravity_mps2[0])
@@ -172,7 +172,7 @@ def test_holes_and_clipped_samples_are_marked(drive: Drive, phone: Phone, tmp_pa
 
 
 @pytest.mark.slow
-def test_gravity_taken_out_needs_the_axis_that_points_up(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+def test_gravity_taken_out_needs_the_axis_that_points_up(drive: DemoDrive, phone: Phone, tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     flat = phone_in(drive, rng, np.eye(3))
     header = '"Time (s)",' + ",".join(f'"Linear Acceleration {axis} (m/s^2)"' for axis in "xyz")
@@ -318,7 +318,7 @@ def test_a_reading_a_second_is_no_record_and_one_that_is_all_clipped_no_run(tmp_
         assert said in refused("--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o")
 
 
-def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) -> None:
+def test_one_axis_and_a_steady_speed_are_enough(drive: DemoDrive, tmp_path: Path) -> None:
     time_s = np.arange(10, 60, 0.01)
     accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
     path = table(tmp_path / "phone.csv", "t,az", time_s, accel + 9.81)
@@ -331,7 +331,7 @@ def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_what_cannot_be_used_is_refused_in_one_line(drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_refused_in_one_line(drive: DemoDrive, phone: Phone, line: Path, tmp_path: Path) -> None:
     phyphox(phone, tmp_path / "good")
     accel, places = tmp_path / "good" / "Accelerometer.csv", tmp_path / "good" / "Location.csv"
     rows = accel.read_text().splitlines()

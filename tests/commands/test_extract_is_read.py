@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from drivers.readings import GPS, Event
-from logger.demo.simulated_drive import Drive, DrivePlan, Reception, RoadStretch, record, simulate_drive
+from logger.demo.simulated_drive import DemoDrive, DrivePlan, Reception, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_drive
 from logger.store.formats.vehicle_file import read_vehicle
@@ -27,12 +27,12 @@ PLAN = DrivePlan(
 
 
 @cache
-def drive(start_utc: str = PLAN.start_utc, sensor: str = PLAN.sensor, rate_hz: int = 100) -> Drive:
+def drive(start_utc: str = PLAN.start_utc, sensor: str = PLAN.sensor, rate_hz: int = 100) -> DemoDrive:
     plan = replace(PLAN, start_utc=start_utc, sensor=sensor, rate_hz=rate_hz)
     return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
 
 
-def damaged(seen: Drive, set_to: Drive, holes: list[tuple[float, float]], late_us: list[int],
+def damaged(seen: DemoDrive, set_to: DemoDrive, holes: list[tuple[float, float]], late_us: list[int],
             lost: list[tuple[float, float]], set_s: float | None) -> list[Event]:
     """The events without the readings in ``holes`` (begin, length) and the sentences while ``lost``; after each hole
     the readings are so much later; from ``set_s`` on the receiver's clock is that of another drive."""

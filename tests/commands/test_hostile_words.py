@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from logger.exchange.format import write_layer
-from logger.exchange.layer import Feature, Field, Kind, Layer
+from logger.exchange.layer import Attribute, Feature, Kind, Layer
 from logger.printable import LONGEST_WORD
 from logger.shipped import vehicle_file
 from logger.store.log.row_format import HEADER, format_row
@@ -91,7 +91,7 @@ def test_of_a_map_s_roads(ending: str, tmp_path: Path) -> None:
     ways = tuple(Feature(word, word, (word,), (((6.5, 46.5), (6.6, 46.5)),), (6.5, 46.5), None, False, "A")
                  for word in WORDS)
     out = tmp_path / f"out.{ending}"
-    write_layer(Layer("ways", (Field("name", Kind.WORDS),), ways), out)
+    write_layer(Layer("ways", (Attribute("name", Kind.WORDS),), ways), out)
     check_written(out)
 
 

@@ -14,7 +14,7 @@ from logger.demo import make
 from logger.demo.simulated_drive import (
     LEAD_M,
     SPACING_M,
-    Drive,
+    DemoDrive,
     DrivePlan,
     Reception,
     RoadStretch,
@@ -34,11 +34,11 @@ SHORT = DrivePlan(speed_knots=((0, 10), (10, 10), (20, 15), (30, 15)),
 
 
 @pytest.fixture(scope="module")
-def shipped() -> Drive:
+def shipped() -> DemoDrive:
     return simulate_drive(make.PLAN, RAV4)
 
 
-def sentences(drive: Drive) -> list[tuple[int, bytes]]:
+def sentences(drive: DemoDrive) -> list[tuple[int, bytes]]:
     """Every whole sentence and when its first byte arrived; UBX frames are cut out by their length."""
     stream = b"".join(event.data for event in drive.events if event.source == "nmea")
     times = np.repeat([event.t_us for event in drive.events if event.source == "nmea"],
@@ -56,7 +56,7 @@ def sentences(drive: Drive) -> list[tuple[int, bytes]]:
     return found
 
 
-def test_what_ships_is_what_the_plan_makes(shipped: Drive, tmp_path: Path) -> None:
+def test_what_ships_is_what_the_plan_makes(shipped: DemoDrive, tmp_path: Path) -> None:
     record(shipped, tmp_path / "drive.dump.gz")
     assert gzip.decompress((tmp_path / "drive.dump.gz").read_bytes()) == gzip.decompress(SHIPPED.read_bytes())
     assert SHIPPED.stat().st_size < 400_000
@@ -66,7 +66,7 @@ def test_what_ships_is_what_the_plan_makes(shipped: Drive, tmp_path: Path) -> No
         assert not dump.torn_tail
 
 
-def test_the_shipped_drive_holds_what_it_promises(shipped: Drive) -> None:
+def test_the_shipped_drive_holds_what_it_promises(shipped: DemoDrive) -> None:
     motion = shipped.motion
     assert 4000 < motion.distance_m[-1] < 6000
     assert 24 < motion.speed_mps.max() <= 25
@@ -82,7 +82,7 @@ def test_the_shipped_drive_holds_what_it_promises(shipped: Drive) -> None:
     assert np.abs(shipped.accel_mps2[over]).max() > 3
 
 
-def test_receiver_bytes_are_good_nmea_at_the_right_place_and_time(shipped: Drive) -> None:
+def test_receiver_bytes_are_good_nmea_at_the_right_place_and_time(shipped: DemoDrive) -> None:
     motion, good, bad, fixed = shipped.motion, 0, 0, {}
     for t_us, line in sentences(shipped):
         try:
@@ -113,14 +113,14 @@ def test_receiver_bytes_are_good_nmea_at_the_right_place_and_time(shipped: Drive
     assert [len(gap) for gap in gaps] == [8, 4, 25]
 
 
-def test_chunks_split_and_join_sentences(shipped: Drive) -> None:
+def test_chunks_split_and_join_sentences(shipped: DemoDrive) -> None:
     chunks = [event.data for event in shipped.events if event.source == "nmea"]
     assert sum(chunk.startswith(b"$") for chunk in chunks) < len(chunks) / 4
     assert any(b"\r\n$" in chunk for chunk in chunks)
     assert sum(chunk.count(b"\xb5\x62\x01\x22") for chunk in chunks) > 20
 
 
-def test_sensor_bytes_are_six_bits_and_on_time(shipped: Drive) -> None:
+def test_sensor_bytes_are_six_bits_and_on_time(shipped: DemoDrive) -> None:
     events = [event for event in shipped.events if event.source == "bma220"]
     raw = np.frombuffer(b"".join(event.data for event in events), np.uint8)
     assert not (raw & 3).any()

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from logger.demo.simulated_drive import Drive
+from logger.demo.simulated_drive import DemoDrive
 from logger.records import WindowRecord
 from logger.service.config import Config, PipelineConfig
 
@@ -20,7 +20,7 @@ def numbers(record: WindowRecord) -> dict[str, float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("low_pass_hz", [None, 15.0])
-def test_fixed_and_float_agree_to_six_digits(short_drive: Drive, low_pass_hz: float | None) -> None:
+def test_fixed_and_float_agree_to_six_digits(short_drive: DemoDrive, low_pass_hz: float | None) -> None:
     pipeline = PipelineConfig(low_pass_hz=low_pass_hz)
     in_float = rows_of(short_drive.header, short_drive.events, Config(pipeline=pipeline)).records
     in_fixed = rows_of(short_drive.header, short_drive.events,

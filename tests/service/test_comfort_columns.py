@@ -10,7 +10,7 @@ import pytest
 
 from logger.comfort.iso2631 import comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RideFigures, Uncertain
-from logger.demo.simulated_drive import Drive
+from logger.demo.simulated_drive import DemoDrive
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.windows import Window
 from logger.estimation.noise_belief import NoiseBelief
@@ -88,7 +88,7 @@ def test_a_window_without_readings_has_nothing_and_hides_nothing() -> None:
 
 
 @pytest.fixture(scope="module")
-def records(short_drive: Drive) -> list[WindowRecord]:
+def records(short_drive: DemoDrive) -> list[WindowRecord]:
     return rows_of(short_drive.header, short_drive.events, Config(gps=GpsConfig(latency_s=0.15))).records
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.dump import Event
-from logger.demo.simulated_drive import Drive, simulate_drive
+from logger.demo.simulated_drive import DemoDrive, simulate_drive
 from logger.errors import BadInput
 from logger.service.config import Config, GpsConfig, PipelineConfig
 from logger.service.event_core import STEP_US
@@ -27,7 +27,7 @@ from ..support.slow import slow
 
 
 @pytest.fixture(scope="module")
-def short_rows(short_drive: Drive) -> Rows:
+def short_rows(short_drive: DemoDrive) -> Rows:
     return rows_of(short_drive.header, short_drive.events)
 
 
@@ -37,13 +37,13 @@ def expected(short_rows: Rows) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def lines_drive() -> Drive:
+def lines_drive() -> DemoDrive:
     plan = replace(SHORT_PLAN, sensor="lines", noise_mps2=0.03)
     return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
 
 
 @pytest.fixture(scope="module")
-def lines_rows(lines_drive: Drive) -> Rows:
+def lines_rows(lines_drive: DemoDrive) -> Rows:
     return rows_of(lines_drive.header, lines_drive.events)
 
 
@@ -62,7 +62,7 @@ def cut_anywhere(events: list[Event], seed: int) -> list[Event]:
 
 
 @pytest.mark.parametrize("date", ["31,12,9999", *slow("01,01,0001")])
-def test_a_date_that_cannot_be_ends_nothing(short_drive: Drive, expected: list[str], date: str) -> None:
+def test_a_date_that_cannot_be_ends_nothing(short_drive: DemoDrive, expected: list[str], date: str) -> None:
     """At the end of time, at midnight: a second later there is no date any more."""
     nine = [(Event(event.t_us, "nmea", checked(f"GPZDA,235959.00,{date},00,00")
                    + checked("GPGGA,235959.00,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,")))
@@ -81,7 +81,7 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
 @pytest.mark.slow
 @settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
-def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
+def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: DemoDrive, expected: list[str], seed: int) -> None:
     assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
 
 
@@ -89,7 +89,7 @@ def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expe
 @settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
-    lines_drive: Drive, lines_rows: Rows, seed: int
+    lines_drive: DemoDrive, lines_rows: Rows, seed: int
 ) -> None:
     assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == lines_rows.rows
 
@@ -97,7 +97,7 @@ def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
 @pytest.mark.slow
 @settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
-def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
+def test_waking_at_any_time_changes_nothing(short_drive: DemoDrive, expected: list[str], seed: int) -> None:
     rng = random.Random(seed)
     core, rows = core_for(short_drive.header)
     last_us = short_drive.events[0].t_us
@@ -114,7 +114,7 @@ def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[s
 @settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(
-    short_drive: Drive, expected: list[str], seed: int
+    short_drive: DemoDrive, expected: list[str], seed: int
 ) -> None:
     """Chunks that are read late and together move the times of fixes a little, but make or lose nothing."""
     rng = random.Random(seed)
@@ -132,7 +132,7 @@ def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(
     assert abs(len(rows) - len(expected)) <= 8
 
 
-def test_random_bytes_on_the_gps_line_make_no_place(short_drive: Drive) -> None:
+def test_random_bytes_on_the_gps_line_make_no_place(short_drive: DemoDrive) -> None:
     rng = random.Random(9)
     events = [e if e.source != "nmea" else e._replace(data=rng.randbytes(len(e.data))) for e in short_drive.events]
     rows = rows_of(short_drive.header, events)
@@ -141,7 +141,7 @@ def test_random_bytes_on_the_gps_line_make_no_place(short_drive: Drive) -> None:
     assert all({"blind", "gps_lost", "time_unset"} <= set(record.flags) for record in rows.records)
 
 
-def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) -> None:
+def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: DemoDrive) -> None:
     rows = rows_of(short_drive.header, [event for event in short_drive.events if event.source == "nmea"])
     placed = [record for record in rows.records if record.lat_deg is not None]
     assert len(placed) > 60
@@ -150,7 +150,7 @@ def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) 
 
 
 @pytest.mark.slow
-def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive, lines_rows: Rows) -> None:
+def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: DemoDrive, lines_rows: Rows) -> None:
     """A recording that holds two of them: its header says which one its rows are made of."""
     serial = [event for event in lines_drive.events if event.source != "nmea"]
     foreign = [Event(event.t_us, "bma220", b"\x00\x00\x40") for event in serial]
@@ -163,7 +163,7 @@ def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive, line
     assert core.bad_events == len(foreign)
 
 
-def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
+def test_no_vehicle_of_that_name_is_refused(short_drive: DemoDrive) -> None:
     with pytest.raises(BadInput, match=r"expected --vehicle FILE\.yaml or one of"):
         core_for(replace(short_drive.header, vehicle="hovercraft"))
 
@@ -201,7 +201,7 @@ def test_a_serial_sensor_gives_the_same_road(short_rows: Rows, lines_rows: Rows)
 
 
 @pytest.mark.slow
-def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Drive, short_rows: Rows) -> None:
+def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: DemoDrive, short_rows: Rows) -> None:
     day_us = 86_400_000_000
     half = len(short_drive.events) // 2
     late = [event._replace(t_us=event.t_us + 300 * day_us) for event in short_drive.events[half:]]
@@ -228,7 +228,7 @@ def with_outages(events: list[Event], seed: int) -> list[Event]:
 @settings(max_examples=6)
 @given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
 def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
-    short_drive: Drive, seed: int, only: str, bridge_s: int
+    short_drive: DemoDrive, seed: int, only: str, bridge_s: int
 ) -> None:
     events = [event for event in with_outages(short_drive.events, seed) if only in ("all", event.source)]
     config = replace(Config(), gps=replace(GpsConfig(), bridge_s=bridge_s), pipeline=PipelineConfig(drive_end_s=20))
@@ -245,7 +245,7 @@ def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
 
 @pytest.mark.parametrize("source", ["bma220", "nmea"])
 def test_an_event_now_and_then_costs_little_time(
-    source: str, short_drive: Drive, monkeypatch: pytest.MonkeyPatch
+    source: str, short_drive: DemoDrive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One each 119 s kept the pipeline stepping through all the time between, 238 times for each."""
     said = next(event.data for event in short_drive.events if event.source == source)
@@ -275,7 +275,7 @@ def test_an_event_now_and_then_costs_little_time(
         ({"range_g": 3}, "range"),
     ],
 )
-def test_a_header_that_cannot_be_is_refused(short_drive: Drive, says: dict[str, object], word: str) -> None:
+def test_a_header_that_cannot_be_is_refused(short_drive: DemoDrive, says: dict[str, object], word: str) -> None:
     header = replace(short_drive.header, accelerometer=short_drive.header.accelerometer | says)
     with pytest.raises(BadInput, match=word):
         core_for(header)

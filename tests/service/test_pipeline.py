@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.accelerometers.bma220 import Bma220Decoder
-from logger.demo.simulated_drive import Drive
+from logger.demo.simulated_drive import DemoDrive
 from logger.dsp.resample import GridResampler
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.geodesy import EARTH_RADIUS_M
@@ -22,7 +22,7 @@ CONFIG = Config(gps=GpsConfig(latency_s=0.15))
 
 
 @pytest.fixture(scope="module")
-def records(short_drive: Drive) -> list[WindowRecord]:
+def records(short_drive: DemoDrive) -> list[WindowRecord]:
     return rows_of(short_drive.header, short_drive.events, CONFIG).records
 
 
@@ -31,7 +31,7 @@ def placed(records: list[WindowRecord]) -> list[WindowRecord]:
     return [record for record in records if record.distance_start_m is not None]
 
 
-def at(drive: Drive, record: WindowRecord, offset_s: float) -> int:
+def at(drive: DemoDrive, record: WindowRecord, offset_s: float) -> int:
     """Index of the motion's grid at an instant of a record's window."""
     return int(np.searchsorted(drive.motion.time_s, (record.t_us - drive.start_us) / 1e6 + offset_s))
 
@@ -42,7 +42,7 @@ def test_windows_follow_one_another_without_hole(placed: list[WindowRecord]) -> 
         assert before.t_us < after.t_us
 
 
-def test_distance_is_that_of_the_car(short_drive: Drive, placed: list[WindowRecord]) -> None:
+def test_distance_is_that_of_the_car(short_drive: DemoDrive, placed: list[WindowRecord]) -> None:
     first, last = placed[0], placed[-1]
     motion = short_drive.motion
     true_m = motion.distance_m[at(short_drive, last, 0)] - motion.distance_m[at(short_drive, first, 0)]
@@ -51,7 +51,7 @@ def test_distance_is_that_of_the_car(short_drive: Drive, placed: list[WindowReco
     assert abs(last.distance_start_m - first.distance_start_m - true_m) < 0.01 * true_m
 
 
-def test_places_are_within_the_receivers_error(short_drive: Drive, placed: list[WindowRecord]) -> None:
+def test_places_are_within_the_receivers_error(short_drive: DemoDrive, placed: list[WindowRecord]) -> None:
     errors_m = []
     for record in placed:
         assert record.lat_deg is not None
@@ -68,13 +68,13 @@ def test_places_are_within_the_receivers_error(short_drive: Drive, placed: list[
     assert np.hypot(*error_m.std(axis=0)) < 0.7
 
 
-def test_utc_is_that_of_the_receiver(short_drive: Drive, records: list[WindowRecord]) -> None:
+def test_utc_is_that_of_the_receiver(short_drive: DemoDrive, records: list[WindowRecord]) -> None:
     for record in records:
         if record.utc_us is not None:
             assert abs(record.utc_us - record.t_us - short_drive.utc_offset_us) < 30_000
 
 
-def test_standing_makes_no_window_and_lost_fixes_are_said(short_drive: Drive, placed: list[WindowRecord]) -> None:
+def test_standing_makes_no_window_and_lost_fixes_are_said(short_drive: DemoDrive, placed: list[WindowRecord]) -> None:
     standing_s = (37.0, 40.5)
     for record in placed:
         begin_s = (record.t_us - short_drive.start_us) / 1e6
@@ -84,7 +84,7 @@ def test_standing_makes_no_window_and_lost_fixes_are_said(short_drive: Drive, pl
     assert all("gps_lost" in record.flags for record in lost)
 
 
-def test_iri_is_within_its_own_error(short_drive: Drive, placed: list[WindowRecord]) -> None:
+def test_iri_is_within_its_own_error(short_drive: DemoDrive, placed: list[WindowRecord]) -> None:
     inside = []
     for record in placed:
         if record.iri_m_per_km is None or record.flags or record.iri_std_m_per_km is None:
@@ -98,7 +98,7 @@ def test_iri_is_within_its_own_error(short_drive: Drive, placed: list[WindowReco
 
 
 def test_comfort_is_that_of_the_exact_weighting_of_the_same_samples(
-    short_drive: Drive, placed: list[WindowRecord]
+    short_drive: DemoDrive, placed: list[WindowRecord]
 ) -> None:
     """Raw a_w, VDV and MTVV within 2 %, against the analog formula applied to the whole record by FFT."""
     events = [event for event in short_drive.events if event.source == "bma220"]
@@ -144,7 +144,7 @@ def test_comfort_is_that_of_the_exact_weighting_of_the_same_samples(
 
 
 @pytest.mark.slow
-def test_the_15_hz_low_pass_is_a_setting(short_drive: Drive, records: list[WindowRecord]) -> None:
+def test_the_15_hz_low_pass_is_a_setting(short_drive: DemoDrive, records: list[WindowRecord]) -> None:
     config = replace(CONFIG, pipeline=replace(CONFIG.pipeline, low_pass_hz=15.0))
     passed = rows_of(short_drive.header, short_drive.events, config).records
     assert len(passed) == len(records)

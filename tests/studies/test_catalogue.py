@@ -11,12 +11,12 @@ from logger.errors import BadInput
 from logger.report.study_page import page
 from logger.studies.study import (
     DISSERTATION,
-    Effort,
     Item,
     Result,
     Statement,
     Value,
     Word,
+    Workload,
     about,
     alike,
     studies,
@@ -78,7 +78,7 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if not study.data])
 def test_a_study_is_as_it_states_with_a_fifth_of_its_effort_too(name: str) -> None:
     study = STUDIES[name]
-    assert not study.differs(study.run(Effort(0.2)))
+    assert not study.differs(study.run(Workload(0.2)))
 
 
 def test_names_with_either_dash() -> None:
@@ -154,9 +154,9 @@ def test_an_item_whose_checks_come_to_another_word_says_so() -> None:
 
 def test_effort() -> None:
     reported: list[tuple[int, int]] = []
-    effort = Effort(0.5, lambda done, of: reported.append((done, of)))
+    effort = Workload(0.5, lambda done, of: reported.append((done, of)))
     assert effort.some(range(5), 2) == [0, 4]
     assert effort.some(range(9)) == [0, 3, 5, 8]
-    assert (effort.count(200), effort.count(3, 2), Effort(0.001).count(200, 6), Effort().count(7)) == (100, 2, 6, 7)
+    assert (effort.count(200), effort.count(3, 2), Workload(0.001).count(200, 6), Workload().count(7)) == (100, 2, 6, 7)
     assert list(effort.each("ab")) == ["a", "b"]
     assert reported == [(0, 2), (1, 2), (2, 2)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from logger.studies.study import Effort, Result, studies
+from logger.studies.study import Result, Workload, studies
 
 STUDIES = studies()
 
@@ -12,4 +12,4 @@ STUDIES = studies()
 @cache
 def study_result(name: str, share: float = 0.01) -> Result:
     """With this share of the full effort."""
-    return STUDIES[name].run(Effort(share))
+    return STUDIES[name].run(Workload(share))

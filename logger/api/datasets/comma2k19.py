@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_sets import DrivenWindows, Recording, driven_windows, expected_files, from_folder
+from logger.api.road_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.iso8608 import iri_class
-from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Word
+from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _WINDOW_M = 25.0
 _LAGS_S = np.arange(-0.5, 0.51, 0.01)
 
 
-def run(folder: Path, effort: Effort) -> Result:
+def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     log = expected_files(folder, "processed_log/IMU/accelerometer/value", "a segment's IMU")[0].parents[2]
     recording = segment(log)
@@ -50,11 +50,11 @@ def run(folder: Path, effort: Effort) -> Result:
     return Result(tuple(tables), words, (Picture(_map(drives)),))
 
 
-def segment(log: Path) -> Recording:
+def segment(log: Path) -> RoadRecording:
     """The record of a ``processed_log``. Raises BadInput."""
     time_s, accel = _signal(log / "IMU" / "accelerometer", 3)
     fix_s, fixes = _signal(log / "GNSS" / "live_gnss_ublox", 3)
-    return Recording(log.parent.name, time_s, accel[:, :3], "m/s2", fix_s, fixes[:, 2], fixes[:, 0], fixes[:, 1])
+    return RoadRecording(log.parent.name, time_s, accel[:, :3], "m/s2", fix_s, fixes[:, 2], fixes[:, 0], fixes[:, 1])
 
 
 def _signal(folder: Path, columns: int) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ def _rows(one: DrivenWindows) -> list[tuple[str | float | None, ...]]:
     return rows
 
 
-def _speeds(log: Path, recording: Recording) -> tuple[tuple[str, float, float], ...] | None:
+def _speeds(log: Path, recording: RoadRecording) -> tuple[tuple[str, float, float], ...] | None:
     """How much faster and later the receiver's speed is; None where the car's was not recorded."""
     if not (log / "CAN" / "speed" / "value").exists():
         return None

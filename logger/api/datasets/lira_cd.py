@@ -24,7 +24,7 @@ from logger.api.road_sets import (
     WINDOWS_M,
     Compared,
     DrivenWindows,
-    Recording,
+    RoadRecording,
     along,
     compared_table,
     each_pass,
@@ -45,7 +45,7 @@ from logger.shipped import vehicle_path
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.study import Effort, Item, Picture, Result, Study, Table, Word
+from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
 from logger.units import KMH_MPS
 
 Array = npt.NDArray[np.float64]
@@ -76,7 +76,7 @@ class ProfiledRoad:
         return (self.left_m_per_km + self.right_m_per_km) / 2
 
 
-def run(folder: Path, effort: Effort) -> Result:
+def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     files = expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
     parts: list[Compared] = []
@@ -108,7 +108,7 @@ _CEILING = ("The profilers against each other are the ceiling: no car can agree 
 # --- files ---
 
 
-def recordings(file: Path) -> tuple[list[Recording], list[str]]:
+def recordings(file: Path) -> tuple[list[RoadRecording], list[str]]:
     """The passes of a file, and a line for each that lacks a signal. Raises BadInput for a file that is not of this
     layout, or where HDF5 cannot be read."""
     try:
@@ -132,7 +132,7 @@ def recordings(file: Path) -> tuple[list[Recording], list[str]]:
         raise BadInput(f"{file}: expected an HDF5 file, found {error}") from None
 
 
-def _recording(name: str, group: Any) -> Recording:
+def _recording(name: str, group: Any) -> RoadRecording:
     def signal(key: str, columns: int) -> Array:
         found = np.asarray(group[key][()], dtype=np.float64) if key in group else np.empty(0)
         if found.ndim != 2 or found.shape[1] < columns or len(found) < 2:
@@ -143,7 +143,7 @@ def _recording(name: str, group: Any) -> Recording:
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
     inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
     gps = gps[inside]
-    return Recording(name, accel[:, 0], accel[:, 1:4], unit_by_gravity(accel[:, 1:4]), gps[:, 0],
+    return RoadRecording(name, accel[:, 0], accel[:, 1:4], unit_by_gravity(accel[:, 1:4]), gps[:, 0],
                      np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
 
 
@@ -197,7 +197,7 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
 # --- the car, and one profiler beside the other ---
 
 
-def _windows(recording: Recording, vehicle: str, road: ProfiledRoad) -> list[tuple[bool, DrivenWindows]]:
+def _windows(recording: RoadRecording, vehicle: str, road: ProfiledRoad) -> list[tuple[bool, DrivenWindows]]:
     """Of each time that the pass goes over the profiled road, with windows where its cells are; once more, True beside
     it, moved along to where cells of 10 m fit best."""
     model = read_model(vehicle_path(vehicle))

@@ -23,7 +23,7 @@ from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.agreement import best_shift_m, matching_cells, mean_between
-from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Word
+from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +58,7 @@ class ProfilerPass:
         self.edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
 
 
-def run(folder: Path, effort: Effort) -> Result:
+def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0])
               for name in PASSES]

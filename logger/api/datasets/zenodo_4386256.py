@@ -21,7 +21,7 @@ from logger.api.road_sets import (
     WINDOWS_M,
     Compared,
     DrivenWindows,
-    Recording,
+    RoadRecording,
     along,
     compared_table,
     driven_windows,
@@ -35,7 +35,7 @@ from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.study import Effort, Item, Picture, Result, Study, Word
+from logger.studies.study import Item, Picture, Result, Study, Word, Workload
 
 Array = npt.NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class LaserRoad:
         write_table(path, ("distance_m", "elevation_m", "lat_deg", "lon_deg"), np.column_stack(columns), "%.10g")
 
 
-def run(folder: Path, effort: Effort) -> Result:
+def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     roads = laser_roads(folder)
     trips = [trip(one) for one in expected_files(folder, "*-2019-*.mat", "the phones' trips")]
@@ -131,7 +131,7 @@ def _laser_road(name: str, elevation: Path, half: int, places: Path) -> LaserRoa
     return LaserRoad(name, spacing_m, elevation_m, *(np.interp(at_m, along_m, one) for one in (lat_deg, lon_deg)))
 
 
-def trip(file: Path) -> Recording:
+def trip(file: Path) -> RoadRecording:
     """A phone's record. Raises BadInput."""
     columns = read_arrays(file, _TRIP)
     if len(set(map(len, columns))) > 1:
@@ -142,7 +142,7 @@ def trip(file: Path) -> Recording:
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
     second = np.floor((time_s - time_s[0]) / _FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
-    return Recording(file.stem, time_s, accel, unit_by_gravity(accel), time_s[kept], speed_mps[kept], lat_deg[kept],
+    return RoadRecording(file.stem, time_s, accel, unit_by_gravity(accel), time_s[kept], speed_mps[kept], lat_deg[kept],
                      lon_deg[kept])
 
 

@@ -12,8 +12,8 @@ from logger.api.question import (
     WAVINESS,
     Anyway,
     Argument,
-    Entries,
     LongQuestion,
+    NamedEntries,
     Option,
     Out,
     Runs,
@@ -112,7 +112,7 @@ class IdentifyQuestion(LongQuestion):
     bounds: Annotated[Mapping[str, tuple[float, float]] | None, Option(
         "where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat",
         metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
-    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, Entries(
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, NamedEntries(
         'what lies on the road [m], such as {"bump": {"height_m": 0.1, "width_m": 3.0}}; without start_m it is '
         "looked for", read=_obstacle, by_name={
             "bump": ("PARAM=M,...", "a speed bump on the road: [start_m=M,]height_m=M,width_m=M; free as "

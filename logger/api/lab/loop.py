@@ -67,7 +67,7 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.maps import Way, ways_map
+from logger.report.maps import MapWay, ways_map
 from logger.report.quantities import columns, wrapped
 from logger.store.formats import vehicle_file as vehicle_format
 from logger.vehicle.effect import Chosen
@@ -495,7 +495,7 @@ def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
             f"{beside['within_one']:.0%}", f"{beside['within_two']:.0%}")
 
 
-def field_page(title: str, about: Sequence[str], measured: Sequence[Way], driven: Sequence[Way], story: Story,
+def field_page(title: str, about: Sequence[str], measured: Sequence[MapWay], driven: Sequence[MapWay], story: Story,
          before: Assessment, after: Assessment, answer: Sequence[str]) -> Html:
     """The whole of it as one HTML document.
 

@@ -40,7 +40,6 @@ from logger.roads.sections import federal_condition, ride_words, road_kinds
 from logger.studies.study import (
     Cell,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -49,6 +48,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -65,7 +65,7 @@ _SHORT_M = 200.0  # one segment of a spectrum, also at twice the length
 _PRINTED_POWER = 1.0  # of a metre, in m2 (cycle/m)
 
 
-def _t2_2(effort: Effort) -> Result:
+def _t2_2(effort: Workload) -> Result:
     limits = [_limit(*pair) for pair in pairwise(CLASS_GD_N0_CM3.items())]
     roads = effort.count(_ROADS, 2)
     rows: list[tuple[Cell, ...]] = []
@@ -135,7 +135,7 @@ _STEP = 0.001  # of the IRI that is asked for; half the last printed figure is 0
 _MOST = 25.0
 
 
-def _t2_3(effort: Effort) -> Result:
+def _t2_3(effort: Workload) -> Result:
     iri = np.round(np.arange(0, _MOST, _STEP), 3)
     (kinds,) = ([road_kinds(one) for one in iri.tolist()] for _ in effort.each(range(1)))
     rows, lines = [], []
@@ -185,7 +185,7 @@ _SHOWN_M = 100.0
 _BANDS_CPM = (0.011, 2.0)
 
 
-def _f2_7(effort: Effort) -> Result:
+def _f2_7(effort: Workload) -> Result:
     rows: list[tuple[Cell, ...]] = []
     lines, roads, scatters, levels = [], [], [], []
     values: list[Value | Statement] = []
@@ -255,7 +255,7 @@ PRINTED_T2_7: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
 )
 
 
-def _t2_7(effort: Effort) -> Result:
+def _t2_7(effort: Workload) -> Result:
     rows: list[tuple[Cell, ...]] = []
     values: list[Value] = []
     for weighting, printed in effort.each(PRINTED_T2_7):
@@ -288,7 +288,7 @@ _BETWEEN_CPM = 0.2
 _NEAR = 0.05  # as near as the top of a broad hump is read off a figure
 
 
-def _f2_13(effort: Effort) -> Result:
+def _f2_13(effort: Workload) -> Result:
     wave_number = np.geomspace(0.01, 2.0, effort.count(2000, 200))
     gain = slope_gain(wave_number, 0.0)
     slow = wave_number < _BETWEEN_CPM
@@ -336,7 +336,7 @@ _ADDITIONAL_HZ = (0.5, 4.0, 20.0)
 _SAME = 1e-6  # of the factor: the formulas are the same but for how they are written
 
 
-def _f2_18(effort: Effort) -> Result:
+def _f2_18(effort: Workload) -> Result:
     principal = about("Fig 2.18", [
         Value(f"{weighting.name} at {f_hz:g} Hz (ISO 2631-1)", factor, float(abs(weighting.response(f_hz))),
               0.75 * _LAST_DIGIT) for weighting, factors in STANDARD for f_hz, factor in factors])
@@ -404,7 +404,7 @@ HOURS = (1 / 60, 1 / 6, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 24.0)
 _DOSE_PER_RMS = 1.4  # the estimated dose of ISO 2631-1, Eq B.3
 
 
-def _f2_20(effort: Effort) -> Result:
+def _f2_20(effort: Workload) -> Result:
     zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(HOURS)]
     table = Table("The zone, weighted r.m.s.", (
         Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),

@@ -42,7 +42,6 @@ from logger.studies.drives import (
 from logger.studies.study import (
     Check,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -51,6 +50,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
 )
 from logger.units import MPH_MPS
@@ -60,7 +60,7 @@ _STEP_AT_M_F4_30, _SECONDS_F4_30 = 10.0, 4.0
 _STILL = 0.02  # of the peak: the body has swung out
 
 
-def _f4_30(effort: Effort) -> Result:
+def _f4_30(effort: Workload) -> Result:
     (record,) = (record_of(bridge(_STEP_AT_M_F4_30), BRIDGE_MPS, _SECONDS_F4_30, Conditions(noise_mps2=0.0))
                  for _ in effort.each(range(1)))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
@@ -106,7 +106,7 @@ HEIGHTS_M_F4_31 = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
 _STEP_AT_M_F4_31, _SECONDS_F4_31 = 20.0, 6.0
 
 
-def _f4_31(effort: Effort) -> Result:
+def _f4_31(effort: Workload) -> Result:
     record = without_profile(record_of(bridge(_STEP_AT_M_F4_31), BRIDGE_MPS, _SECONDS_F4_31, Conditions()))
     heights = effort.some(HEIGHTS_M_F4_31, 3)
     white, masses = (np.array(ends) for ends in zip(*([_mass(record, height, ours) for ours in (False, True)]
@@ -183,7 +183,7 @@ _STEP_AT_M_F4_32, _LENGTH_M_F4_32, _SEED = 50.0, 100.0, 0
 _BEHIND_M = 15.0  # both axles are over the step and the body has swung out
 
 
-def _f4_32(effort: Effort) -> Result:
+def _f4_32(effort: Workload) -> Result:
     conditions = Conditions(noise_mps2=0.0, iri_m_per_km=PRINTED_IRI, seed=_SEED)
     (record,) = (record_of(bridge(_STEP_AT_M_F4_32, -STEP_M), BRIDGE_MPS, _LENGTH_M_F4_32 / BRIDGE_MPS, conditions)
                  for _ in effort.each(range(1)))
@@ -234,7 +234,7 @@ OF_ONE_SIZE = 0.4  # a metre is a thirteenth of a second: where it begins moves 
 _STEP_AT_M_F4_34, _SECONDS_F4_34, _LENGTH_M_F4_34 = 50.0, 8.0, 100.0
 
 
-def _f4_34(effort: Effort) -> Result:
+def _f4_34(effort: Workload) -> Result:
     roads = effort.count(20)
     found = [_sections(seed) for seed in effort.each(range(roads))]
     rows = tuple((section, PRINTED_PEAK_MPS2 if section == 1 else None, float(found[0][index].max()),
@@ -297,7 +297,7 @@ _STEP_AT_M_F4_36, _LENGTH_M_F4_36, _SECTION_M = 20.0, 60.0, 1.0
 _LIMITS = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
 
 
-def _f4_36(effort: Effort) -> Result:
+def _f4_36(effort: Workload) -> Result:
     speeds = np.array(effort.some(SPEEDS_KMH, 3))
     # The car is linear: one height is enough for all.
     per_metre = np.array([_peak(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M

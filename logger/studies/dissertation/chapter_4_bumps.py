@@ -51,7 +51,6 @@ from logger.studies.study import (
     Cell,
     Check,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -60,6 +59,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -84,7 +84,7 @@ _SECONDS_T4_4, _BUMP_AT_M_T4_4 = 12.0, 8.0
 _TYPICAL = {MASS: 800.0, FRONT: 22_000.0, REAR: 22_000.0}
 
 
-def _t4_4(effort: Effort) -> Result:
+def _t4_4(effort: Workload) -> Result:
     masses = effort.some(list(enumerate(START_MASSES_KG)))
     rates = effort.some(list(enumerate(START_RATES_N_PER_M)))
     record = _drive(0)
@@ -157,7 +157,7 @@ _BUMP_AT_M_F4_19 = 5.0
 _BUMP_ENDS_M = 15.0  # both axles are over it and the body has swung out
 
 
-def _f4_19(effort: Effort) -> Result:
+def _f4_19(effort: Workload) -> Result:
     (whole,) = (record_of(bump(_BUMP_AT_M_F4_19), BUMP_MPS, (WINDOWS_M_F4_19[-1] + 1) / BUMP_MPS,
                           Conditions(iri_m_per_km=PRINTED_IRI)) for _ in effort.each(range(1)))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
@@ -216,7 +216,7 @@ BOTH_AXLES_M = 10.0
 VERY_CLOSE = 0.02  # two standard errors of ours on such a road are twice that
 
 
-def _f4_21(effort: Effort) -> Result:
+def _f4_21(effort: Workload) -> Result:
     whole = record_of(bump(_BUMP_AT_M_F4_21), BUMP_MPS, (WINDOWS_M_F4_21[-1] + 1) / BUMP_MPS,
                       Conditions(iri_m_per_km=5.0))
     windows = effort.some(WINDOWS_M_F4_21, 4)
@@ -263,7 +263,7 @@ PRINTED_WITHIN_PERCENT = 6.0
 _WIDER_KG = (300.0, 400.0, 550.0, 1500.0, 2000.0, 3000.0)
 
 
-def _f4_22(effort: Effort) -> Result:
+def _f4_22(effort: Workload) -> Result:
     record = record_of(bump(8.0), BUMP_MPS, 12.0, Conditions(iri_m_per_km=5.0))
     kg = sorted([*effort.some(PRINTED_STARTS_KG), *effort.some(_WIDER_KG)])
     found = [fitted(record, {MASS: start}, ours=True) for start in effort.each(kg)]
@@ -303,7 +303,7 @@ WIDTHS_M_F4_25 = (1.83, 2.13, 2.44, 2.74, 3.05, 3.35)
 PRINTED_PEAK_G = 0.8703  # Table 5.5, measured on speed bumps
 
 
-def _f4_25(effort: Effort) -> Result:
+def _f4_25(effort: Workload) -> Result:
     heights, widths = effort.some(HEIGHTS_M_F4_25), effort.some(WIDTHS_M_F4_25)
     peaks = np.array([[_peak(height, width) for width in widths] for height in effort.each(heights)])
     columns = (Column("height [mm]", ".1f"), *(Column(f"width {width:.2f} m [m/s2]", ".2f") for width in widths))
@@ -350,7 +350,7 @@ _NUMBERS = ((MASS, "mass [kg]", TRUTH[MASS]), ("bump.height_m", "height [m]", BU
             ("bump.width_m", "width [m]", BUMP_WIDTH_M), ("speed_scale", "recorded speed over true", 1.0))
 
 
-def _f4_27(effort: Effort) -> Result:
+def _f4_27(effort: Workload) -> Result:
     drive = record_of(bump(_BUMP_AT_M_F4_27), BUMP_MPS, _SECONDS_F4_27, Conditions())
     record = without_profile(drive)
     heights, widths = effort.some(HEIGHTS_M_F4_27, 3), effort.some(WIDTHS_M_F4_27, 3)

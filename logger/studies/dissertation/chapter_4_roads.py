@@ -33,7 +33,6 @@ from logger.studies.study import (
     Cell,
     Check,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -42,6 +41,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -55,7 +55,7 @@ COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, co
            Column("printed damping", ".2f"), Column("in series, damping", ".3f"), Column("as it rings, damping", ".3f"))
 
 
-def _t4_1(effort: Effort) -> Result:
+def _t4_1(effort: Workload) -> Result:
     car = quarter_car(GOLDEN_CAR)
     (rows,) = (quoted(car, ("body", "wheel"), PRINTED_HZ_T4_1, (PRINTED_DAMPING_T4_1, None)) for _
                in effort.each(range(1)))
@@ -105,7 +105,7 @@ PRINTED_HZ_T4_2, PRINTED_DAMPING_T4_2 = (1.1, 11.0), 0.30
 CURB_KG, PERSON_KG, PRINTED_MASS_KG = 1524.07, 72.57, 875.0
 
 
-def _t4_2(effort: Effort) -> Result:
+def _t4_2(effort: Workload) -> Result:
     names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), PRINTED_HZ_T4_2
     (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None),
                       (PRINTED_DAMPING_T4_2, None, None, None))
@@ -134,7 +134,7 @@ PRINTED_T4_3 = (("A", 32.0, 3.05), ("B", 128.0, 6.09), ("C", 512.0, 12.19), ("D"
 _ROADS_T4_3, _LENGTH_M_T4_3, _SPACING_M_T4_3 = 60, 1000.0, 0.05
 
 
-def _t4_3(effort: Effort) -> Result:
+def _t4_3(effort: Workload) -> Result:
     roads = effort.count(_ROADS_T4_3, 4)
     # One seed is one set of phases: the roads of all classes are alike but for their level.
     found = np.array([[iri(generate(gd, _LENGTH_M_T4_3, _SPACING_M_T4_3, seed), _SPACING_M_T4_3) for _, gd,
@@ -184,7 +184,7 @@ _ROADS_F4_3, _LENGTH_M_F4_3, _SPACING_M_F4_3 = 60, 1000.0, 0.1
 _TOLERANCE = 0.05  # of the mean over roads; at Gd of one road's length the longest waves are not averaged out
 
 
-def _f4_3(effort: Effort) -> Result:
+def _f4_3(effort: Workload) -> Result:
     roads = effort.count(_ROADS_F4_3, 12)
     rows = []
     values: list[Check] = []
@@ -254,7 +254,7 @@ RANGE_CM3 = (2.0, 4096.0)
 _SETS_F4_16, _ROADS_F4_16, _LENGTH_M_F4_16, _SPACING_M_F4_16 = 4, 100, 500.0, 0.1
 
 
-def _f4_16(effort: Effort) -> Result:
+def _f4_16(effort: Workload) -> Result:
     roads = effort.count(_ROADS_F4_16, 12)
     gd = np.geomspace(*RANGE_CM3, roads)
     found = np.array([[iri(generate(one, _LENGTH_M_F4_16, _SPACING_M_F4_16, number * roads + place), _SPACING_M_F4_16)
@@ -305,7 +305,7 @@ WANTED_M_PER_KM = tuple(float(one) for one in range(1, 21))
 _SETS_F4_18, _LENGTH_M_F4_18, _SPACING_M_F4_18 = 2, 500.0, 0.1
 
 
-def _f4_18(effort: Effort) -> Result:
+def _f4_18(effort: Workload) -> Result:
     wanted = np.array(effort.some(WANTED_M_PER_KM, 10))
     found = np.array([[iri(generate(gd_n0_from_iri(one), _LENGTH_M_F4_18, _SPACING_M_F4_18, 1000 * number + place),
                            _SPACING_M_F4_18)

@@ -52,7 +52,6 @@ from logger.studies.study import (
     Cell,
     Check,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -61,6 +60,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -79,7 +79,7 @@ HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulle
        "printed one; gains and noise of the sensors are assumed.")
 
 
-def _t5_1(effort: Effort) -> Result:
+def _t5_1(effort: Workload) -> Result:
     compared = [compare_sensors(seed) for seed in effort.each(range(1, 1 + effort.count(20)))]
     first, second = compared[0]
     differences = [100 * abs(phone.rms_g - ps2119.rms_g) / ps2119.rms_g for ps2119, phone in compared]
@@ -139,7 +139,7 @@ PRINTED_ROWS = ((1.19, 0.1978), (14.83, 0.8545))
 _SEGMENTS, _HIGHEST_HZ = 4, 8.0
 
 
-def _t5_2(effort: Effort) -> Result:
+def _t5_2(effort: Workload) -> Result:
     (ps2119, phone), = (compare_sensors() for _ in effort.each(range(1)))
     rows = tuple((float(mode), printed, *ours) for mode, (printed, *ours) in enumerate(
         zip(PRINTED_HZ, ps2119.peaks_hz, phone.peaks_hz, strict=True), start=1))
@@ -205,7 +205,7 @@ PRINTED_STIFFNESS = (("fixed-fixed", 3.0, False), ("fixed-free", 12.0, True))
 """Ends of a column, its printed stiffness in EI / h^3, and whether one end may turn."""
 
 
-def _t5_4(effort: Effort) -> Result:
+def _t5_4(effort: Workload) -> Result:
     building = five_storey.structure()
     frequencies = five_storey.frequencies_hz(building)
     (found,) = (_from_record(building) for _ in effort.each(range(1)))
@@ -309,7 +309,7 @@ _BANDS_HZ = ((0.5, 5.0), (7.0, 18.0))
 _BUMPS_AT_M = (20.0, 70.0, 120.0, 170.0)
 
 
-def _t5_5(effort: Effort) -> Result:
+def _t5_5(effort: Workload) -> Result:
     cases = list(zip(PRINTED, ASSUMED_IRI, strict=True))
     records = [_record(*printed[:2], iri, seed) for seed, (printed, iri) in enumerate(effort.each(cases))]
     rows = tuple(_row_t5_5(printed, iri, accel) for (printed, iri), accel in zip(cases, records, strict=True))
@@ -436,7 +436,7 @@ CASES = (
 )
 
 
-def _f5_22(effort: Effort) -> Result:
+def _f5_22(effort: Workload) -> Result:
     drives = [(_drive(case, Conditions(0.0)), _drive(case, PS_2119.on(_IRI, seed)))
               for seed, case in enumerate(effort.each(CASES), start=1)]
     table = Table("What an obstacle does to the car, and what it tells of its mass", (

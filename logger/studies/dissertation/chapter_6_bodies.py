@@ -48,7 +48,6 @@ from logger.studies.study import (
     Cell,
     Check,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -57,6 +56,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -78,7 +78,7 @@ _OFF, _IRI, _DRIVES = 0.05, 3.0, 40
 _BUMP_AT_M, _SECONDS_T6_1 = 8.0, 8.0
 
 
-def _t6_1(effort: Effort) -> Result:
+def _t6_1(effort: Workload) -> Result:
     drives = effort.count(_DRIVES)
     factors = np.random.default_rng(1).normal(1.0, _OFF, (drives, 3)).tolist()
     jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, _IRI) for height, width, speed in factors)]
@@ -183,7 +183,7 @@ _ROADS_T6_3 = 6
 _STEP_AT_M, _SECONDS_T6_3 = 20.0, 6.0
 
 
-def _t6_3(effort: Effort) -> Result:
+def _t6_3(effort: Workload) -> Result:
     cases, roads = effort.some(CASES_T6_3), effort.count(_ROADS_T6_3)
     jobs = [(step_m, iri, seed) for step_m, iri in cases for seed in range(roads)]
     drives = [_drive(*job) for job in effort.each(jobs)]
@@ -299,7 +299,7 @@ _NEXT_WORD = {word: limit for (_, word), (limit, _) in zip(COMFORT_WORDS[1:], CO
 _LIMIT = {word: limit for limit, word in COMFORT_WORDS}
 
 
-def _t6_5(effort: Effort) -> Result:
+def _t6_5(effort: Workload) -> Result:
     starts = effort.some(_STARTS_M)
     per_mm = [np.mean([_a_w_per_unit(shape(start), PRINTED_MPH[segment]) for start in starts]) / (1000 * _UNIT_M)
               for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(PRINTED_T6_5[:2]), strict=True)]

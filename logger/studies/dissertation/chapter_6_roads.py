@@ -48,7 +48,6 @@ from logger.studies.drives import (
 from logger.studies.study import (
     Cell,
     Column,
-    Effort,
     Item,
     Picture,
     Result,
@@ -57,6 +56,7 @@ from logger.studies.study import (
     Table,
     Value,
     Word,
+    Workload,
     about,
     alike,
 )
@@ -69,7 +69,7 @@ _LEVELS_MPS2 = np.array([0.0, 2.0])
 _ROADS_F6_6, _DRIVEN_M = 120, 100.0
 
 
-def _f6_6(effort: Effort) -> Result:
+def _f6_6(effort: Workload) -> Result:
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
     cars = (rav4(), loaded(rav4(), passengers=2), loaded(rav4(), sprung_mass_factor=2.0))
     own, two, heavy = (rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
@@ -167,7 +167,7 @@ _IRI, _LENGTH_M_F6_9, _WINDOWED_MPH = 2.5, 305.0, 40
 _ROADS_F6_9 = 6
 
 
-def _f6_9(effort: Effort) -> Result:
+def _f6_9(effort: Workload) -> Result:
     speeds, roads = effort.some(SPEEDS_MPH), effort.count(_ROADS_F6_9, 1)
     road = random_road(_IRI, _LENGTH_M_F6_9, 1, WAVINESS[0])
     ours = [per_window(drive_over(road, mph * MPH_MPS, PS_2119), PS_2119) for mph in effort.each(speeds)]
@@ -277,7 +277,7 @@ _ROADS_F6_16 = 60
 _DRIVEN_IRI, _LENGTH_M_F6_16 = 5.0, 305.0
 
 
-def _f6_16(effort: Effort) -> Result:
+def _f6_16(effort: Workload) -> Result:
     settings = CalibrationSettings(roads=effort.count(_ROADS_F6_16, 10))
     (lines,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     mph = np.round(np.array(SPEEDS_MPS) / MPH_MPS)
@@ -352,7 +352,7 @@ _ROADS_F6_23, _FEWEST = 4, 24
 _LENGTH_M_F6_23 = _WINDOWS * WINDOW_M + 1.0
 
 
-def _f6_23(effort: Effort) -> Result:
+def _f6_23(effort: Workload) -> Result:
     segments = effort.some(sorted(PRINTED_MPH))
     found = {one: _driven(one) for one in effort.each(segments)}
     speeds = [mph for mph in PRINTED_KMH if any(PRINTED_MPH[one] == mph for one in segments)]
@@ -430,7 +430,7 @@ def _f6_23(effort: Effort) -> Result:
                              for mph, kmh in PRINTED_KMH.items()])))
 
 
-def _biases_percent(mph: int, segments: Sequence[int], effort: Effort) -> Array:
+def _biases_percent(mph: int, segments: Sequence[int], effort: Workload) -> Array:
     """Errors of the windows' mean by the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
     edges_m: Array = WINDOW_M * np.arange(_WINDOWS + 1.0)
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH

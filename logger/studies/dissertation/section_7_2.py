@@ -56,7 +56,7 @@ from logger.studies.drives import (
     record_of,
     rms_error,
 )
-from logger.studies.study import Cell, Column, Effort, Item, Picture, Result, Statement, Study, Table, Word
+from logger.studies.study import Cell, Column, Item, Picture, Result, Statement, Study, Table, Word, Workload
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.linearise import known_vehicle
@@ -72,7 +72,7 @@ _SPEED_MPS, _IRI_FULL_CAR, _LENGTH_M_FULL_CAR = 14.0, 4.0, 400.0
 _SKIP = 200
 
 
-def _full_car(effort: Effort) -> Result:
+def _full_car(effort: Workload) -> Result:
     cases = [(shared, left_m) for left_m in LEFT_M for shared in effort.some(SHARED)]
     rows = tuple(_row_full_car(*case) for case in effort.each(cases))
     table = Table("A full car's record, explained by two models", (
@@ -147,7 +147,7 @@ SPEEDS_MPS = (10.0, 20.0)
 _IRI_INPUT, _LENGTH_M_INPUT, _START = 4.0, 300, 1.2
 
 
-def _input(effort: Effort) -> Result:
+def _input(effort: Workload) -> Result:
     road = random_road(_IRI_INPUT, effort.count(_LENGTH_M_INPUT, _LENGTH_M_INPUT // 2), 7)
     drives = [drive_over(road, speed, PS_2119.on(_IRI_INPUT, seed)) for seed, speed in enumerate(SPEEDS_MPS)]
     fits: list[tuple[str, list[Run]]] = [(f"one drive, {one.speed_mps[0]:g} m/s", [one]) for one in drives]
@@ -252,7 +252,7 @@ INPUTS = (
 )
 
 
-def _other_vehicles(effort: Effort) -> Result:
+def _other_vehicles(effort: Workload) -> Result:
     cars = [read_vehicle(vehicle_file(name)) for name in effort.some(vehicle_names())]
     inputs = effort.some(INPUTS)
     jobs: list[Vehicle | _Input] = [*cars, *inputs]
@@ -336,7 +336,7 @@ PLACES_M = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _ESTIMATED_MPH, _IRI_SENSOR_POSITION, _LENGTH_M_SENSOR_POSITION = 30, 3.0, 230.0
 
 
-def _sensor_position(effort: Effort) -> Result:
+def _sensor_position(effort: Workload) -> Result:
     speeds = np.array(SPEEDS_MPH_SENSOR_POSITION) * MPH_MPS
     felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms
                      for place in PLACES_M])
@@ -392,7 +392,7 @@ SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the c
 _IRI_SPEED, _LENGTH_M_SPEED = 3.0, 230.0
 
 
-def _speed(effort: Effort) -> Result:
+def _speed(effort: Workload) -> Result:
     limits = ErrorBound(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
     roads = [random_road(_IRI_SPEED, _LENGTH_M_SPEED, 21 + number, waviness) for number,
              waviness in enumerate(WAVINESS)]

@@ -34,7 +34,7 @@ from logger.studies.drives import (
     record_of,
     standard_error_percent,
 )
-from logger.studies.study import Check, Column, Effort, Item, Picture, Result, Statement, Study, Table, Value, Word
+from logger.studies.study import Check, Column, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
 
 PRINTED_TRUE_HZ, PRINTED_TRUE_DAMPING = (0.890, 2.598, 4.095, 5.261, 6.000), 0.02
 PRINTED_HZ = (0.889, 2.601, 4.096, 5.275, 6.031)
@@ -45,7 +45,7 @@ _RECORDS_FIVE_MODES, _RATE_HZ, _LENGTH_S, _DECIBEL, _NEAR = 5, 20.0, 300.0, 20.0
 _HALF_DIGIT, _SURE_FIVE_MODES = 0.0005, 3.0
 
 
-def _five_modes(effort: Effort) -> Result:
+def _five_modes(effort: Workload) -> Result:
     building = with_damping_ratios(*chain(np.full(5, _FLOOR_KG), np.full(5, _STOREY_N_PER_M)),
                                    np.full(5, PRINTED_TRUE_DAMPING))
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
@@ -123,7 +123,7 @@ _RECORDS_MASS_FROM_A_BUMP, _SECONDS, _BUMP_AT_M, _START_KG = 40, 6.0, 8.0, 800.0
 _SURE_MASS_FROM_A_BUMP = 3.0
 
 
-def _mass_from_a_bump(effort: Effort) -> Result:
+def _mass_from_a_bump(effort: Workload) -> Result:
     fits = [fitted(record_of(bump(_BUMP_AT_M), BUMP_MPS, _SECONDS, Conditions(seed=seed)), {MASS: _START_KG}, ours=True)
             for seed in effort.each(range(effort.count(_RECORDS_MASS_FROM_A_BUMP, 5)))]
     errors = np.array([error_percent(one, MASS) for one in fits])
@@ -180,7 +180,7 @@ def interval_percent(hits: int, cases: int) -> tuple[float, float]:
     return float(100 * max(0.0, low)), float(100 * min(1.0, high))
 
 
-def _lab_examination(effort: Effort) -> Result:
+def _lab_examination(effort: Workload) -> Result:
     counts = examined()
     rows, met, surely = [], 0, 0
     for goal in effort.each([one for one in counts["goals"] if one["of"]]):

@@ -17,7 +17,7 @@ from logger.chart_data import Curves, Line
 from logger.dsp.weightings.wd import WEIGHTING as WD
 from logger.dsp.weightings.wk import WEIGHTING as WK
 from logger.roads.iri import STANDARD_SPEED_MPS, rectified_slope, slope_gain
-from logger.studies.study import Column, Effort, Item, Picture, Result, Study, Table, Value, Word, about
+from logger.studies.study import Column, Item, Picture, Result, Study, Table, Value, Word, Workload, about
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import straight_step
 
@@ -28,7 +28,7 @@ PRINTED_COEFFICIENT = 5.476107e-3
 _ROUNDING_IRI_CHECK_PROFILE, _ATTAINED = 5e-10, 1e-5
 
 
-def _iri_check_profile(effort: Effort) -> Result:
+def _iri_check_profile(effort: Workload) -> Result:
     at_m = _SPACING_M * np.arange(round(_LENGTH_M / _SPACING_M) + 1)
     pulse_m = np.interp(at_m, [0, 1, 3, 5, _LENGTH_M], [0, 0, 0.02, 0, 0])
     slopes = rectified_slope(pulse_m, _SPACING_M)
@@ -71,7 +71,7 @@ _SHARE_GOLDEN_CAR_GAIN = 0.05
 """Of the printed value, as broad humps are read off a figure."""
 
 
-def _golden_car_gain(effort: Effort) -> Result:
+def _golden_car_gain(effort: Workload) -> Result:
     wave_number = np.geomspace(0.01, 3.0, effort.count(4000, 1000))
     gain = slope_gain(wave_number, 0.0)
     slow = wave_number < _BETWEEN_CPM
@@ -121,7 +121,7 @@ _ROUNDING_ISO_2631_FACTORS = 0.75
 _ITEMS = {"wk": "ISO 2631-1 Table 3, Wk", "wd": "ISO 2631-1 Table 3, Wd"}
 
 
-def _iso_2631_factors(effort: Effort) -> Result:
+def _iso_2631_factors(effort: Workload) -> Result:
     values: list[Value] = []
     for name, weighting in effort.each((("wk", WK), ("wd", WD))):
         for hz, printed in zip(HZ, PRINTED_ISO_2631_FACTORS[name], strict=True):
@@ -170,7 +170,7 @@ def saw_teeth(teeth: float) -> np.ndarray:
     return np.where(phase < teeth, 2 * ((phase + 0.5) % 1.0) - 1.0, 0.0)
 
 
-def _iso_8041_bursts(effort: Effort) -> Result:
+def _iso_8041_bursts(effort: Workload) -> Result:
     rows, values = [], []
     found: dict[str, list[float]] = {"wk": [], "wd": []}
     for number, teeth in enumerate(effort.each(TEETH)):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.demo.simulated_drive import Drive
+from logger.demo.simulated_drive import DemoDrive
 from logger.units import STANDARD_GRAVITY_MPS2 as G
 
 
@@ -33,7 +33,8 @@ class Phone:
     speed_mps: np.ndarray
 
 
-def phone_in(drive: Drive, rng: np.random.Generator, turned: np.ndarray, rate_hz: float = 104.0, jitter: float = 0.15,
+def phone_in(drive: DemoDrive, rng: np.random.Generator, turned: np.ndarray, rate_hz: float = 104.0,
+             jitter: float = 0.15,
              late_s: float = 0.1, step_mps2: float = 0.0024) -> Phone:
     """A phone whose axes are the car's (ahead, left, up) turned by a rotation (3, 3); fixes come so late."""
     motion = drive.motion

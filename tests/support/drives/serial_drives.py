@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from drivers.dump import Event
-from logger.demo.simulated_drive import Drive, DrivePlan, RoadStretch, simulate_drive
+from logger.demo.simulated_drive import DemoDrive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
@@ -19,7 +19,7 @@ SPEED_MPS = 15.0
 
 
 @cache
-def drive_at(rate_hz: int) -> Drive:
+def drive_at(rate_hz: int) -> DemoDrive:
     """A class B road at 15 m/s; noise in proportion to the root of the rate, as one and the same sensor has it."""
     knots = ((0, 0), (BEGIN_S, 0), (BEGIN_S + 10, SPEED_MPS), (SECONDS, SPEED_MPS))
     plan = DrivePlan(knots, (RoadStretch(5000, 64),), sensor="lines", rate_hz=rate_hz, seed=7,
@@ -56,7 +56,7 @@ def evenly_lost(rate_hz: int, every: int, count: int = 1) -> set[int]:
 
 
 @cache
-def rows_at(rate_hz: int, share: float = 0.0) -> tuple[Drive, Rows]:
+def rows_at(rate_hz: int, share: float = 0.0) -> tuple[DemoDrive, Rows]:
     """The drive and its rows."""
     return drive_at(rate_hz), rows_without(rate_hz, frozenset(randomly_lost(rate_hz, share)))
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.csv_extraction import Asked, _recorded
+from logger.api.csv_extraction import CsvSettings, _recorded
 from logger.api.datasets.lira_map import ProfilerPass
 from logger.errors import BadInput
 from logger.files import json_sha256
@@ -166,7 +166,7 @@ def phone(folder: Path) -> Target:
 
         place.write_bytes(fields.tables()(rng, fixes) if data == one else fixes)
         alone = b"lat_deg" in data[:200]
-        asked = Asked(named_columns(columns) if data.startswith(b"time") else None,
+        asked = CsvSettings(named_columns(columns) if data.startswith(b"time") else None,
                       None if alone else place, speed_mps=12.0 if rng.random() < 0.1 else None)
         found = _recorded(file.hold(data), asked, Config(), lambda words: None)
         _finite(found.readings.time_s, found.readings.accel_mps2, found.fixes.time_s, found.fixes.speed_mps)
