@@ -236,7 +236,7 @@ WRITERS_OF_FILES = {
     "logger.store.export.directory_handle": "sticks, which a hand may pull",
     "logger.store.export.export": "the same", "logger.store.export.stick_status": "an LED of the board",
     "logger.store.log.atomic_file": "the car's small files, through drivers.disk",
-    "logger.store.log.dump_recording": "the same",
+    "logger.store.log.disk_quota": "the same",
     "logger.store.log.recovery": "the same",
 }
 

@@ -26,7 +26,7 @@ from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import LEAST_COVERED, passes_of, scatter_of, suggestion, way_means
 from logger.roads.road_matching import match
 from logger.roads.road_network import Array, RoadNetwork, on_sphere
-from logger.roads.window_errors import WindowErrors
+from logger.roads.sections import WindowErrors
 from logger.store.formats.road_lines import MapWay
 from logger.store.log.log_reader import split_drives
 

@@ -542,9 +542,9 @@ def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -
     """How late fixes are: by the settings, else what is usual and what braking shows."""
     from logger.estimation.drive_alignment import DriveAlignment
     from logger.estimation.receiver_delay import combined
-    from logger.service.receiver_learning import at_start
+    from logger.service.learning import delay_at_start
 
-    known = at_start(config.gps, None)
+    known = delay_at_start(config.gps, None)
     if not learns or known.std_s == 0.0:
         return known
     alignment = DriveAlignment(2, 1.0)

@@ -57,9 +57,9 @@ from logger.errors import BadInput
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
-    from logger.store.formats.channel_file import ChannelRecord
     from logger.store.formats.drive_file import Drive
     from logger.store.formats.profile_file import Profile
+    from logger.store.formats.record_checks import ChannelRecord
     from logger.store.formats.record_file import AccelerationRecord
 
 

@@ -384,7 +384,7 @@ def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Mo
     from logger.api.lab.checks import check_roads
     from logger.runs import SKIP_S
     from logger.runs import Run as Record
-    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.simulation.virtual_drive import SimulatedRuns
 
     if len(distance_m) > SKIP_S * run.rate_hz + 2:
         record = Record(str(run.path), run.rate_hz, run.accel_z_mps2, distance_m, run.speed_mps, road)

@@ -31,8 +31,15 @@ from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief
-    from logger.extraction.along_track import Observations, Predict, Registered, RunGrid, TrackMotion
-    from logger.extraction.measured_line import MeasuredLine, Pass
+    from logger.extraction.along_track import (
+        MeasuredLine,
+        Observations,
+        Pass,
+        Predict,
+        Registered,
+        RunGrid,
+        TrackMotion,
+    )
     from logger.service.drive_readings import GridReadings
     from logger.service.wiring import Instrument
     from logger.store.formats.vehicle_file import Model
@@ -216,7 +223,7 @@ class MeasuredProfile:
 
 def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
-    from logger.extraction.measured_line import MeasuredLine
+    from logger.extraction.along_track import MeasuredLine
 
     profile, places = read_profile(path, judged=True), read_places(path)
     try:
@@ -381,7 +388,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
 
 def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
     """Why a drive, by fixes (k,), has no pass over a line."""
-    from logger.extraction.measured_line import ASIDE_M, goes_back
+    from logger.extraction.along_track import ASIDE_M, goes_back
 
     if goes_back(driven_m, along_m, aside_m):
         return ": the drive goes along the profile from its end to its beginning"
@@ -395,8 +402,7 @@ def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: 
 
 def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -> list[_Drive]:
     """The runs of a stretch without a break: one, or one for each pass over the profile."""
-    from logger.extraction.along_track import motion_of
-    from logger.extraction.measured_line import passes
+    from logger.extraction.along_track import motion_of, passes
 
     speeds = _speeds(fixes, recorded.config)
     motion = motion_of(speeds)
@@ -441,7 +447,7 @@ def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, mea
 
 def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
     from logger.runs import Run
-    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.simulation.virtual_drive import SimulatedRuns
     from logger.vehicle.compose import compose
 
     car = compose(recorded.model.vehicle, recorded.model.effects)

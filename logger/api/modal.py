@@ -32,10 +32,10 @@ from logger.files import write_text
 from logger.modal.mode import FoundMode, ModalResult
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
-from logger.store.formats import channel_file
-from logger.store.formats.channel_file import SPEED as SPEED_COLUMN
-from logger.store.formats.channel_file import ChannelRecord
+from logger.store.formats import record_checks
 from logger.store.formats.drive_file import header_of
+from logger.store.formats.record_checks import SPEED as SPEED_COLUMN
+from logger.store.formats.record_checks import ChannelRecord
 from logger.store.formats.record_file import VERTICAL
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def vehicle_modes(
     return VehicleModes(text, vehicle_json(*columns), *columns)
 
 
-def found_modes(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
+def found_modes(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
     """The modes of a record or of a file. BadInput as ``modes``."""
     if question.vehicle is not None:
         return modes_of_drive(given, question)
@@ -193,10 +193,10 @@ def found_modes(given: channel_file.ChannelRecord | Path | str, question: ModesQ
         raise question.complaint(f"{name_of(given)}: {error}") from None
 
 
-def _check_stands(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion) -> None:
+def _check_stands(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> None:
     """BadInput for a drive, unless what moved it was measured, or it is said to be a free decay."""
-    drives = (bool({*given.names} & {*channel_file.NOT_SENSORS}) if isinstance(given, channel_file.ChannelRecord) else
-              channel_file.is_drive(given))
+    drives = (bool({*given.names} & {*record_checks.NOT_SENSORS}) if isinstance(given, record_checks.ChannelRecord) else
+              record_checks.is_drive(given))
     if drives and question.input_column is None and question.response != "decay":
         raise question.complaint(
             f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
@@ -216,18 +216,18 @@ def _check(question: ModesQuestion) -> None:
             raise question.wrong("input_column", f": expected `method` n4sid with it, found {method}")
 
 
-def _asked(given: channel_file.ChannelRecord | Path | str, question: ModesQuestion
+def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion
            ) -> tuple[Channels, Array | None]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
     pushed, name = question.input_column, name_of(given)
-    at = name if isinstance(given, channel_file.ChannelRecord) else f"{name}:1"
+    at = name if isinstance(given, record_checks.ChannelRecord) else f"{name}:1"
     wished = () if question.columns is None else tuple(question.columns)
     if question.columns is not None and (
             not wished or not all(wished) or len(set(wished)) < len(wished) or pushed in wished):
         raise question.wrong("columns", f" {','.join(wished)}: expected names with commas between them, each once, the "
                                         "input not among them")
     wanted = (*wished, pushed) if wished and pushed else wished
-    record = _picked(given, wanted) if isinstance(given, channel_file.ChannelRecord) else read_channels(given, wanted)
+    record = _picked(given, wanted) if isinstance(given, record_checks.ChannelRecord) else read_channels(given, wanted)
     if pushed is not None and pushed not in record.names:
         raise BadInput(f"{at}: expected a column {pushed}, found {','.join(record.names)[:80]}")
     t_s = record.start_s + np.arange(len(record.samples)) / record.rate_hz
@@ -248,7 +248,7 @@ def _asked(given: channel_file.ChannelRecord | Path | str, question: ModesQuesti
     return replace(record, names=names, start_s=float(t_s[inside][0]), samples=samples[:, outputs]), inputs
 
 
-def _picked(given: channel_file.ChannelRecord, wanted: Sequence[str]) -> Channels:
+def _picked(given: record_checks.ChannelRecord, wanted: Sequence[str]) -> Channels:
     """These channels of a record, or all. BadInput for one that there is not."""
     if unknown := set(wanted) - set(given.names):
         raise BadInput(f"record: expected a channel {sorted(unknown)[0]}, found {','.join(given.names)[:80]}")
@@ -342,7 +342,7 @@ def _record(given: ChannelRecord | Path | str, question: ModesQuestion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Channels(channel_file.ChannelRecord, Shown):
+class Channels(record_checks.ChannelRecord, Shown):
     """A record of c sensors, evenly sampled.
 
     names      of the channels
@@ -374,7 +374,7 @@ def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
     >>> read_channels(folder / "drive.csv", ["accel_z_mps2"]).samples.shape
     (1115, 1)
     """
-    return Channels(**vars(channel_file.read_channels(path, columns)))
+    return Channels(**vars(record_checks.read_channels(path, columns)))
 
 
 def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
@@ -404,9 +404,9 @@ class Found:
     record: Channels
 
 
-def name_of(given: channel_file.ChannelRecord | Path | str) -> str:
+def name_of(given: record_checks.ChannelRecord | Path | str) -> str:
     """How a complaint names a record."""
-    return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+    return "record" if isinstance(given, record_checks.ChannelRecord) else str(given)
 
 
 _REJECTED_SHOWN = 12

@@ -32,8 +32,8 @@ from logger.api.drives import assessed, read_run, sensor_of
 from logger.api.extraction import read_measured_profile
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
-from logger.extraction.measured_line import MeasuredLine, passes
-from logger.roads.agreement import Agreement, agreement, factor_to
+from logger.extraction.along_track import MeasuredLine, passes
+from logger.roads.repeated_drives import Agreement, agreement, factor_to
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.logger_csv import named_columns

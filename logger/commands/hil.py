@@ -29,11 +29,10 @@ from drivers.readings import GPS
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
-from logger.service import noise_learning, receiver_learning
 from logger.service.config import Config, find_config, load_config
 from logger.service.hil.log_comparison import Difference, LogAgreement, compare, newest_sidecar, read_sessions
 from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
-from logger.service.noise_learning import KnownNoise
+from logger.service.learning import DELAY, NOISE, KnownNoise, read_delay
 
 LATE_MS = 50.0
 LATE_WHY = "the service itself waits as long between two looks at a port"
@@ -141,11 +140,11 @@ def _known_at_start(folder: Path) -> tuple[Belief | None, KnownNoise | None]:
     sidecar."""
     said = newest_sidecar(folder)
     try:
-        receiver = receiver_learning.from_fields(said.get("receiver", {}))
-        noise = noise_learning.from_fields(said.get("noise", {}))
+        receiver = DELAY.from_fields(said.get("receiver", {}))
+        noise = NOISE.from_fields(said.get("noise", {}))
     except ValueError:
         receiver = noise = None
-    return receiver or receiver_learning.read_learnt(folder), noise
+    return receiver or read_delay(folder), noise
 
 
 def _play(args: argparse.Namespace, config: Config) -> Sent:

@@ -21,7 +21,7 @@ from logger.printable import counted
 from logger.service.config import Config, load_config
 
 if TYPE_CHECKING:
-    from logger.service.noise_learning import NoiseLearning
+    from logger.service.learning import NoiseLearning
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 1e6
 
@@ -87,7 +87,7 @@ class Outcome:
     def text(self) -> str:
         """For a person."""
         from logger.report.summary import screen
-        from logger.service.receiver_learning import drive_words
+        from logger.service.learning import drive_words
 
         lines = [screen(self.summary, sys.stdout.encoding or "ascii")]
         if self.torn_tail:
@@ -103,9 +103,8 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     """Play ``dump`` into logs below ``out``. Progress goes to stderr unless ``quiet``."""
     from logger.service import wiring
     from logger.service.event_core import EventCore
+    from logger.service.learning import NoiseLearning, drive_fields
     from logger.service.main_loop import Player
-    from logger.service.noise_learning import NoiseLearning
-    from logger.service.receiver_learning import drive_fields
     from logger.service.wiring import check_recorded_rate
     from logger.store.formats.vehicle_file import read_on_board
     from logger.store.log.atomic_file import FolderLock

@@ -49,7 +49,7 @@ from logger.fleet.road_map import SEGMENT_M
 from logger.geodesy import EARTH_RADIUS_M
 from logger.printable import cell, word
 from logger.report.summary import NOT_COUNTED
-from logger.roads.window_errors import WindowErrors, errors_of_means
+from logger.roads.sections import WindowErrors, errors_of_means
 from logger.store.log.log_name import LogName
 from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
 from logger.units import US_PER_S

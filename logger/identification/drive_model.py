@@ -45,7 +45,7 @@ from logger.identification.unknown_inputs import (
 from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
-from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.linear_car import (

@@ -19,7 +19,7 @@ from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.runs import Run, normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 

@@ -17,7 +17,7 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.screening import Baseline, misalignment
 from logger.lab.selection.stepwise import Search
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.stepping_loop import COMPILED
 from logger.vehicle.vehicle import Vehicle

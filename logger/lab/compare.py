@@ -30,7 +30,7 @@ from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
 from logger.lab.selection.holdout import cross_validate
 from logger.runs import normalised_rms_error, signal_errors
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle

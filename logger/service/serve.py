@@ -25,13 +25,18 @@ from drivers.hardware import Machine
 from drivers.readings import GPS, Event
 from drivers.sources import SerialSource
 from logger.errors import BadInput
-from logger.service import noise_learning, wiring
+from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
+from logger.service.learning import (
+    NoiseLearning,
+    ReceiverLearning,
+    delay_at_start,
+    noise_at_start,
+    read_delay,
+)
 from logger.service.main_loop import Listener, MainLoop, monotonic_us
-from logger.service.noise_learning import NoiseLearning
 from logger.service.pipeline import Pipeline
-from logger.service.receiver_learning import ReceiverLearning, at_start, read_learnt
 from logger.service.signal_chain import Axis
 from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
 from logger.service.storage import Storage
@@ -286,11 +291,11 @@ def serve(config: Config, stop: Stop) -> None:
 
 
 def _serve(config: Config, stop: Stop) -> None:
-    noise = noise_learning.at_start(config.log.directory, config.accelerometer)
+    noise = noise_at_start(config.log.directory, config.accelerometer)
     sensor = wiring.instrument(config.accelerometer, noise)
     model = read_on_board(config.vehicle)
-    learnt = read_learnt(config.log.directory)
-    receiver_delay = at_start(config.gps, learnt)
+    learnt = read_delay(config.log.directory)
+    receiver_delay = delay_at_start(config.gps, learnt)
     facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
     header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
     limits = QuotaLimits(config.log.quota_bytes, config.log.keep_free_bytes)

@@ -34,12 +34,10 @@ from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.service import noise_learning
 from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
 from logger.service.drive_readings import RangeUse
-from logger.service.noise_learning import KnownNoise
+from logger.service.learning import DELAY, NOISE, KnownNoise, delay_at_start, is_loggers
 from logger.service.pipeline import Pipeline, PipelineSettings
-from logger.service.receiver_learning import at_start, from_fields, header_fields, is_loggers
 from logger.service.signal_chain import (
     GRID_RATE_HZ,
     Axis,
@@ -140,7 +138,7 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
 
     Raises BadInput for a vehicle that lacks what its model or an effect needs.
     """
-    receiver = receiver or at_start(config.gps, None)
+    receiver = receiver or delay_at_start(config.gps, None)
     low_pass_hz = config.pipeline.low_pass_hz
     settings = PipelineSettings(
         window_m=config.pipeline.window_m,
@@ -216,7 +214,7 @@ def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief |
         "sensor": sensor.description,
         "vehicle": asdict(model.vehicle) | _more_of(model),
         "settings": _plain(_as_written(config)),
-        "receiver": header_fields(receiver or at_start(config.gps, None)),
+        "receiver": DELAY.fields(receiver or delay_at_start(config.gps, None)),
         **_noise_said(config.accelerometer, noise),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
@@ -235,12 +233,12 @@ def _noise_said(config: AccelerometerConfig, known: KnownNoise | None) -> dict[s
     if config.noise_mps2 is None:
         return {}
     of = {_READS: reads} if known and (reads := instrument(config).reads) > 1 else {}
-    return {"noise": {"noise_mps2": config.noise_mps2, **(noise_learning.header_fields(known) if known else {}), **of}}
+    return {"noise": {"noise_mps2": config.noise_mps2, **(NOISE.fields(known) if known else {}), **of}}
 
 
 def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNoise | None = None) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
-    gps = {"baud": config.gps.baud, **header_fields(receiver or at_start(config.gps, None))}
+    gps = {"baud": config.gps.baud, **DELAY.fields(receiver or delay_at_start(config.gps, None))}
     sensor = config.accelerometer
     accelerometer = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis,
                      **sensor.kind.header(sensor.settings), **_noise_said(sensor, noise)}
@@ -280,7 +278,7 @@ def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header")
     """What was known of the receiver's delay when the recording began, unless the settings say a number. Raises
     BadInput, beginning with ``place``, where the recording says what cannot be."""
     try:
-        return at_start(config.gps, from_fields(header.gps))
+        return delay_at_start(config.gps, DELAY.from_fields(header.gps))
     except ValueError as error:
         raise BadInput(f"{place}: {error}") from None
 
@@ -292,7 +290,7 @@ def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") ->
         return None
     said = header.accelerometer.get("noise", {})
     try:
-        known = noise_learning.from_fields(said)
+        known = NOISE.from_fields(said)
         # Recordings by programs that learnt the noise of the mean of several readings say nothing of one.
         return known if said.get(_READS, 1) == instrument(config.accelerometer).reads else None
     except ValueError as error:

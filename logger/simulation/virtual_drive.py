@@ -1,4 +1,18 @@
-"""A drive that never happened: a road with obstacles, a car over it, and what its sensor would have recorded.
+"""What a recorder would see: a car driven over a road, or stood on a rig, with its effects.
+
+What a recorder would keep of a car with effects, at places where its own sensor does not sit.
+
+Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a fit
+asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and the
+transforms of them are kept as those of the sensor alone are: sensors are tried on them without moving the car again.
+
+Predictions of runs by a car with effects.
+
+Problem: a fit needs hundreds of predictions of the same runs, by cars that differ in a number or an effect. Solution:
+``SimulatedRuns`` caches the road under the wheels of each run (``Passage``), also for the few other distance signals
+(with a scale error, with a distance error) that were used last.
+
+A drive that never happened: a road with obstacles, a car over it, and what its sensor would have recorded.
 
 Problem: what a person asks for (a speed, obstacles, effects, a sensor) has to become what a model needs, and what no
 car can do (a jump of a kilometre, effects that a car's masses cannot follow) is to be refused in words. Solution: each
@@ -9,21 +23,177 @@ or ``response_with_effects`` what is felt on the way, ``as_sensed`` what a senso
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.profiles.excitation import Excitation
-from logger.profiles.track import Track
+from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.vehicle.compose import Car, bounded, recorded
-from logger.vehicle.observe import observed, recorded_distance
+from logger.runs import Run, Signal
+from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, in_blocks, moved, recorded, respond, stepper_of
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.stepping import force_input
+from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, wheel
+from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
+
+_MOST_TRIES = 200
+_NEARLY_M = 1e-9
+# Columns of ``Structure.body``; corners by their names, of cars with so many wheels.
+_RATES = {"pitch_rate": 1, "roll_rate": 2}
+_CORNERS = {1: {"front": 0}, 2: {"front": 0, "rear": 1},
+            4: {"front": 0, "front_left": 0, "front_right": 1, "rear": 2, "rear_left": 2, "rear_right": 3}}
+
+
+def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
+    """Outputs (N, p) of a car on a passage, behind the recorder's filter and nothing else: the sensor's effects are not
+    in them. Heights count from where the front left wheel begins."""
+    return np.stack([passage.recorded(column, np.ones_like) for column in _fine(car, passage, outputs)], axis=1)
+
+
+def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
+    """What the recorder keeps of the sensor's acceleration and of other signals, these without their means, one after
+    the other ((1 + s) N,).
+
+    ValueError for a signal that this car does not have.
+    """
+    if not signals:
+        return recorded(car, passage)
+    sensor = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
+    outputs = [sensor, *(output_of(car, one) for one in signals)]
+    found = passage.recorded_of((car.body, signals), lambda: _fine(car, passage, outputs), car.factor)
+    found[0] = car.written(passage, found[0])
+    found[1:] -= found[1:].mean(axis=1, keepdims=True)
+    return found.ravel()
+
+
+def output_of(car: Car, signal: Signal) -> Output:
+    """The motion that a signal measures. ValueError for one that this car does not have."""
+    structure = car.structure
+    side, _, part = signal.of.rpartition("_")
+    try:
+        if part in ("wheel", "suspension"):
+            of = suspension_travel if part == "suspension" else wheel
+            return of(structure, _CORNERS[len(structure.wheels)][side])
+        if signal.measures in _RATES:
+            column = structure.body[:, _RATES[signal.measures]]
+            if not column.any():
+                raise ValueError(f"this body has no {signal.measures.replace('_', ' ')}")
+            return Output(column, np.zeros(len(structure.wheels)), 1)
+        return body_point(structure, signal.ahead_m - car.shift_m, signal.left_m)
+    except KeyError:
+        raise ValueError(f"signal {signal.name}: this vehicle has no {signal.of.replace('_', ' ')}") from None
+    except ValueError as error:
+        raise ValueError(f"signal {signal.name}: {error}") from None
+
+
+def _fine(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
+    """Outputs at the fine instants (p, M)."""
+    structure = car.structure
+    n = len(structure.mass)
+    elevation, _ = passage.under_wheels(structure)
+    observe, direct = structure.output_matrices(outputs)
+    if not car.bends_laws:
+        return (in_blocks(structure, passage, observe) + elevation @ direct.T).T
+    motion = moved(car, passage)
+    onto = force_input(structure)[n:]
+    pushed = np.array([one.row @ onto if one.order == 2 else np.zeros(onto.shape[1]) for one in outputs])
+    return np.asarray((motion.states @ observe.T + elevation @ direct.T + motion.forces @ pushed.T).T)
+
+
+def recorded_distance(car: Car, distance_m: Array) -> Array:
+    """What a car that truly was at these distances (n,) records: the inverse of ``car.driven``.
+
+    ValueError if there is none: an effect on the position signal may stretch it by less than two, not turn it round.
+    """
+    recorded_m = distance_m
+    for _ in range(_MOST_TRIES):
+        missing_m = distance_m - car.driven(recorded_m)
+        recorded_m = recorded_m + missing_m
+        if not np.abs(missing_m).max() > _NEARLY_M:
+            return recorded_m
+    raise ValueError("no recorded distance would stand for where the car was")
+
+
+_KEPT_PASSAGES = 4
+_STEPPERS = 2
+_HOP_HZ = 13.0  # of a car's wheels
+_MOST_FINER = 16
+# Dry friction jumps: it needs so many times the steps of other laws.
+_FINER_WITH_FRICTION = 2
+
+
+def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
+    """Steps a second in which a vehicle is simulated: as usual for one whose wheels hop as those of cars do, twice as
+    many for one an octave quicker, and so on up to four octaves."""
+    quickest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[-1])
+    return usual_hz * float(np.clip(2 ** np.round(np.log2(quickest_hz / _HOP_HZ)), 1, _MOST_FINER))
+
+
+class SimulatedRuns:
+    """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
+    laws of their own are stepped in two threads besides."""
+
+    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
+        self.runs, self.fine_hz = list(runs), fine_hz
+        self._steppers = ThreadPoolExecutor(_STEPPERS)
+        self._passages: list[dict[tuple[float, bytes, WheelTracks], Passage]] = [{} for _ in self.runs]
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
+                tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
+        """Predicted record of each run, whole, in its pass band (n,) [m/s2]; of one with more signals all ((1 + s) n,).
+
+        distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
+        rough               no finer steps for a car with dry friction: near enough for differences
+        tracks              roads in place of the runs' own; each such object is cached by itself
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            passages = self._passages_of(car, distance_error_m, rough, tracks)
+            for step_s in {one.step_s for one in passages if car.bends_laws}:
+                stepper_of(car, step_s)  # made once, before both threads ask for it
+        each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
+            partial(_recorded, car), passages, [run.signals for run in self.runs])
+        return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
+
+    def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
+        """The response of the car in each run: its record, and the motions of suspensions and tires."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)]
+
+    def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
+                     tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
+        fine_hz = _FINER_WITH_FRICTION * self.fine_hz if car.rubs and not rough else self.fine_hz
+        found = []
+        for index, run in enumerate(self.runs):
+            distance = run.distance_m if distance_error_m is None else run.distance_m + distance_error_m[index]
+            distance = car.driven(distance)
+            track: WheelTracks = run.track if tracks is None else tracks[index]
+            key = fine_hz, distance.tobytes(), track
+            passage = self._passages[index].get(key)  # another thread may put others in its place at any time
+            if passage is None:
+                passage = Passage(track, run.rate_hz, distance, fine_hz, index)
+                kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
+                self._passages[index] = dict(kept) | {key: passage}
+            found.append(passage)
+        return found
+
+
+def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = recorded_signals(car, passage, signals)
+    return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
+
 
 SENSOR = "accel_z_mps2"
 """The column of the sensor's acceleration."""

@@ -16,7 +16,7 @@ from logger.errors import BadInput
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.road_match import match_below_bounce
 from logger.shipped import vehicle_file
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import read_model
 from logger.vehicle.models import structure_of

@@ -43,8 +43,7 @@ from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.report.placed import column, iri_errors, placed
-from logger.roads.sections import Windows, even_edges, sections
-from logger.roads.window_errors import WindowErrors
+from logger.roads.sections import WindowErrors, Windows, even_edges, sections
 from logger.service.signal_chain import GRID_STEP_US
 from logger.units import FOOT_M, MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle.linear_car import LinearCar

@@ -17,7 +17,7 @@ from logger.estimation.mounting import angle_rad
 from logger.estimation.receiver_delay import DelayEstimate
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.service.receiver_learning import UNKNOWN
+from logger.service.learning import UNKNOWN
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import half_car

@@ -22,7 +22,7 @@ from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.whittle import Bands
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.named_parameters import changed, read
 

@@ -33,8 +33,8 @@ from logger.records import WindowRecord
 from logger.service.config import AccelerometerConfig, Config, load_config
 from logger.service.hil.log_comparison import LoggedSession, compare, read_sessions
 from logger.service.hil.playback import Sent, expected_rows, send, wired
+from logger.service.learning import DELAY
 from logger.service.pipeline import longest_wait_us
-from logger.service.receiver_learning import FILE_NAME, header_fields
 from logger.store.log import row_format
 from logger.store.log.sidecar import Tally, store_sidecar
 from logger.units import STANDARD_GRAVITY_MPS2
@@ -311,14 +311,14 @@ def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_si
         rows = expected_rows(wired(reader.header, reader, None, "x"), load_config(Path("ridelog.yaml")), "x", knew)
     log = tmp_path / "00004-001.csv"
     log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *map(row_format.format_row, rows)]))
-    learnt = tmp_path / FILE_NAME
-    learnt.write_text(json.dumps(header_fields(Belief(0.05, 0.02, 9))))
+    learnt = tmp_path / DELAY.file_name
+    learnt.write_text(json.dumps(DELAY.fields(Belief(0.05, 0.02, 9))))
     compared = ["hil", str(short_dump), "--log", ".", "--config", "ridelog.yaml"]
-    store_sidecar(FileSystem(), log, {"receiver": header_fields(knew)}, "finished", Tally(len(rows)), None)
+    store_sidecar(FileSystem(), log, {"receiver": DELAY.fields(knew)}, "finished", Tally(len(rows)), None)
     assert main.main(compared) == 0
     log.with_suffix(".json").unlink()  # nothing but what was learnt since is left
     assert main.main(compared) == 1
-    learnt.write_text(json.dumps(header_fields(knew)))
+    learnt.write_text(json.dumps(DELAY.fields(knew)))
     assert main.main(compared) == 0
 
 

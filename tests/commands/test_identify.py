@@ -14,7 +14,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
 from logger.shipped import vehicle_file
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import write_drive, write_profile
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import Model, read_model, read_vehicle, write_model

@@ -124,7 +124,7 @@ def test_what_takes_long_without_a_compiler_is_said_before(
     command: str, runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("logger.vehicle.stepping_loop.COMPILED", False)
-    monkeypatch.setattr("logger.simulation.simulated_runs.SimulatedRuns.predict", None)
+    monkeypatch.setattr("logger.simulation.virtual_drive.SimulatedRuns.predict", None)
     car = car_with(tmp_path, "{name: wheel_lift}")
     with pytest.raises(TypeError):
         main([*COMMANDS[command](tmp_path), "--vehicle", car, *runs])

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.accelerometers._bma220_chip import Bma220Chip
-from drivers.accelerometers.bma220 import Bma220, Bma220Decoder, Bma220Settings, mps2_per_count
+from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
 from drivers.recorded_wires import RecordedBus
 

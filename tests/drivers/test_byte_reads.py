@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.accelerometers._bma220_chip import REGISTER_STEP, Bma220Chip
-from drivers.accelerometers.bma220 import Bma220, Bma220Settings, mps2_per_count
+from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220, Bma220Chip, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 from drivers.recorded_wires import RecordedBus

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.accelerometers._bma220_chip import Bma220Chip
-from drivers.accelerometers.bma220 import Bma220, Bma220Settings
+from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Settings
 from drivers.dump import Event
 from drivers.errors import BadReply, DumpError, NotPresent, Timeout
 from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort

@@ -12,8 +12,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
 from logger.roads.obstacles import speed_bump
-from logger.roads.sections import Windows, even_edges, sections
-from logger.roads.window_errors import WindowErrors
+from logger.roads.sections import WindowErrors, Windows, even_edges, sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar

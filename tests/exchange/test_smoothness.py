@@ -15,7 +15,7 @@ from logger.commands.main import main
 from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
 from logger.roads.repeated_drives import Passes, Scatter, suggestion, way_means
-from logger.roads.window_errors import WindowErrors
+from logger.roads.sections import WindowErrors
 from logger.store.formats.road_lines import read_map_ways
 
 WINDOW_M = 7.62

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.measured_line import MeasuredLine, goes_back, passes
+from logger.extraction.along_track import MeasuredLine, goes_back, passes
 
 M_PER_DEG = 111_195.08
 

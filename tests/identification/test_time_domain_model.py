@@ -16,7 +16,7 @@ from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.studies.drives import rav4
 from logger.vehicle.compose import compose

@@ -10,7 +10,7 @@ import pytest
 
 from logger.api.lab.compare import comparison_json, conclusion, evidence, headline
 from logger.lab.compare import Comparison, compare
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Vehicle

@@ -19,7 +19,7 @@ from logger.lab.likelihood.noise_floor import UNEXPLAINED
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.runs import RecordFacts, Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.roads.agreement import agreement, best_shift_m, factor_to, matching_cells, mean_between
+from logger.roads.repeated_drives import agreement, best_shift_m, factor_to, matching_cells, mean_between
 
 RNG = np.random.default_rng(3)
 TRUE = np.exp(0.5 * RNG.standard_normal(20_000))

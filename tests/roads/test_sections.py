@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 import ridelog
 from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.sections import Windows, even_edges, federal_condition, sections
-from logger.roads.window_errors import WindowErrors
+from logger.roads.sections import WindowErrors, Windows, even_edges, federal_condition, sections
 
 NAN = float("nan")
 

@@ -8,8 +8,7 @@ import pytest
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope
 from logger.roads.repeated_drives import passes_of
-from logger.roads.sections import Windows, even_edges, sections
-from logger.roads.window_errors import ALONG_M, WindowErrors
+from logger.roads.sections import ALONG_M, WindowErrors, Windows, even_edges, sections
 
 WINDOW_M, COUNT, PARTS = 7.5, 120, 15  # of half a metre
 OWN, LEVEL, COMMON, PLACE = (np.linspace(*ends, COUNT) for ends in ((0.3, 0.7), (0.5, 0.2), (0.1, 0.1), (0.4, 0.6)))

@@ -13,16 +13,16 @@ from drivers.accelerometers.bma220 import Bma220Config
 from drivers.dump import DumpHeader, Event, open_dump
 from logger.errors import BadInput
 from logger.estimation.noise_belief import NoiseBelief
-from logger.service import receiver_learning, wiring
+from logger.service import wiring
 from logger.service.config import AUTO, AccelerometerConfig, Config, load_config
-from logger.service.noise_learning import (
-    FILE_NAME,
+from logger.service.learning import (
+    DELAY,
+    NOISE,
+    UNKNOWN,
     KnownNoise,
     NoiseLearning,
-    at_start,
-    from_fields,
-    header_fields,
-    read_learnt,
+    noise_at_start,
+    read_noise,
 )
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
@@ -75,7 +75,7 @@ def test_what_was_learnt_of_the_mean_of_several_readings_is_not_taken_for_that_o
     header = wiring.dump_header(config, None, KNOWN)
     assert header.accelerometer["noise"]["reads"] == 4
     assert wiring.noise_for_dump(header, config) == KNOWN
-    old = replace(header, accelerometer=header.accelerometer | {"noise": header_fields(KNOWN)})
+    old = replace(header, accelerometer=header.accelerometer | {"noise": NOISE.fields(KNOWN)})
     assert wiring.noise_for_dump(old, config) is None
     once = wiring.dump_header(config_of(settings.replace("4", "1"), tmp_path), None, KNOWN)
     assert "reads" not in once.accelerometer["noise"]
@@ -88,24 +88,24 @@ def test_a_setting_that_cannot_be_is_refused(tmp_path: Path, value: str) -> None
 
 
 def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
-    assert at_start(tmp_path, LEARNS) is None
+    assert noise_at_start(tmp_path, LEARNS) is None
     NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
-    first = read_learnt(tmp_path, LEARNS)
+    first = read_noise(tmp_path, LEARNS)
     assert first is not None
     assert (first.belief.noise_rms_mps2, first.drives) == (pytest.approx(0.2), 1)
-    begun = at_start(tmp_path, LEARNS)
+    begun = noise_at_start(tmp_path, LEARNS)
     assert begun is not None and begun.belief.log_std > first.belief.log_std
     NoiseLearning(tmp_path, LEARNT, LEARNS, begun).save()
-    again = read_learnt(tmp_path, LEARNS)
+    again = read_noise(tmp_path, LEARNS)
     assert again is not None and again.drives == 2
-    assert at_start(tmp_path, AccelerometerConfig(noise_mps2=0.15)) is None  # it is not to be learnt
+    assert noise_at_start(tmp_path, AccelerometerConfig(noise_mps2=0.15)) is None  # it is not to be learnt
 
 
 def test_of_a_sensor_that_is_set_otherwise_nothing_is_known(tmp_path: Path) -> None:
     NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
     ranged = replace(LEARNS, sections={**LEARNS.sections, "bma220": Bma220Config(range_g=8)})
-    assert read_learnt(tmp_path, ranged) is None
-    assert read_learnt(tmp_path, replace(LEARNS, driver="pasco")) is None
+    assert read_noise(tmp_path, ranged) is None
+    assert read_noise(tmp_path, replace(LEARNS, driver="pasco")) is None
 
 
 @pytest.mark.parametrize("drive", [NOTHING, Drive(None, 0)])
@@ -121,8 +121,8 @@ def test_nothing_learnt_writes_nothing(tmp_path: Path, drive: Drive) -> None:
     f'{{"noise_mps2": 1{"0" * 400}, "noise_std_mps2": 0.1}}', '["noise_std_mps2"]',
     '{"noise_mps2": 0.1, "noise_std_mps2": 0.1, "noise_drives": 1.5}', '{"noise_mps2": 0, "noise_std_mps2": 0.1}'])
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
-    (tmp_path / FILE_NAME).write_bytes(text.encode("latin-1"))
-    assert read_learnt(tmp_path, LEARNS) is None
+    (tmp_path / NOISE.file_name).write_bytes(text.encode("latin-1"))
+    assert read_noise(tmp_path, LEARNS) is None
 
 
 def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
@@ -135,7 +135,7 @@ def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
     assert wiring.noise_for_dump(header, Config(accelerometer=AccelerometerConfig(noise_mps2=0.2))) is None
     car = read_model(vehicle_file("rav4-2009"))
     facts = wiring.sidecar(config, wiring.instrument(LEARNS, KNOWN), car, noise=KNOWN)
-    assert from_fields(facts["noise"]) == from_fields(header_fields(KNOWN))
+    assert NOISE.from_fields(facts["noise"]) == NOISE.from_fields(NOISE.fields(KNOWN))
     first = wiring.dump_header(config)
     assert wiring.config_for_dump(first, None, None).accelerometer.noise_mps2 == AUTO
     assert wiring.noise_for_dump(first, config) is None
@@ -146,7 +146,7 @@ def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
 def test_a_recording_by_a_logger_that_did_not_learn_replays_with_what_it_took() -> None:
     """Such loggers said what they knew of the receiver, and of the noise only a number out of the settings. What says
     neither is by no logger: it is played as one would drive today."""
-    said = header_fields(KNOWN)
+    said = NOISE.fields(KNOWN)
     by_logger = {"baud": 9600, "latency_s": 0.1, "latency_std_s": 0.1, "latency_drives": 0}
     for gps, noise, setting in ((by_logger, {}, None), ({"baud": 9600}, {}, AUTO), (by_logger, {"noise": said}, AUTO),
                                 (by_logger, {"noise": {"noise_mps2": 0.2}}, 0.2)):
@@ -179,7 +179,7 @@ def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader
     core.finish()
     config = wiring.config_for_dump(auto, None, None).accelerometer
     NoiseLearning(tmp_path, pipeline, config, None).save()
-    learnt = read_learnt(tmp_path, config)
+    learnt = read_noise(tmp_path, config)
     assert learnt is not None
     assert abs(learnt.belief.log_mean - log(DRIVEN_MPS2)) < 2 * learnt.belief.log_std  # the belief is log-normal
 
@@ -188,12 +188,12 @@ def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader
 def test_a_recording_replays_with_what_its_drive_began_with(recorded: tuple[DumpHeader, list[Event]]) -> None:
     header, events = recorded[0], recorded[1][:20000]
     loud = KnownNoise(NoiseBelief(log(0.4), 0.02), 5)
-    said = replace(header, accelerometer={**header.accelerometer, "noise": header_fields(loud)})
+    said = replace(header, accelerometer={**header.accelerometer, "noise": NOISE.fields(loud)})
     rows = rows_of(said, events).rows
     assert rows == rows_of(said, events).rows
     assert rows != rows_of(header, events).rows
     usual = {**header.accelerometer, "noise": {"noise_mps2": 0.1}}
-    old = replace(header, gps={"baud": 9600, **receiver_learning.header_fields(receiver_learning.UNKNOWN)})
+    old = replace(header, gps={"baud": 9600, **DELAY.fields(UNKNOWN)})
     assert rows_of(replace(header, accelerometer=usual), events).rows == rows_of(old, events).rows
 
 

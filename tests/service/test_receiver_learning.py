@@ -15,16 +15,7 @@ from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import Belief, DelayEstimate
 from logger.service import wiring
 from logger.service.config import Config, GpsConfig
-from logger.service.learnt_file import SAVE_EVERY_US
-from logger.service.receiver_learning import (
-    FILE_NAME,
-    UNKNOWN,
-    ReceiverLearning,
-    at_start,
-    from_fields,
-    header_fields,
-    read_learnt,
-)
+from logger.service.learning import DELAY, SAVE_EVERY_US, UNKNOWN, ReceiverLearning, delay_at_start, read_delay
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 
@@ -58,41 +49,41 @@ AUTO, SET = GpsConfig(), GpsConfig(latency_s=0.25)
 
 
 def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
-    assert read_learnt(tmp_path) is None
-    assert at_start(AUTO, None) == UNKNOWN
+    assert read_delay(tmp_path) is None
+    assert delay_at_start(AUTO, None) == UNKNOWN
     ReceiverLearning(tmp_path, FOUND, UNKNOWN, None).save()
-    learnt = read_learnt(tmp_path)
+    learnt = read_delay(tmp_path)
     assert learnt is not None
     assert learnt.delay_s == pytest.approx(0.159, abs=0.001)
     assert learnt.std_s == pytest.approx(0.0148, abs=0.001)
     assert learnt.drives == 1
-    assert at_start(AUTO, learnt) == learnt
+    assert delay_at_start(AUTO, learnt) == learnt
     ReceiverLearning(tmp_path, FOUND, learnt, learnt).save()
-    again = read_learnt(tmp_path)
+    again = read_delay(tmp_path)
     assert again is not None
     assert again.drives == 2
     assert again.std_s < learnt.std_s
-    assert [path.name for path in tmp_path.iterdir()] == [FILE_NAME]
+    assert [path.name for path in tmp_path.iterdir()] == [DELAY.file_name]
 
 
 def test_a_delay_of_about_nothing_is_read_back(tmp_path: Path) -> None:
     before_the_sensor = Told(DelayEstimate(-0.02, 0.015))
     ReceiverLearning(tmp_path, before_the_sensor, UNKNOWN, None).save()
-    learnt = read_learnt(tmp_path)
+    learnt = read_delay(tmp_path)
     assert learnt is not None and learnt.delay_s == 0.0 and learnt.drives == 1
 
 
 def test_a_number_in_the_settings_counts_and_has_no_error() -> None:
-    assert at_start(SET, Belief(0.1, 0.01, 4)) == Belief(0.25, 0.0)
+    assert delay_at_start(SET, Belief(0.1, 0.01, 4)) == Belief(0.25, 0.0)
 
 
 def test_it_is_saved_now_and_then(tmp_path: Path) -> None:
     learning = ReceiverLearning(tmp_path, FOUND, UNKNOWN, None)
     learning.tend(0)
     learning.tend(SAVE_EVERY_US - 1)
-    assert read_learnt(tmp_path) is None
+    assert read_delay(tmp_path) is None
     learning.tend(SAVE_EVERY_US)
-    assert read_learnt(tmp_path) is not None
+    assert read_delay(tmp_path) is not None
 
 
 def test_nothing_learnt_writes_nothing(tmp_path: Path) -> None:
@@ -106,8 +97,8 @@ def test_nothing_learnt_writes_nothing(tmp_path: Path) -> None:
                                   f'{{"latency_s": 1{"0" * 400}, "latency_std_s": 0.1}}',
                                   '{"latency_s": 0.1, "latency_std_s": 0.0, "latency_drives": 1}'])
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
-    (tmp_path / FILE_NAME).write_bytes(text.encode("latin-1"))
-    assert read_learnt(tmp_path) is None
+    (tmp_path / DELAY.file_name).write_bytes(text.encode("latin-1"))
+    assert read_delay(tmp_path) is None
 
 
 def test_a_disk_that_refuses_is_tried_again(tmp_path: Path) -> None:
@@ -122,10 +113,10 @@ def test_a_disk_that_refuses_is_tried_again(tmp_path: Path) -> None:
     disk = Full()
     learning = ReceiverLearning(tmp_path, FOUND, UNKNOWN, None, disk)
     learning.save()
-    assert read_learnt(tmp_path) is None
+    assert read_delay(tmp_path) is None
     disk.refuses = False
     learning.save()
-    assert read_learnt(tmp_path) is not None
+    assert read_delay(tmp_path) is not None
 
 
 def test_a_recording_carries_what_its_drive_went_by() -> None:
@@ -150,7 +141,7 @@ def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> No
     with open_dump(short_dump) as reader:
         header, events = reader.header, list(reader)[:6000]
     header = replace(header, accelerometer={**header.accelerometer, "noise": {"noise_mps2": "auto"}})
-    learnt = replace(header, gps={**header.gps, **header_fields(Belief(0.25, 0.0, 3))})
+    learnt = replace(header, gps={**header.gps, **DELAY.fields(Belief(0.25, 0.0, 3))})
     rows = rows_of(learnt, events).rows
     assert rows == rows_of(header, events, config_of(header, SET)).rows
     assert rows != rows_of(header, events).rows
@@ -161,8 +152,8 @@ def test_a_sidecar_says_what_its_rows_went_by() -> None:
     car = read_model(vehicle_file("rav4-2009"))
     known = Belief(0.17, 0.02, 3)
     facts = wiring.sidecar(config, wiring.instrument(config.accelerometer), car, known)
-    assert from_fields(facts["receiver"]) == known
-    assert facts["receiver"] == header_fields(known)
+    assert DELAY.from_fields(facts["receiver"]) == known
+    assert facts["receiver"] == DELAY.fields(known)
 
 
 def test_status_says_it_in_words(tmp_path: Path) -> None:
@@ -174,11 +165,11 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
     assert first.endswith("learnt over 1 drive; from the next start on")
     assert ReceiverLearning(tmp_path, NOTHING, UNKNOWN, None).words() == \
         "0.14 +- 0.07 s, assumed: too little has been driven"
-    assert ReceiverLearning(tmp_path, NOTHING, at_start(SET, None), None).words() == "0.25 s by the settings"
+    assert ReceiverLearning(tmp_path, NOTHING, delay_at_start(SET, None), None).words() == "0.25 s by the settings"
 
 
 def test_a_wrong_number_and_a_loose_sensor_are_reported(tmp_path: Path) -> None:
-    (words,) = ReceiverLearning(tmp_path, FOUND, at_start(SET, None), None).notices()
+    (words,) = ReceiverLearning(tmp_path, FOUND, delay_at_start(SET, None), None).notices()
     assert "latency_s is 0.25 s in the settings" in words
     assert "set latency_s: auto" in words
     loose = Told(DelayEstimate(), ("it has tilted by 12 degrees 9 min after the drive began: fasten it",))

@@ -6,8 +6,7 @@ from collections import deque
 
 import pytest
 
-from drivers.accelerometers._bma220_chip import FILTER, RANGE, Bma220Chip
-from drivers.accelerometers.bma220 import Bma220Settings, chip_source
+from drivers.accelerometers.bma220 import FILTER, RANGE, Bma220Chip, Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.recorded_wires import RecordedBus
 from logger.service.main_loop import EventMerger, Listener, MainLoop

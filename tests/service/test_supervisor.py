@@ -6,8 +6,7 @@ import itertools
 
 import pytest
 
-from drivers.accelerometers._bma220_chip import Bma220Chip
-from drivers.accelerometers.bma220 import Bma220Settings, chip_source
+from drivers.accelerometers.bma220 import Bma220Chip, Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
 from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort

@@ -11,7 +11,7 @@ from scipy.signal import StateSpace, lsim
 
 from logger.profiles.excitation import Excitation
 from logger.runs import RecordFacts, Run, Signal
-from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import compose
 from logger.vehicle.vehicle import Axle, Vehicle
 

@@ -26,7 +26,7 @@ from logger.lab.another_car import POOR_ERROR
 from logger.lab.likelihood.priors import Tolerance
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import Model, read_model
 from logger.units import STANDARD_GRAVITY_MPS2

@@ -8,11 +8,11 @@ import pytest
 from logger.lab.unknown_road.likelihood import response_of
 from logger.runs import Signal
 from logger.shipped import vehicle_file
+from logger.simulation.virtual_drive import recorded_signals
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Parameter, RecordEffect, Recording, Scale, SensorEffect, chosen
 from logger.vehicle.linearise import known_car
-from logger.vehicle.observe import recorded_signals
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.simulate import Passage
 

@@ -16,13 +16,13 @@ from scipy.integrate import solve_ivp
 from logger.profiles.track import Track
 from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
+from logger.simulation.virtual_drive import observed
 from logger.store.formats.effect_file import own_effect, shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import structure_of
-from logger.vehicle.observe import observed
 from logger.vehicle.simulate import Passage, recorder_taps
 from logger.vehicle.stepping import march, static_tire_loads_n
 from logger.vehicle.structure import suspension_travel, wheel

@@ -38,9 +38,9 @@ from logger.api.road_sets import (
     windows_of,
 )
 from logger.errors import BadInput
-from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
-from logger.roads.agreement import best_shift_m, matching_cells, mean_between
+from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
 from logger.shipped import vehicle_path
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.record_file import MAX_BYTES

@@ -20,9 +20,9 @@ from logger.api.road_sets import REPEAT_COLUMNS, expected_files, from_folder, re
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
-from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
-from logger.roads.agreement import best_shift_m, matching_cells, mean_between
+from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
 from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
 
 Array = npt.NDArray[np.float64]

@@ -184,7 +184,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     from logger.identification.session import UnusableRun, error_before
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.lab.readings_fit import fit_to_readings
-    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.simulation.virtual_drive import SimulatedRuns
 
     word = word_of(question.vehicle, given)
     _check_effects(given, word, records, question)

@@ -30,7 +30,7 @@ from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment, screen
 from logger.runs import Array, Run
 from logger.shipped import vehicle_path
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import Model, Step

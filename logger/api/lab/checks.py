@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from logger.lab.another_car import AnotherCar
     from logger.lab.road_match import RoadMatch
     from logger.runs import Array, Bools, Run
-    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.simulation.virtual_drive import SimulatedRuns
     from logger.store.formats.drive_file import Drive, DriveOnRoad
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.compose import Car
@@ -229,7 +229,7 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
     """Where a run that does not follow its road would fit."""
     from logger.lab.road_match import better_placement
     from logger.profiles.track import Track
-    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.simulation.virtual_drive import SimulatedRuns
 
     track = run.track
     if not isinstance(track, Track):
@@ -268,7 +268,7 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
     from logger.profiles.track import Track
-    from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+    from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
     from logger.store.formats.drive_file import DRIVE
 
     for number, drive in enumerate(drives):

@@ -13,7 +13,7 @@ from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.runs import normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle

@@ -27,8 +27,7 @@ from logger.lab.likelihood.whittle import Bands, Whitener
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run, Signal
-from logger.simulation.simulated_runs import SimulatedRuns
-from logger.simulation.virtual_drive import Obstacle, at_one_speed, motion_along, with_obstacles
+from logger.simulation.virtual_drive import Obstacle, SimulatedRuns, at_one_speed, motion_along, with_obstacles
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.effect import Chosen
 from logger.vehicle.models import structure_of

@@ -22,7 +22,7 @@ from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import screen
 from logger.lab.selection.stepwise import Search, Selection
 from logger.runs import LowPass
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Misalignment
 from logger.vehicle.effects.sensor_bandwidth import SensorBandwidth
 

@@ -33,9 +33,8 @@ from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import AXES, Config
 from logger.service.event_core import EventCore
+from logger.service.learning import KnownNoise, delay_at_start
 from logger.service.main_loop import EventMerger
-from logger.service.noise_learning import KnownNoise
-from logger.service.receiver_learning import at_start
 from logger.service.signal_chain import Axis
 from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.log_writer import ClockMap
@@ -154,7 +153,7 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief
     instrument = wiring.instrument(config.accelerometer, noise)
     rows = _Rows()
     # As the service began, not as the recording: the header's delay is that of another drive.
-    belief = at_start(config.gps, receiver)
+    belief = delay_at_start(config.gps, receiver)
     pipeline = wiring.pipeline(config, instrument, read_on_board(config.vehicle), belief)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:

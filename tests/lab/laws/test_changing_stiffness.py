@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from logger.lab.laws.families.changing_stiffness import _draft
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Axle

@@ -11,7 +11,7 @@ import pytest
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.changing_with_speed import FAMILY
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Axle, Vehicle

@@ -10,7 +10,7 @@ import pytest
 
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.extension_stop import FAMILY
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import ForceEffect, chosen
 from logger.vehicle.laws import Seen, linear

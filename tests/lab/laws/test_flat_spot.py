@@ -10,7 +10,7 @@ import pytest
 from logger.lab.laws.draft import Draft, LawContext
 from logger.lab.laws.families.flat_spot import FAMILY, _draft
 from logger.lab.likelihood.map_fit import align
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.hung_mass import FAMILY
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.vehicle import Axle

@@ -15,7 +15,7 @@ from logger.lab.laws.learn import screen_law
 from logger.lab.laws.repeating import EACH
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 

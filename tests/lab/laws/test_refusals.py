@@ -20,7 +20,7 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.screening import Baseline
 from logger.plugins import catalogue
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.uncertain import NumberErrors
 

@@ -12,7 +12,7 @@ import pytest
 
 from logger.lab.likelihood.lag import WINDOW_S, Trend, constant_lag, lag_drift, lags, offset_by_lag_m
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, measuring

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from logger.runs import RecordFacts
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.secret_runs import FINE_HZ, hidden, posterior_of, secret_runs
 

@@ -21,7 +21,7 @@ from logger.lab.likelihood.record_band import (
 )
 from logger.lab.likelihood.whittle import Bands
 from logger.runs import LowPass, RecordFacts, Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 

@@ -14,7 +14,7 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.repeats import find_repeats
 from logger.profiles.excitation import Excitation
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 
 from ...support.lab.runs_with_residual import CAR, a_run

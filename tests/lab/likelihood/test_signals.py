@@ -14,7 +14,7 @@ from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import JointBands, by_signal
 from logger.lab.likelihood.whittle import Bands
 from logger.runs import RecordFacts, Run, Signal, signal_errors
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 
 from ...support.lab.noisy_runs import still_runs

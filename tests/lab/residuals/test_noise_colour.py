@@ -12,7 +12,7 @@ from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.growing_power import growing_power, steady_power
 from logger.lab.residuals.noise_colour import is_monotonic, rising_levels
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.runs_with_residual import measuring
 from ...support.lab.secret_runs import EFFECTS, FINE_HZ, hidden, posterior_of, secret_runs

@@ -12,7 +12,7 @@ from logger.api.lab.compare import comparison_json, conclusion, evidence, headli
 from logger.lab.compare import Comparison, compare
 from logger.lab.likelihood.record_band import with_pass_bands
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.runs_with_residual import CAR, beside_with, measuring
 

@@ -19,7 +19,7 @@ from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
 from logger.lab.residuals.road_coherence import coherence_with_road
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 from ...support.slow import slow

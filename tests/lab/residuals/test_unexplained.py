@@ -11,7 +11,7 @@ from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import shape_of, spatial_line_of
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 
 from ...support.lab.runs_with_residual import CAR, a_run, beside_with, measuring

@@ -15,7 +15,7 @@ from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number, ad
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.runs import normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import read

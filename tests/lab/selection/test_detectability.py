@@ -8,7 +8,7 @@ import pytest
 from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, undetectable_effects
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 

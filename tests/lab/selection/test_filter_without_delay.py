@@ -15,7 +15,7 @@ from logger.lab.diagnosis import diagnose, search_effects
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.stepwise import Search, Selection
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.secret_runs import EFFECTS, posterior_of, secret_runs
 

@@ -21,7 +21,7 @@ from logger.lab.selection.screening import (
     without_distance_trend,
     without_effect,
 )
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Misalignment
 
 from ...support.lab.runs_with_residual import CAR

@@ -16,7 +16,7 @@ from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.screening import Baseline, misalignment, screen
 from logger.lab.selection.stepwise import Round, Search, Selection
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Misalignment, chosen
 
 from ...support.lab.runs_with_residual import CAR

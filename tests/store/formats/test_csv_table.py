@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from logger.errors import BadInput
-from logger.store.formats.channel_file import read_channels
 from logger.store.formats.csv_table import columns_of, parse_columns, place
 from logger.store.formats.drive_file import header_of, read_drive, read_speeds
 from logger.store.formats.logger_csv import named_columns, read_header, read_table, recognised
 from logger.store.formats.profile_file import read_excitation, read_places, read_profile
+from logger.store.formats.record_checks import read_channels
 from logger.store.formats.record_file import read_record
 
 N = np.arange(12)

@@ -18,8 +18,7 @@ from drivers.errors import DumpError
 from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.integrity import verify
-from logger.store.log.disk_quota import QuotaLimits
-from logger.store.log.dump_recording import repair_recordings
+from logger.store.log.disk_quota import QuotaLimits, repair_recordings
 from logger.store.log.log_writer import ClockMap, next_session, read_sidecar, repair
 from logger.store.log.row_format import format_row, parse_row, read_log
 

@@ -25,7 +25,7 @@ import serial
 import smbus2
 
 from drivers import sources
-from drivers.accelerometers._bma220_chip import REGISTER_STEP, Bma220Chip
+from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220Chip
 from drivers.hardware import Machine
 from logger.commands import main
 from logger.service import main_loop, serve, supervisor

@@ -19,8 +19,18 @@ from unittest.mock import patch
 
 import numpy as np
 
-from drivers.accelerometers._bma220_chip import AXES, CHIP_ID, FILTER, RANGE, WATCHDOG, Bma220Chip
-from drivers.accelerometers.bma220 import RANGE_CODES, Bma220Config, Bma220Settings, chip_source
+from drivers.accelerometers.bma220 import (
+    AXES,
+    CHIP_ID,
+    FILTER,
+    RANGE,
+    RANGE_CODES,
+    WATCHDOG,
+    Bma220Chip,
+    Bma220Config,
+    Bma220Settings,
+    chip_source,
+)
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
 from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort

@@ -21,7 +21,7 @@ from logger.api.datasets.lira_map import ProfilerPass
 from logger.errors import BadInput
 from logger.files import json_sha256
 from logger.fleet.dataset import Dataset
-from logger.service import noise_learning, receiver_learning
+from logger.service import learning
 from logger.service.config import Config
 from logger.service.status import read_status
 from logger.store.export.manifest import Manifest, list_blocks, manifest_blocks, read_manifest
@@ -266,12 +266,12 @@ def _sealed(name: str, text: str) -> str:
 def _small(name: str, path: Path) -> Hashable:
     match name:
         case "receiver-delay":
-            found = receiver_learning.read_learnt(path.parent)
+            found = learning.read_delay(path.parent)
             promise(found is None or (isfinite(found.delay_s) and isfinite(found.std_s)), "a delay that is none")
             return found is None
         case "sensor-noise":
             try:
-                known = noise_learning.from_fields(json.loads(path.read_text()))
+                known = learning.NOISE.from_fields(json.loads(path.read_text()))
             except ValueError:
                 return "refused"
             return known is None or isfinite(known.belief.noise_rms_mps2)

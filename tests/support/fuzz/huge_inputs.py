@@ -23,9 +23,9 @@ from drivers.errors import DriverError
 from drivers.wire_profiles import load_profile
 from logger.errors import BadInput
 from logger.service.config import load_config
-from logger.store.formats.channel_file import read_channels
 from logger.store.formats.drive_file import read_run
 from logger.store.formats.profile_file import read_profile
+from logger.store.formats.record_checks import read_channels
 from logger.store.formats.record_file import read_record
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.integrity import verify

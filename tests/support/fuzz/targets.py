@@ -30,9 +30,9 @@ from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import load_config
 from logger.service.wiring import config_for_dump
-from logger.store.formats.channel_file import read_channels
 from logger.store.formats.drive_file import read_run
 from logger.store.formats.profile_file import read_profile
+from logger.store.formats.record_checks import read_channels
 from logger.store.formats.record_file import read_record
 from logger.store.formats.vehicle_file import read_vehicle, write_vehicle
 from logger.store.integrity import verify

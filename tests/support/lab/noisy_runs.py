@@ -12,7 +12,7 @@ from logger.lab.likelihood.distance_error import ErrorSize
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 
 from .runs_with_residual import CAR, a_run, measuring

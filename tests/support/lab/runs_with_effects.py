@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import write_drive, write_profile
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose

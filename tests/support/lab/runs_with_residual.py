@@ -12,7 +12,7 @@ from logger.lab.residuals.breakdown import ModelResiduals
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 

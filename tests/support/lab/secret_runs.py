@@ -11,7 +11,7 @@ import numpy.typing as npt
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
