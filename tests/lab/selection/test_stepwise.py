@@ -205,7 +205,7 @@ def test_a_bracket_and_a_bending_body_are_distinguished_though_one_can_take_the_
     bracket = hidden("sensor_mount_resonance", frequency_hz=29.6, damping_ratio=0.05)
     bending = hidden("body_bending", frequency_hz=14.7, damping_ratio=0.057, participation=-0.15)
     selection = search(("sensor_mount_resonance", "body_bending", "sensor_gain")).run(
-        base_of(secret_runs([bracket, bending], lasts_s=20.0)))
+        base_of(secret_runs([bracket, bending], lasts_s=14.0)))
     values = {one.effect.name: one.values["frequency_hz"] for one in selection.now.state.effects}
     assert values == pytest.approx({"sensor_mount_resonance": 29.6, "body_bending": 14.7}, rel=0.01)
 
@@ -215,7 +215,7 @@ def test_a_bracket_and_a_bending_body_are_distinguished_though_one_can_take_the_
 def test_a_wrong_speed_and_a_late_clock_are_both_found_though_either_alone_gains_little(
         scale: float, delay_s: float) -> None:
     both = [hidden("speed_scale", scale=scale), hidden("time_offset", delay_s=delay_s)]
-    base = base_of(secret_runs(both, lasts_s=20.0))
+    base = base_of(secret_runs(both, lasts_s=14.0))
     seen = misalignment(base.posterior, base.posterior.start())
     names = ("speed_scale", "time_offset", "sensor_gain")
     selection = Search([EFFECTS[name] for name in names], 0, seen).run(base)
