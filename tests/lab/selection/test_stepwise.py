@@ -184,7 +184,7 @@ ROUGHER = {"progressive_spring": 2.0, "bump_stop": 2.0, "wheel_lift": 6.0}
 @pytest.mark.parametrize("name", ALONE)
 def test_every_effect_is_found_where_it_is_what_is_missing(name: str) -> None:
     there = chosen(EFFECTS[name], EFFECTS[name].usual | STRONGER.get(name, {}))
-    runs = secret_runs([there], rougher=ROUGHER.get(name, 1.0), lasts_s=20.0)
+    runs = secret_runs([there], rougher=ROUGHER.get(name, 1.0), lasts_s=15.0)
     found = diagnose(posterior_of(runs), {one: EFFECTS[one] for one in {name, *FEW}})
     assert found.verdict == (name,) and not found.unexplained
 
