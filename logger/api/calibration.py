@@ -9,30 +9,28 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.drive_questions import CalibrateQuestion
 from logger.api.question import Notify, function
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model
+from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.errors import BadInput
-from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration
+from logger.estimation import rms_calibration
+from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration, loaded
 from logger.files import write_text
+from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_path
 from logger.store.formats import vehicle_file
+from logger.store.formats.vehicle_file import find, fingerprint, keep, places
 from logger.units import MPH_MPS
+from logger.vehicle.effect import Chosen
+from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-    from logger.vehicle.effect import Chosen
-
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +84,6 @@ class Calibration(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """IRI per r.m.s. acceleration over the speed, of whole roads and of windows."""
-        from logger.chart_data import Curves, Line
-
         return [Curves("Calibration", "speed [m/s]", "IRI per r.m.s. [m/km per m/s2]", tuple(
             Line(name, self.speed_mps, one.slope, one.slope * one.spread)
             for name, one in (("roads", self.iri_per_accel_rms), ("windows", self.window_iri_per_accel_rms))))]
@@ -119,9 +115,6 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Calibrate
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
     """
-    from logger.estimation.rms_calibration import loaded
-    from logger.service.signal_chain import recorder_gain
-
     try:
         settings = CalibrationSettings(window_m=question.window_m, seed=question.seed)
     except ValueError as error:
@@ -155,10 +148,6 @@ class _Ask:
 
 def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
     """The stored calibration of this vehicle, or a new one, which is then stored."""
-    from logger.estimation import rms_calibration
-    from logger.store.formats.vehicle_file import find, fingerprint, keep, places
-    from logger.vehicle.linearise import known_vehicle
-
     kept_in = () if ask.path is None else places(ask.path)
     key = fingerprint(vehicle, ask.gain, ask.settings, ask.effects)
     found = None if ask.recompute else find(kept_in, key)

@@ -21,7 +21,7 @@ from logger.api.question import Notify, function, named_numbers, silent
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import car_on, model_of
-from logger.chart_data import line
+from logger.chart_data import Array, line
 from logger.errors import BadInput
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
 from logger.estimation.road_profile import RESOLVED_SHARE
@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.estimation.sensor_noise import Sensor
     from logger.profiles.track import Track
-
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,7 +26,7 @@ from logger.api.drives import read_run
 from logger.api.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
-from logger.chart_data import line
+from logger.chart_data import Array, line
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.modal.mode import FoundMode, ModalResult
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
 
 
-Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _ONLY_DECAYS = ("era", "decrement")

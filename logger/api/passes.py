@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,15 +25,17 @@ import numpy.typing as npt
 from logger.api.log_questions import PassesQuestion, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
-from logger.chart_data import Array
+from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
+from logger.exchange.format import write_layer
 from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title
+from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
 from logger.report.page import number_button, page
-from logger.report.placed import column, iri_errors, placed, trace_of
+from logger.report.placed import column, iri_errors, of_passes, placed, trace_of
 from logger.report.quantities import known
 from logger.report.summary import comfort_words, counts
 from logger.roads.iso8608 import iri_class
@@ -54,14 +56,10 @@ from logger.roads.repeated_drives import (
 )
 from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
-from logger.roads.sections import FAIR_TO_IN_PER_MI, WindowErrors
-from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives, utc
+from logger.roads.sections import FAIR_TO_IN_PER_MI
+from logger.roads.window_errors import WindowErrors
+from logger.store.log.log_reader import LoggedFile, find_logs_in, iso_utc, read_found, split_drives, utc
 from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-
-
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,8 +86,6 @@ class RepeatedDrives(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the way that most cells lie on."""
-        from logger.chart_data import Curves, Line
-
         longest = max(chains(self._found), key=len, default=None)
         if longest is None:
             return []
@@ -99,8 +95,6 @@ class RepeatedDrives(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the cells, or the places to visit, in the format of the file's ending."""
-        from logger.exchange.format import write_layer
-
         write_layer(self.visits() if option == "--visit" else self.layer(), path)
 
     def layer(self) -> Layer:
@@ -123,10 +117,6 @@ def _day_s(day: str) -> float:
 
 def combined(question: PassesQuestion) -> RepeatedDrives:
     """The answer to ``PassesQuestion``, which says what is raised."""
-    from logger.left_out import left_out_json, left_out_paragraph
-    from logger.report.placed import of_passes
-    from logger.store.log.log_reader import find_logs_in, read_found
-
     since, until, places = question.since, question.until, question.places
     first_s, end_s = -np.inf if since is None else _day_s(since), np.inf if until is None else _day_s(until)
     above_m_per_km = question.above_m_per_km or FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM

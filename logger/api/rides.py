@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import welch
 
 from logger.api.drive_questions import ComfortQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
 from logger.api.weightings import weighting_named, weightings
-from logger.chart_data import Chart, Curves, Line, line
+from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.comfort import iso2631
 from logger.comfort.iso2631 import (
     COMFORT_FACTORS,
@@ -41,8 +40,6 @@ from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
 from logger.store.formats.drive_file import facts_beside
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
-
-Array = npt.NDArray[np.float64]
 
 Given = record_file.AccelerationRecord | drive_file.Drive | Path | str
 _SPECTRUM_S = 5.12

@@ -21,29 +21,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from logger.api.csv_extraction import CsvSettings, extract_csv
-from logger.api.drives import assessed, read_run, sensor_of
+from logger.api.drives import Run, assessed, read_run, sensor_of
 from logger.api.extraction import read_measured_profile
-from logger.chart_data import Curves, Line
+from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine, passes
 from logger.roads.repeated_drives import Agreement, agreement, factor_to
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.logger_csv import named_columns
-from logger.store.formats.vehicle_file import read_model
+from logger.store.formats.vehicle_file import Model, read_model
 from logger.studies.study import Cell, Column, Result, Table, Workload
-
-if TYPE_CHECKING:
-    from logger.api.drives import Run
-    from logger.store.formats.vehicle_file import Model
-
 
 NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and claim nothing of them."
 
@@ -75,7 +69,6 @@ def expected_files(folder: Path, pattern: str, what: str) -> list[Path]:
     return found
 
 
-Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 WINDOWS_M = (10.0, 100.0)

@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.drive_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
-from logger.chart_data import Chart, Curves, Line, line
+from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.report.quantities import area_lines, area_values
@@ -33,8 +32,6 @@ from logger.roads.plausible import doubts_of, spacing_hint, unit_complaint, unit
 from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
 from logger.units import WINDOW_M
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -24,20 +24,23 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
+from logger.exchange.format import write_layer
 from logger.exchange.layer import Attribute, Feature, Kind, Layer, chained, geometries, group_name, iri_title
+from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
 from logger.records import WindowRecord
-from logger.report.placed import column, iri_errors, placed, trace_of
+from logger.report.placed import column, iri_errors, of_sections, placed, trace_of
 from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_values, known
 from logger.report.summary import counts, expected_square
 from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
-from logger.roads.road_matching import ALONG, on_route
+from logger.roads.road_matching import ALONG, measures, on_route, route_network
 from logger.roads.road_network import RoadNetwork
 from logger.roads.sections import FEDERAL_WORDS, Windows, even_edges, federal_condition
 from logger.roads.sections import Sections as RoadSections
 from logger.roads.sections import sections as in_sections
-from logger.store.log.log_reader import LoggedFile, iso_utc, split_drives
+from logger.store.formats.road_lines import read_route
+from logger.store.log.log_reader import LoggedFile, find_logs_in, iso_utc, read_found, split_drives
 from logger.units import FOOT_M, MILE_M
 
 
@@ -75,8 +78,6 @@ class Sections(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the rows in the format of the file's ending."""
-        from logger.exchange.format import write_layer
-
         write_layer(self.layer(), path)
 
     def layer(self) -> Layer:
@@ -86,10 +87,6 @@ class Sections(CommandResult):
 
 def sections_of(question: SectionsQuestion) -> Sections:
     """The answer to ``SectionsQuestion``, which says what is raised."""
-    from logger.left_out import left_out_json, left_out_paragraph
-    from logger.report.placed import of_sections
-    from logger.store.log.log_reader import find_logs_in, read_found
-
     length_m, route, places = length_of(question.length), question.route, question.places
     units, localized_m_per_km = question.units, question.localized_m_per_km
     files = read_found(find_logs_in(places))
@@ -112,9 +109,6 @@ sections = function("sections", SectionsQuestion, sections_of)
 
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
-    from logger.roads.road_matching import measures, route_network
-    from logger.store.formats.road_lines import read_route
-
     route = read_route(path)
     try:
         measure_m = measures(route.lat_deg, route.lon_deg, route.begin_m, route.end_m,

@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.catalogue import names
 from logger.chart_data import Chart
@@ -136,7 +135,6 @@ def word_of(checks: Iterable[Check]) -> Word:
     return next((one for one in Word if one in words), Word.NOT_REPRODUCIBLE)
 
 
-Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 Cell = str | float | None
 

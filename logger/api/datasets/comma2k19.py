@@ -11,16 +11,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.road_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
-from logger.chart_data import Curves, Line
+from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.iso8608 import iri_class
 from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
-
-Array = npt.NDArray[np.float64]
 
 _CAR = "rav4-2009"
 _WINDOW_M = 25.0

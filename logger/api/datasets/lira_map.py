@@ -14,18 +14,15 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.road_sets import REPEAT_COLUMNS, expected_files, from_folder, repeat_row
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
-from logger.chart_data import Curves, Line
+from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
 from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
-
-Array = npt.NDArray[np.float64]
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
 _COLUMNS = ("timestamp", "value", "lat", "lng")

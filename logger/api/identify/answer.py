@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
@@ -25,7 +24,7 @@ from logger.api.lab.checks import check_roads
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
-from logger.chart_data import Bars, Chart, Curves, Line
+from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
@@ -47,8 +46,6 @@ if TYPE_CHECKING:
     from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
     from logger.vehicle.uncertain import NumberErrors
 
-
-Array = npt.NDArray[np.float64]
 
 USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.lab.bench import Bench, bench_with, slow_words
 from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuestion
@@ -348,8 +347,6 @@ def _place(part: Part, run: str) -> str:
     name = f"  {run}, {part.low:g} to {part.high:g} m"
     return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{error_text(part, 3):>8}"
 
-
-Array = npt.NDArray[np.float64]
 
 _BODY_HZ = 5.0
 _QUIET_DB = -80.0

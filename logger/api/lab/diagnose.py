@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.drives import Run
 from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, word_of
@@ -34,7 +33,7 @@ from logger.api.lab.words import looks_like as residual_looks_like
 from logger.api.question import Notify, Runs, each, function, silent
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
-from logger.chart_data import Bars, Curves, Line
+from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.lab.diagnosis import Diagnosis as LabDiagnosis
@@ -69,8 +68,6 @@ from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
 from logger.vehicle.effect import Chosen
-
-Array = npt.NDArray[np.float64]
 
 _SHOWN = 8
 _PLACES_EVERY_M = 10.0
