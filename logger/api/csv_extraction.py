@@ -1,10 +1,9 @@
 """CSV recordings of phones and other loggers into runs, as the lab reads them.
 
 Problem: such a recording has its own names, units and axes, an uneven clock, and was made by a phone that lay anyhow.
-Solution: columns are recognised or named (``store.formats.logger_csv``), the time is repaired
-(``extraction.even_samples``), gravity shows up and the unit (``extraction.even_samples``); what is left is cut, laid on
-a profile and written as a dump is (``api.extracted_runs``). What cannot be known is refused, with the option that says
-it.
+Solution: columns are recognised or named (``store.formats.logger_csv``), the time is repaired, and gravity shows up and
+the unit (``extraction.even_samples``); what is left is cut, laid on a profile and written as a dump is
+(``api.extraction``). What cannot be known is refused, with the option that says it.
 
 Speed and place out of the CSV files of a logger: fixes, and how late they are.
 """

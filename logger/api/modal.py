@@ -1,12 +1,7 @@
-"""The modes of the structure, or the vehicle, that a record was made on.
+"""The modes of the structure, or the vehicle, that a record was made on, with their words and JSON.
 
-Modes of a car out of a drive: its file, its speed and the vehicle, put before the fit.
-
-Vibration records of many sensors, and what is asked of them.
-
-Modes of a vibration record, for a person and for a program.
-
-The model building of the reference dissertation: its modes out of its matrices, and out of simulated records.
+Vibration records of many sensors; a car's modes out of a drive, from its file, its speed and the vehicle; and the model
+building of the reference dissertation, out of its matrices and of simulated records.
 """
 
 from __future__ import annotations

@@ -1,12 +1,6 @@
-"""Repeated drives of logs, combined by place and direction.
+"""Repeated drives of logs, combined by place and direction: means of cells of the road, what changed, places to visit.
 
-Repeated drives of logs, combined: means of cells of the road, what changed, and places to visit.
-
-Repeated drives in words, and as JSON.
-
-Repeated drives as layers for other programs: the means of cells as lines, places to visit as points.
-
-Repeated drives as a page: the report's map and curves of the means, and the places to visit.
+Figures, words and JSON, layers for other programs (cells as lines, places as points), and the page.
 """
 
 from __future__ import annotations

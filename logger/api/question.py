@@ -1,11 +1,4 @@
-"""Ranges of what may be asked, at a terminal and in Python alike.
-
-What the annotation of a field lets a value be, and the complaint about another one.
-
-Annotations name classes that are not loaded (``Union["Model", Path, str]``): an object of one is known by the names of
-its class and of those that it inherits from.
-
-What a verb is asked, declared once.
+"""What a verb is asked, declared once.
 
 Problem: an option of a verb was declared four times, for the terminal, for Python, in the checks and in the help, and
 the four came apart. Solution: a frozen dataclass for each verb, whose annotations carry range, unit and help::
@@ -16,7 +9,8 @@ the four came apart. Solution: a frozen dataclass for each verb, whose annotatio
 The arguments of the command line (``logger.commands.options``), the function in Python (``function``), the checks
 (``Question``) and the reference are read from it. Modules with questions load nothing heavy.
 
-Fields that the questions of several verbs have in common.
+Annotations name classes that are not loaded (``Union["Model", Path, str]``): an object of one is known by the names of
+its class and of those that it inherits from. Ranges, and fields that several verbs share, stand here too.
 """
 
 

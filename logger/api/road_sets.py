@@ -1,4 +1,6 @@
-"""Studies of public records of real roads: what a folder has to hold, and what is said where it does not.
+"""What the studies of public records of real roads share.
+
+Studies of public records of real roads: what a folder has to hold, and what is said where it does not.
 
 Every file of ``logger/api/datasets`` knows one set and offers a study of it: it reads the folder that a person
 downloaded and compares what ridelog says of the car's acceleration with what a profiler measured. Nothing of a set is

@@ -1,11 +1,4 @@
-"""Roads: measured profiles, random ones, and their International Roughness Index.
-
-The IRI of a profile, for a person and for a program.
-
-The class of a road, for a person and for a program.
-
-Areas of localized roughness, for a person and for a program.
-"""
+"""Roads: measured profiles and random ones, their IRI and their class (ISO 8608), each with its words and JSON."""
 
 from __future__ import annotations
 

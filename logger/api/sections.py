@@ -1,10 +1,6 @@
-"""Logs in sections of road, as agencies file them.
+"""Logs in sections of road of one length, as road agencies file them: figures, words and JSON, and a layer for maps.
 
-Drives of logs in sections of one length, and their places as a layer for other programs.
-
-Sections of logs in words, and as JSON.
-
-Sections of drives as a layer for other programs: a line each, of the windows whose middles lie in it.
+On a layer a section is a line, of the windows whose middles lie in it.
 """
 
 from __future__ import annotations

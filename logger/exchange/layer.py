@@ -1,6 +1,6 @@
-"""Lines on the ground, in the order of maps: longitude before latitude, cut at the 180th meridian.
+"""What other programs are given: layers of rows with values and places, and their geometry.
 
-What other programs are given: rows with values and places, in any of the formats.
+Lines on the ground, in the order of maps: longitude before latitude, cut at the 180th meridian.
 
 Geometries as well-known binary (OGC 06-103r4, section 8): little-endian, longitude before latitude.
 

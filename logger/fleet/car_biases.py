@@ -1,4 +1,6 @@
-"""Least squares with a level and a growth for each road and a bias for each car, the roads eliminated.
+"""Biases of cars, and the least squares behind them.
+
+Least squares with a level and a growth for each road and a bias for each car, the roads eliminated.
 
 Roads are many, and a block each; cars are few. So what is solved has as many rows as there are cars, and one for the
 growth that all roads share. A road's own growth beyond that is drawn towards zero by a ridge (a random effect: C. R.

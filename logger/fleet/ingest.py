@@ -1,4 +1,6 @@
-"""Cars by a pseudonym: the keyed hash of a name (HMAC-SHA-256, RFC 2104), whose key lies beside the dataset.
+"""From logs to the rows of a dataset.
+
+Cars by a pseudonym: the keyed hash of a name (HMAC-SHA-256, RFC 2104), whose key lies beside the dataset.
 
 Who has the dataset alone cannot tell which car is which, nor try names. Its owner reads names: beside the key lies a
 table of them, by pseudonym. The number has 63 bits: among a million cars the chance of two alike is one in ten million.

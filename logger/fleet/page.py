@@ -1,4 +1,6 @@
-"""Figures of a fleet in words and as JSON.
+"""What a fleet's owner sees: words, layers, tiles, page and folder.
+
+Figures of a fleet in words and as JSON.
 
 Figures of roads as a layer for the formats of other programs: a line each, or a point for what has no direction.
 

@@ -1,4 +1,6 @@
-"""An integer for a piece of road without a map: a cell of the ground, and the direction driven.
+"""Integers for pieces of road, without a map and with one.
+
+An integer for a piece of road without a map: a cell of the ground, and the direction driven.
 
 Problem: rows of many drives over one place have to meet in a grouping, which is quick by an integer and slow by
 geometry. Solution: the ground in cells of 0.1 mi / 8 = 66 ft, eight directions in each. A key reads from its highest

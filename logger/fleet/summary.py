@@ -1,4 +1,6 @@
-"""The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
+"""From passes to figures: expressions, the statistics of roads, and the summary.
+
+The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
 
 Three groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and
 time. ``passes_by_session``: means by session, of a part of the roads, from which the biases of cars follow.

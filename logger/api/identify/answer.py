@@ -1,10 +1,7 @@
 """Vehicle parameters, and those of effects and roads, from drives: a grey-box prediction-error fit.
 
-A fit in plain words: what was found, how sure it is, and whether to believe it.
-
-A fit without a measured road, in plain words and for a program.
-
-A fit as pictures: its residuals, and which numbers can be estimated only together.
+The answer, and a fit on measured roads or without one in plain words and for a program: what was found, how sure it is,
+whether to believe it; as pictures its residuals, and which numbers can be estimated only together.
 """
 
 from __future__ import annotations
