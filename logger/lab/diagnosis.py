@@ -175,7 +175,8 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
     before = refit(posterior, nominal)
-    search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers, effort or Effort())
+    search: Search[Baseline, Screened, CandidateFit] = Search(tried, len(present), misalignment(posterior, nominal),
+                                                              progress, workers, effort or Effort())
     return search, search.run(before)
 
 

@@ -101,6 +101,11 @@ class Baseline:
         """The fitted state."""
         return self.linear.state
 
+    @property
+    def effects(self) -> tuple[Chosen, ...]:
+        """The effects of the model."""
+        return self.state.effects
+
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""

@@ -13,12 +13,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
-from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.posterior import Posterior
 from logger.lab.residuals.noise_colour import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain, probability_by_chance
@@ -61,16 +62,161 @@ class Effort:
     round_share: float = 0.02
 
 
+class Model(Protocol):
+    """A fitted model that effects are sought on top of.
+
+    score          minus twice the log of its evidence, over any one for all models of a search
+    explanation    gain of a full explanation of what it leaves
+    effects        with their values
+    hold_out       on data that no fit saw
+    """
+
+    @property
+    def score(self) -> float: ...
+
+    @property
+    def explanation(self) -> float: ...
+
+    @property
+    def effects(self) -> tuple[Chosen, ...]: ...
+
+    @property
+    def hold_out(self) -> HoldOut: ...
+
+
+class Promise(Protocol):
+    """An effect that was screened, and its expected gain, its numbers not counted."""
+
+    @property
+    def effect(self) -> Effect: ...
+
+    @property
+    def gain(self) -> float: ...
+
+
+class Fitted(Protocol):
+    """A fit of a model with one more effect, its last, and by how much its score is below that of the model without."""
+
+    @property
+    def effect(self) -> Effect: ...
+
+    @property
+    def chosen(self) -> Chosen: ...
+
+    @property
+    def gain(self) -> float: ...
+
+
+M = TypeVar("M", bound=Model)
+P = TypeVar("P", bound=Promise)
+F = TypeVar("F", bound=Fitted)
+
+
+class Likelihood(Protocol[M, P, F]):
+    """What a search asks of a likelihood: of drives over a measured road, or over one that is integrated out."""
+
+    def screened(self, base: M, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+                 pool: ThreadPoolExecutor, progress: Progress) -> list[P]:
+        """Effects screened on a model, the largest gain first; ``near`` are values of one in whose place they are
+        tried, ``seen`` how the runs are misaligned."""
+
+    def laid_anew(self, base: M) -> M | None:
+        """The model for effects that shift runs, where what they do may have been taken for a distance error."""
+
+    def stripped(self, now: M, name: str) -> M | None:
+        """The model without one of its effects, all other numbers unchanged; None: it is the fitted one."""
+
+    def without(self, now: M, name: str) -> M:
+        """The model without one of its effects, fitted."""
+
+    def fitted_roughly(self, score: float, base: M, one: P) -> list[F]:
+        """Rough fits of an effect on a model, best first; gains are counted from a score."""
+
+    def refined(self, base: M, one: F, least: float) -> F:
+        """A rough fit that goes on until a round gains less than this; its gain is counted from a model."""
+
+    def with_effect(self, one: F) -> M:
+        """The model with one more effect, fitted in full."""
+
+    def chance(self, one: Chosen, gain: float, base: M, candidates: int) -> float:
+        """Probability, at most, that noise alone gains as much over a model with any of so many candidates."""
+
+    def is_doubtful(self, base: M, one: F) -> bool:
+        """Whether a fit is at an end of its range, beyond what the records show, or predicts no better."""
+
+    def leaves_noise(self, there: M | F) -> bool:
+        """Whether what is left is noise though it is louder than expected."""
+
+
+class MeasuredRoad:
+    """The likelihood of drives over a road that was measured."""
+
+    def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+                 pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
+        """Effects screened by simulations at their trial values."""
+        misaligned = [seen]
+        if base.state.size.is_unusually_large:
+            misaligned.append(misalignment_of_record(base))
+        found = []
+        for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
+            progress(f"screened {done} of {len(effects)} effects")
+            found.append(one)
+        return sorted(found, key=lambda one: -one.gain)
+
+    def laid_anew(self, base: Baseline) -> Baseline | None:
+        """The model with the recorded distances, where its distance errors are large."""
+        return without_distance_trend(base) if base.state.size.is_unusually_large else None
+
+    def stripped(self, now: Baseline, name: str) -> Baseline:
+        """The model without an effect, before the others have moved to compensate for it."""
+        return without_effect(now, name)
+
+    def without(self, now: Baseline, name: str) -> Baseline:
+        """The model without an effect, fitted to its end."""
+        rest = effects_without(now.state, name)
+        removed = next(one for one in now.effects if one.effect.name == name)
+        posterior = now.posterior
+        if removed.effect.realigns:
+            return Baseline.of(fit_to_the_end(align(posterior, posterior.state_at(rest, now.state.logs))))
+        start = LinearModel(posterior, posterior.state_at(rest, now.state.logs, now.state.record, now.state.size))
+        return Baseline.of(fit_to_the_end(start, now.linear.numbers))
+
+    def fitted_roughly(self, score: float, base: Baseline, one: Screened) -> list[CandidateFit]:
+        """Fits from each trial, with the derivatives of the model."""
+        return fit_roughly(score, base, one)
+
+    def refined(self, base: Baseline, one: CandidateFit, least: float) -> CandidateFit:
+        """The fit with derivatives of its own."""
+        return refine(base.score, one, least)
+
+    def with_effect(self, one: CandidateFit) -> Baseline:
+        """The model with the effect, its runs aligned again."""
+        return Baseline.of(fit(align(one.found.posterior, one.found.state), one.found.numbers))
+
+    def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
+        """By the evidence and by the likelihood."""
+        return chance_of([one], gain, base.posterior.freedom, candidates)
+
+    def is_doubtful(self, base: Baseline, one: CandidateFit) -> bool:
+        """Whether a fit is at an end of its range, or beyond what the records show."""
+        return is_outside_data(base.posterior, one.chosen)
+
+    def leaves_noise(self, there: Baseline | CandidateFit) -> bool:
+        """Whether what is left is noise of a colour."""
+        fitted = there if isinstance(there, Baseline) else there.found
+        return is_coloured_noise(fitted.posterior, fitted.state)
+
+
 @dataclass(frozen=True, eq=False)
-class Round:
+class Round(Generic[P, F]):
     """All effects tried on a model: those that were fitted, best first, and the screening of the others."""
 
-    fits: tuple[CandidateFit, ...]
-    unfitted: tuple[Screened, ...]
+    fits: tuple[F, ...]
+    unfitted: tuple[P, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(Generic[M, P, F]):
     """The result of a search.
 
     before     the model without the effects that were found
@@ -78,27 +224,29 @@ class Selection:
     gains      of each of them with the others present, by name, the largest first
     rivals     effects that explain as well in the place of each, by name
     first      the first round
-    steps      names of the effects that were added, each with the cross-validation of the model then
+    steps      names of the effects that were added, each with the model on data that no fit saw
+    last       the last round, in which nothing was added
     """
 
-    before: Baseline
-    now: Baseline
+    before: M
+    now: M
     gains: dict[str, float]
     rivals: dict[str, tuple[str, ...]]
-    first: Round
+    first: Round[P, F]
     steps: tuple[tuple[str, HoldOut], ...]
+    last: Round[P, F] = Round((), ())
 
 
 @dataclass(frozen=True, eq=False)
-class Replaced:
+class Replaced(Generic[M]):
     """One of a model's effects, in whose place others are tried."""
 
-    now: Baseline
+    now: M
     one: Chosen
 
 
 @dataclass(eq=False)
-class Search:
+class Search(Generic[M, P, F]):
     """A search among effects, on models whose first ``present`` effects are given."""
 
     effects: Sequence[Effect]
@@ -107,52 +255,54 @@ class Search:
     progress: Progress = lambda words: None
     workers: int = 2
     effort: Effort = Effort()
+    likelihood: Likelihood[Any, Any, Any] = field(default_factory=MeasuredRoad)
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    _reduced: tuple[Baseline, dict[str, Baseline]] | None = None
+    _reduced: tuple[M, dict[str, M]] | None = None
 
-    def with_more_given(self, more: int, effects: int) -> Search:
+    def with_more_given(self, more: int, effects: int) -> Search[M, P, F]:
         """A search of its own for up to so many effects, on models in which so many more are given."""
         return Search(self.effects, self.present + more, self.misalignment, self.progress, self.workers,
-                      replace(self.effort, effects=effects))
+                      replace(self.effort, effects=effects), self.likelihood)
 
-    def run(self, before: Baseline) -> Selection:
+    def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
         return self.go_on(Selection(before, before, {}, {}, Round((), ()), ()))
 
-    def go_on(self, begun: Selection) -> Selection:
+    def go_on(self, begun: Selection[M, P, F]) -> Selection[M, P, F]:
         """A search that ended because it had found as many effects as it might, with more of them."""
         before, now, first, steps = begun.before, begun.now, begun.first, list(begun.steps)
-        while len(now.state.effects) - self.present < self.effort.effects:
-            untried = [one for one in self.effects if one.name not in now.state.names]
+        last = begun.last
+        while len(now.effects) - self.present < self.effort.effects:
+            untried = [one for one in self.effects if one.name not in names_of(now)]
             if not untried:
                 break
             self.progress(f"round {len(steps) + 1}")
-            tried = self.round(now, untried, self._required_gain(now) if steps else 0.0)
+            last = tried = self.round(now, untried, self._required_gain(now) if steps else 0.0)
             first = first if steps else tried
             best = self._simplest(now, tried)
             if best is None:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
-            now = self._swap_for_related(now, self.refit(best))
-            added = now.state.names[-1]
-            earlier = [name for name in now.state.names[self.present:] if name != added]
+            now = self._swap_for_related(now, self.likelihood.with_effect(best))
+            *earlier, added = names_of(now)[self.present:]
+            last = Round((), ())
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(now, name)
         now, gains = self.eliminate_backward(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
-        return Selection(before, now, gains, rivals, first, tuple(steps))
+        return Selection(before, now, gains, rivals, first, tuple(steps), last)
 
-    def without_effect(self, found: Selection, name: str) -> Selection:
+    def without_effect(self, found: Selection[M, P, F], name: str) -> Selection[M, P, F]:
         """A result without one of its effects."""
         now, gains = self.eliminate_backward(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
-    def round(self, now: Baseline, effects: Sequence[Effect], required_gain: float = 0.0,
-              instead: Replaced | None = None) -> Round:
+    def round(self, now: M, effects: Sequence[Effect], required_gain: float = 0.0,
+              instead: Replaced[M] | None = None) -> Round[P, F]:
         """Every effect tried on a model. Where its distance errors are large, effects that shift runs are also tried
         with the recorded distances: what they do may have been taken for a start or scale error.
 
@@ -164,18 +314,17 @@ class Search:
             near = instead.one.values if instead is not None else {}
             unfitted = self._screen_all(pool, now, effects, near)
             worth = [(now, one) for one in self._promising_of(unfitted, required_gain)]
-            if instead is not None:
-                there = without_effect(instead.now, instead.one.effect.name)
+            if instead is not None and (
+                    there := self.likelihood.stripped(instead.now, instead.one.effect.name)) is not None:
                 worth += [(there, one) for one in self._promising_of(
                     self._screen_all(pool, there, effects, near), required_gain)]
             self._promising |= {one.effect.name for _, one in worth}
             aligning = [one for one in effects if one.realigns]
-            if now.state.size.is_unusually_large and aligning:
-                there = without_distance_trend(now)
+            if aligning and (there := self.likelihood.laid_anew(now)) is not None:
                 worth += [(there, one) for one in self._promising_of(
                     self._screen_all(pool, there, aligning), required_gain)]
             self.progress(f"fitting {len(worth)} of them")
-            tries = _fit_all_roughly(pool, now.score, worth)
+            tries = self._fit_all_roughly(pool, now.score, worth)
             rough = _best_of_each(tries)
             best = {one.effect.name: one.gain for one in rough[: effort.refined]
                     if one.gain > effort.refine_share * max(rough[0].gain, required_gain)}
@@ -183,55 +332,60 @@ class Search:
             if len(good) == 1 and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
-            fine = list(pool.map(lambda one: refine(now.score, one, effort.round_share * now.explanation), good))
+            least = effort.round_share * now.explanation
+            fine = list(pool.map(lambda one: self.likelihood.refined(now, one, least), good))
         # A fit that is much worse than the model without the effect has diverged: its screening says more.
         fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
                 if one.gain > -min_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
         return Round(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
-    def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect],
-                  near: Mapping[str, float] = MappingProxyType({})) -> list[Screened]:
+    def _screen_all(self, pool: ThreadPoolExecutor, base: M, effects: Sequence[Effect],
+                    near: Mapping[str, float] = MappingProxyType({})) -> list[P]:
         """Screenings of effects on a model, the largest gain first."""
-        misaligned = [self.misalignment]
-        if base.state.size.is_unusually_large:
-            misaligned.append(misalignment_of_record(base))
-        found = []
-        for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
-            self.progress(f"screened {done} of {len(effects)} effects")
-            found.append(one)
-        return sorted(found, key=lambda one: -one.gain)
+        return self.likelihood.screened(base, effects, self.misalignment, near, pool, self.progress)
 
-    def _promising_of(self, unfitted: Sequence[Screened], required_gain: float) -> list[Screened]:
+    def _fit_all_roughly(self, pool: ThreadPoolExecutor, score: float, worth: Sequence[tuple[M, P]]) -> list[F]:
+        """Rough fits of screened effects, each on its model."""
+        return [one for some in pool.map(lambda pair: self.likelihood.fitted_roughly(score, *pair), worth)
+                for one in some]
+
+    def _promising_of(self, unfitted: Sequence[P], required_gain: float) -> list[P]:
         """The first of some screenings in the order of their gain, down to a share of the largest."""
         least = self.effort.fit_share * max(unfitted[0].gain, required_gain)
         return [one for one in unfitted[: self.effort.fitted] if one.gain > least]
 
-    def is_accepted(self, now: Baseline, one: CandidateFit) -> bool:
+    def is_accepted(self, now: M, one: F) -> bool:
         """Whether an effect gains enough, and its values are within its range and within what the record shows."""
-        there = one.found.posterior, one.found.state
-        return self._is_evident(now, one.chosen, one.gain, there) and not is_outside_data(now.posterior, one.chosen)
+        return self._is_evident(now, one.chosen, one.gain, one) and not self.likelihood.is_doubtful(now, one)
 
-    def _is_evident(self, without: Baseline, one: Chosen, gain: float, there: tuple[Posterior, State]) -> bool:
+    def may_imitate(self, now: M, one: F) -> bool:
+        """Whether an effect would be accepted, did it not gain so little of what is to be explained that it may only
+        imitate what is missing."""
+        return (self._chance_of(now, one.chosen, one.gain) < FALSE_ALARM and not self.is_accepted(now, one)
+                and not self.likelihood.is_doubtful(now, one))
+
+    def _is_evident(self, without: M, one: Chosen, gain: float, there: M | F) -> bool:
         """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
-        explain, or what is left with it (``there``) is noise of a colour, nothing is imitated."""
+        explain, or what is left with it (``there``) is noise, nothing is imitated."""
         if not self._chance_of(without, one, gain) < FALSE_ALARM:
             return False
-        return gain > IMITATION * without.explanation or without.explanation == 0 or is_coloured_noise(*there)
+        return (gain > IMITATION * without.explanation or without.explanation == 0
+                or self.likelihood.leaves_noise(there))
 
-    def _chance_of(self, without: Baseline, one: Chosen, gain: float) -> float:
+    def _chance_of(self, without: M, one: Chosen, gain: float) -> float:
         """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are
         searched, a law that was learned, nobody knows how much else was tried: the bound of the evidence holds."""
         if all(known is not one.effect for known in self.effects):
             return probability_by_chance(gain, len(self.effects))
-        return chance_of([one], gain, without.posterior.freedom, len(self.effects))
+        return self.likelihood.chance(one, gain, without, len(self.effects))
 
-    def _required_gain(self, without: Baseline) -> float:
+    def _required_gain(self, without: M) -> float:
         """Gain over a model from which on nothing is chance or imitation; what gains less than a share of it is not
         pursued."""
         return max(min_gain(len(self.effects)), IMITATION * without.explanation)
 
-    def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
+    def _simplest(self, now: M, tried: Round[P, F]) -> F | None:
         """The simplest of the accepted effects that cannot be distinguished from the most likely one."""
         accepted = [one for one in tried.fits if self.is_accepted(now, one)]
         return min((one for one in accepted if one.gain > accepted[0].gain - INDISTINGUISHABLE),
@@ -241,80 +395,66 @@ class Search:
         """Order of simplicity: effects that the records show by themselves first, then by their free parameters."""
         return not one.effect.is_seen(one.values, self.misalignment), len(free_parameters_of([one]))
 
-    def without(self, now: Baseline, name: str) -> Baseline:
+    def without(self, now: M, name: str) -> M:
         """A model without one of its effects, fitted; kept for the model that was asked for last."""
         if self._reduced is None or self._reduced[0] is not now:
             self._reduced = now, {}
         kept = self._reduced[1]
         if name not in kept:
-            kept[name] = self._fit_without(now, name)
+            kept[name] = self.likelihood.without(now, name)
         return kept[name]
 
-    def _fit_without(self, now: Baseline, name: str) -> Baseline:
-        rest = effects_without(now.state, name)
-        removed = next(one for one in now.state.effects if one.effect.name == name)
-        posterior = now.posterior
-        if removed.effect.realigns:
-            return Baseline.of(fit_to_the_end(align(posterior, posterior.state_at(rest, now.state.logs))))
-        start = LinearModel(posterior, posterior.state_at(rest, now.state.logs, now.state.record, now.state.size))
-        return Baseline.of(fit_to_the_end(start, now.linear.numbers))
-
-    def refit(self, one: CandidateFit) -> Baseline:
-        """A model with one more effect, fitted in full."""
-        posterior = one.found.posterior
-        return Baseline.of(fit(align(posterior, one.found.state), one.found.numbers))
-
-    def _swap_for_related(self, without: Baseline, now: Baseline) -> Baseline:
+    def _swap_for_related(self, without: M, now: M) -> M:
         """The model, or one with an effect of the same parameters in the place of the one that was added last, if that
         is preferred: a sharp resonance gains nothing at another frequency, and screening tries few frequencies."""
-        here, gain = now.state.effects[-1], without.score - now.score
+        here, gain = now.effects[-1], without.score - now.score
         related = [one for one in self.effects
-                   if one.name not in now.state.names and shared_parameters(one, here.values)]
+                   if one.name not in names_of(now) and shared_parameters(one, here.values)]
         if not related:
             return now
         self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in related)}?")
         with ThreadPoolExecutor(self.workers) as pool:
             worth = self._promising_of(self._screen_all(pool, without, related, here.values), gain)
-            rough = _best_of_each(_fit_all_roughly(pool, without.score, [(without, one) for one in worth]))
-            fine = _best_of_each(list(pool.map(partial(refine, without.score), rough)))
+            rough = _best_of_each(self._fit_all_roughly(pool, without.score, [(without, one) for one in worth]))
+            fine = _best_of_each(list(pool.map(lambda one: self.likelihood.refined(without, one, 0.0), rough)))
         best = self._simplest(without, Round(tuple(fine), ()))
         if best is None or not self._is_preferred(best, here, gain):
             return now
         self._rivals[best.effect.name] = (here.effect.name,) if abs(best.gain - gain) < INDISTINGUISHABLE else ()
-        return self.refit(best)
+        return self.likelihood.with_effect(best)
 
-    def _is_preferred(self, other: CandidateFit, one: Chosen, gain: float) -> bool:
+    def _is_preferred(self, other: F, one: Chosen, gain: float) -> bool:
         """Whether an effect in the place of one that gains so much explains more, or as much and is simpler."""
         simpler = self._complexity(other.chosen) < self._complexity(one)
         return other.gain > gain + (-INDISTINGUISHABLE if simpler else INDISTINGUISHABLE)
 
-    def _reconsider(self, now: Baseline, name: str) -> Baseline:
+    def _reconsider(self, now: M, name: str) -> M:
         """The model, or one with another effect in the place of this one, if that is preferred: of all that any round
         fitted, and all with the same parameters."""
         self.progress(f"is {name} still what it was?")
-        without, here = self.without(now, name), next(one for one in now.state.effects if one.effect.name == name)
+        without, here = self.without(now, name), next(one for one in now.effects if one.effect.name == name)
         gain = without.score - now.score
-        may_be = [one for one in self.effects if one.name == name or (one.name not in now.state.names and (
+        may_be = [one for one in self.effects if one.name == name or (one.name not in names_of(now) and (
             one.name in self._promising or shared_parameters(one, here.values)))]
         tried = self.round(without, may_be, gain, Replaced(now, here))
         best = self._simplest(without, tried)
         if best is not None and self._is_preferred(best, here, gain):
-            now, gain = self.refit(best), best.gain
+            now, gain = self.likelihood.with_effect(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
         self._rivals[name] = self._rivals_of(without, gain, name, tried)
         return now
 
-    def _rivals_of(self, without: Baseline, gain: float, name: str, tried: Round) -> tuple[str, ...]:
+    def _rivals_of(self, without: M, gain: float, name: str, tried: Round[P, F]) -> tuple[str, ...]:
         """Names of other effects that cannot be distinguished from one that gains so much."""
         return tuple(one.effect.name for one in tried.fits
                      if one.effect.name != name and abs(one.gain - gain) < INDISTINGUISHABLE
-                     and not is_outside_data(without.posterior, one.chosen))
+                     and not self.likelihood.is_doubtful(without, one))
 
-    def eliminate_backward(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
+    def eliminate_backward(self, before: M, now: M) -> tuple[M, dict[str, float]]:
         """The model without effects that gain too little with the others present, and the gain of each of those that
         stay."""
-        names = list(now.state.names[self.present:])
+        names = names_of(now)[self.present:]
         if len(names) == 1:
             return now, {names[0]: before.score - now.score}
         gains: dict[str, float] = {}
@@ -323,20 +463,19 @@ class Search:
             with ThreadPoolExecutor(self.workers) as pool:
                 without = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in without.items()}
-            by_name = {one.effect.name: one for one in now.state.effects}
+            by_name = {one.effect.name: one for one in now.effects}
             chances = {name: self._chance_of(without[name], by_name[name], gain) for name, gain in gains.items()}
             least = min(gains, key=lambda name: (-chances[name], gains[name]))
-            if len(names) == 1 or self._is_evident(without[least], by_name[least], gains[least],
-                                                   (now.posterior, now.state)):
+            if len(names) == 1 or self._is_evident(without[least], by_name[least], gains[least], now):
                 break
             now = without[least]
             names.remove(least)
             gains.pop(least)
         return now, self._findings(now, dict(sorted(gains.items(), key=lambda pair: -pair[1])))
 
-    def _findings(self, now: Baseline, gains: dict[str, float]) -> dict[str, float]:
+    def _findings(self, now: M, gains: dict[str, float]) -> dict[str, float]:
         """The gains without effects that only correct what is uncertain of a filter, where that is found as well."""
-        by_name = {one.effect.name: one for one in now.state.effects}
+        by_name = {one.effect.name: one for one in now.effects}
         if not any(by_name[name].effect.is_seen(by_name[name].values, self.misalignment) for name in gains):
             return gains
         return {name: gain for name, gain in gains.items()
@@ -351,15 +490,14 @@ def is_outside_data(posterior: Posterior, one: Chosen) -> bool:
     return one.at_bound or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
 
 
-def _fit_all_roughly(pool: ThreadPoolExecutor, score: float,
-                    worth: Sequence[tuple[Baseline, Screened]]) -> list[CandidateFit]:
-    """Rough fits of screened effects, each on its model."""
-    return [one for some in pool.map(lambda pair: fit_roughly(score, *pair), worth) for one in some]
+def names_of(model: Model) -> list[str]:
+    """Names of a model's effects."""
+    return [one.effect.name for one in model.effects]
 
 
-def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
+def _best_of_each(fits: Sequence[F]) -> list[F]:
     """The best fit of each effect, best first."""
-    found: dict[str, CandidateFit] = {}
+    found: dict[str, F] = {}
     for one in sorted(fits, key=lambda one: -one.gain):
         found.setdefault(one.effect.name, one)
     return list(found.values())

@@ -1,15 +1,17 @@
 """Diagnosis without a profile: which effects a model lacks, and what such drives cannot identify.
 
-Problem: as in ``lab.diagnosis``, but the road is unknown and absorbs part of what an effect does. Solution: in each
-round every effect that can be tried is screened by a score test, the promising ones are fitted in full, and the best is
-added if noise would hardly gain as much in so many trials and it helps to predict each drive by the others. What cannot
-be identified is computed from the information of these drives, with the road and without it.
+Problem: as in ``lab.diagnosis``, but the road is unknown and absorbs part of what an effect does. Solution: the same
+search (``selection.stepwise``) on another likelihood, that with the road integrated out (``UnmeasuredRoad``): effects
+are screened by score tests, fitted by Fisher scoring, and are to predict each drive by the others no worse than without
+them. What cannot be identified is computed from the information of these drives, with the road and without it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,16 +20,21 @@ from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structu
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.holdout import HoldOut
+from logger.lab.selection.screening import shared_parameters
+from logger.lab.selection.stepwise import Effort, Search, Selection, names_of
 from logger.lab.unknown_road.fit import SameRoadFit, Trial, fit, screen
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.one_road import certain_two_roads, placed_by_road, possible_two_roads, road_agreements
-from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, RoadEffect, chosen
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, Misalignment, RoadEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
+_EFFORT = Effort(effects=3, fitted=3, fit_share=0.1)
+"""A fit takes as long as ten over a measured road, so that fewer are made."""
 ABSORBED_BY_ROAD = 0.02
 """The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
 show it seven times as well (root of 1 / 0.02)."""
@@ -35,14 +42,13 @@ show it seven times as well (root of 1 / 0.02)."""
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that was tried on the model of its round.
+    """An effect that was tried.
 
     error            leave-one-out error of all drives
     p_value          bound on the probability that noise alone gains as much with any of the candidates
     gain             of minus twice the log of the evidence; where it was not fitted, by its score test
     confused_with    effects that explain about as much
     fitted           with the car's numbers and the road; else it was added at the best strength of its score test
-    imitation        gain up to which an effect may only imitate what is missing
     stands_in        whether it bends the laws of the car, so that linear ones stood in for it
     """
 
@@ -52,23 +58,12 @@ class Candidate:
     gain: float
     confused_with: tuple[str, ...] = ()
     fitted: bool = True
-    imitation: float = 0.0
     stands_in: bool = False
 
     @property
     def name(self) -> str:
         """The effect's name."""
         return self.one.effect.name
-
-    def helps(self, error: float) -> bool:
-        """Whether it explains more than chance would, without a larger leave-one-out error than the model without
-        it."""
-        return self.fitted and self.p_value < FALSE_ALARM and self.error <= error
-
-    @property
-    def may_imitate(self) -> bool:
-        """Whether it gains so little of what is to be explained that it may only imitate what is missing."""
-        return self.gain < self.imitation
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,60 +105,237 @@ class UnknownRoadDiagnosis:
         return self.excess > UNEXPLAINED
 
 
+@dataclass(frozen=True, eq=False)
+class RoadModel:
+    """A fitted model of drives over an unknown road; ``score`` is over that of the first model of a search, as only
+    differences are known."""
+
+    fit: SameRoadFit
+    score: float = 0.0
+
+    @property
+    def problem(self) -> SameRoad:
+        """The drives, with a preconditioner for states near this one."""
+        return self.fit.problem
+
+    @property
+    def state(self) -> RoadFitState:
+        """All its numbers."""
+        return self.fit.state
+
+    @property
+    def effects(self) -> tuple[Chosen, ...]:
+        """With their values."""
+        return self.state.effects
+
+    @cached_property
+    def hold_out(self) -> HoldOut:
+        """Each drive as predicted by the others; of the likelihood only differences are known."""
+        return HoldOut(self.problem.error(self.state), float("nan"))
+
+    @cached_property
+    def noise(self) -> Noise:
+        """The sensor's noise by what this model leaves."""
+        return self.problem.noise(self.state)
+
+    @cached_property
+    def explanation(self) -> float:
+        """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as
+        explained; at least 0."""
+        over = self.state.noise_mps2 / ((1 + UNEXPLAINED) * self.noise.deviation_mps2)
+        return max(0.0, 2 * PASS_OF_RATE * self.problem.samples * 2 * float(np.log(over)))
+
+
+@dataclass(frozen=True, eq=False)
+class RoadTrial:
+    """An effect as it was screened: where fits may begin, the largest gain first."""
+
+    starts: tuple[Trial, ...]
+
+    @property
+    def effect(self) -> Effect:
+        """The effect."""
+        return self.starts[0].chosen.effect
+
+    @property
+    def gain(self) -> float:
+        """The largest gain."""
+        return self.starts[0].gain
+
+
+@dataclass(frozen=True, eq=False)
+class RoadCandidate:
+    """A model with one more effect, its last, and its gain in minus twice the log of the evidence."""
+
+    model: RoadModel
+    gain: float
+
+    @property
+    def chosen(self) -> Chosen:
+        """The effect, with its values."""
+        return self.model.effects[-1]
+
+    @property
+    def effect(self) -> Effect:
+        """The effect."""
+        return self.chosen.effect
+
+
+@dataclass(frozen=True)
+class UnmeasuredRoad:
+    """The likelihood of drives over one road that nobody measured, as a search asks for it.
+
+    starts         so many trials of an effect at their own values are starts of fits, those whose gain is half of the
+                   best one's or more; this also at its best strength, which holds for small changes only
+    first_steps    from each start, of which the best goes on
+    """
+
+    progress: Progress
+    starts: int = 2
+    first_steps: int = 2
+
+    def screened(self, base: RoadModel, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+                 pool: ThreadPoolExecutor, progress: Progress) -> list[RoadTrial]:
+        """Effects screened by score tests at their trial values, all at once."""
+        trials = [chosen(one, values) for one in effects
+                  for values in (*one.trials(), *([one.trials()[0] | shared_parameters(one, near)] if near else []))]
+        progress(f"screening {len(effects)} effects")
+        by_effect: dict[str, list[Trial]] = {}
+        for one in sorted(screen(base.problem, base.fit, trials), key=lambda one: -one.gain):
+            by_effect.setdefault(one.chosen.effect.name, []).append(one)
+        return [RoadTrial(tuple(ones)) for ones in by_effect.values()]
+
+    def laid_anew(self, base: RoadModel) -> None:
+        """Nothing: places are numbers of the road."""
+
+    def stripped(self, now: RoadModel, name: str) -> None:
+        """Nothing: the fitted one serves."""
+
+    def without(self, now: RoadModel, name: str) -> RoadModel:
+        """The model without an effect, fitted."""
+        effects = tuple(one for one in now.effects if one.effect.name != name)
+        there = fit(now.problem, self._state(now, effects))
+        lost = there.problem.gain(there.state, now.state) - self._cost(now, next(
+            one for one in now.effects if one.effect.name == name))
+        return RoadModel(replace(there, problem=there.problem.preconditioned(there.state)), now.score + lost)
+
+    def fitted_roughly(self, score: float, base: RoadModel, one: RoadTrial) -> list[RoadCandidate]:
+        """The best of fits of some steps."""
+        first = one.starts[0]
+        begins = [first.best, *(start.chosen for start in one.starts[: self.starts] if start.gain > 0.5 * first.gain)]
+        tries = [fit(base.problem, self._state(base, (*base.effects, begin)), self.first_steps) for begin in begins]
+        return [max((self._candidate(base, there, score, 2) for there in tries), key=lambda one: one.gain)]
+
+    def refined(self, base: RoadModel, one: RoadCandidate, least: float) -> RoadCandidate:
+        """The fit to its end; one that gains less by its first steps than its numbers cost is not fitted further."""
+        if one.gain <= 0:
+            return one
+        return self._candidate(base, fit(one.model.problem, one.model.state), base.score, 3)
+
+    def with_effect(self, one: RoadCandidate) -> RoadModel:
+        """The model with the effect, its equations near it, and its drives laid on each other anew where their
+        distances are a receiver's."""
+        now, state = one.model.fit, one.model.state
+        if now.problem.exact_places:
+            return replace(one.model, fit=replace(now, problem=now.problem.preconditioned(state)))
+        return replace(one.model, fit=_placed_anew(now, self.progress))
+
+    def chance(self, one: Chosen, gain: float, base: RoadModel, candidates: int) -> float:
+        """The bound of the evidence: a gain that is integrated from slopes of simulated drives is too rough for more.
+        """
+        return probability_by_chance(gain, candidates)
+
+    def is_doubtful(self, base: RoadModel, one: RoadCandidate) -> bool:
+        """Whether a fit is at an end of its range, or predicts drives by the others worse."""
+        return one.chosen.at_bound or one.model.hold_out.error > base.hold_out.error
+
+    def leaves_noise(self, there: RoadModel | RoadCandidate) -> bool:
+        """Never: a colour of the noise is not told from a road."""
+        return False
+
+    def _state(self, base: RoadModel, effects: tuple[Chosen, ...]) -> RoadFitState:
+        """The state of a model with other effects."""
+        return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
+
+    def _cost(self, base: RoadModel, one: Chosen) -> float:
+        """What the numbers of an effect cost of its gain (G. Schwarz 1978)."""
+        return len(free_parameters_of([one])) * float(np.log(base.problem.samples))
+
+    def _candidate(self, base: RoadModel, there: SameRoadFit, score: float, nodes: int) -> RoadCandidate:
+        """A fit with one more effect than a model."""
+        gain = there.problem.gain(base.state, there.state, nodes) - self._cost(base, there.state.effects[-1])
+        return RoadCandidate(RoadModel(there, base.score - gain), score - base.score + gain)
+
+
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                       progress: Progress = lambda words: None, most_effects: int = 3) -> UnknownRoadDiagnosis:
-    """Find the effects that the model, with those that are ``present``, lacks; at most so many.
+                       progress: Progress = lambda words: None) -> UnknownRoadDiagnosis:
+    """Find the effects that the model, with those that are ``present``, lacks.
 
     ValueError if the car is not linear with one that is present; NotOneRoad for drives that are certainly over two.
     """
     progress("are the drives over one road?")
     nominal = problem.start(present)
     untried = _obstacles(problem, effects, present)
-    remaining = {name: one for name, one in effects.items() if name not in untried}
-    agreements = road_agreements(problem, nominal, _trials(remaining))
+    tried = [one for name, one in effects.items() if name not in untried]
+    agreements = road_agreements(problem, nominal, [chosen(one, values) for one in tried for values in one.trials()])
     if found := certain_two_roads(agreements):
         one, other = (problem.runs[run].name for run in found)
         raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
-    before = now = fit(problem.preconditioned(nominal), nominal)
-    now = replace(now, problem=now.problem.moved_as(now.state))
-    errors = [before.problem.error(replace(nominal, roads=before.state.roads)), before.problem.error(before.state)]
-    first: list[Candidate] = []
-    taken: list[Candidate] = []
-    undecided: list[Candidate] = []
-    while len(taken) < most_effects:
-        progress(f"round {len(taken) + 1}: trying {len(remaining)} effects")
-        ranked = _by_effect(screen(now.problem, now, _trials(remaining)))
-        models = _fits(now, ranked, progress)
-        candidates = _candidates(now, models, len(remaining), errors[-1])
-        first = first or [*candidates, *(
-            _candidate(now.problem, _with_effect(now, ones[0].best), ones[0].gain, len(remaining), fitted=False)
-            for name, ones in ranked.items() if name not in models)]
-        best = next((one for one in candidates if one.helps(errors[-1])), None)
-        if best is None or best.may_imitate:
-            undecided = [one for one in candidates if one.helps(errors[-1])]
-            break
-        taken.append(best)
-        now = models[best.name]
-        now = (replace(now, problem=now.problem.preconditioned(now.state)) if problem.exact_places else
-               _placed_anew(now, progress))
-        errors.append(now.problem.error(now.state))
-        del remaining[best.name]
-    usual = {one.chosen.effect.name: one for one in screen(
-        now.problem, now, [chosen(one, one.usual) for one in remaining.values()])}
+    before = fit(problem.preconditioned(nominal), nominal)
+    as_filed = before.problem.error(replace(nominal, roads=before.state.roads))
+    base = RoadModel(replace(before, problem=before.problem.moved_as(before.state)))
+    search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
+        tried, len(present), Misalignment(1.0, 0.0), progress, effort=_EFFORT, likelihood=UnmeasuredRoad(progress))
+    selection = search.run(base)
+    now, steps = selection.now, dict(selection.steps)
+    names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
+    remaining = [one for one in tried if one.name not in names_of(now)]
+    usual = {one.chosen.effect.name: one for one in screen(now.problem, now.fit, [
+        chosen(one, one.usual) for one in remaining])}
     road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
-    noise = now.problem.noise(now.state)
+    by_name = {one.effect.name: one for one in _with_errors(now.fit)}
+    errors = [as_filed, base.hold_out.error, *(steps.get(name, now.hold_out).error for name in names)]
+    errors[-1] = now.hold_out.error
+    undecided = [one for one in selection.last.fits if search.may_imitate(now, one)]
     return UnknownRoadDiagnosis(
-        (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
-        _with_errors(now)[len(present):], tuple(errors),
+        _candidates(selection, len(tried)), tuple(by_name[name] for name in names), tuple(errors),
         tuple(zip(before.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
-        noise.deviation_mps2 / now.problem.size_mps2, untried, road,
+        now.noise.deviation_mps2 / now.problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
-        _confounded_numbers(now), now.state.noise_mps2, _excess(now, noise),
+        _confounded_numbers(now.fit), now.state.noise_mps2, _excess(now),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
-        tuple(undecided), problem.exact_places,
+        tuple(_candidate(one, len(tried)) for one in undecided), problem.exact_places,
     )
+
+
+def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count: int) -> tuple[Candidate, ...]:
+    """Effects that were found, then the others of the first round, best first."""
+    now, hold_outs = selection.now, dict(selection.steps)
+    found = []
+    for name, gain in selection.gains.items():
+        one = next(one for one in now.effects if one.effect.name == name)
+        error = hold_outs.get(name, now.hold_out).error
+        found.append(Candidate(one, error, probability_by_chance(gain, count), gain, selection.rivals.get(name, ()),
+                               stands_in=not now.problem.is_linear([one], now.state.logs)))
+    others = [_candidate(one, count) for one in selection.first.fits]
+    before = selection.before
+    for trial in selection.first.unfitted:
+        best = trial.starts[0].best
+        there = UnmeasuredRoad(lambda words: None)._state(before, (*before.effects, best))
+        gain = trial.gain - len(free_parameters_of([best])) * float(np.log(before.problem.samples))
+        others.append(Candidate(best, before.problem.error(there), probability_by_chance(gain, count), gain,
+                                fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
+    others.sort(key=lambda one: (not one.fitted, -one.gain))
+    return (*found, *(one for one in others if one.name not in selection.gains))
+
+
+def _candidate(one: RoadCandidate, count: int) -> Candidate:
+    """A fitted effect as one of so many candidates."""
+    model = one.model
+    return Candidate(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
+                     stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen],
@@ -198,45 +370,6 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
     return found
 
 
-# --- one round ---
-
-
-def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:
-    return [chosen(effect, values) for effect in effects.values() for values in effect.trials()]
-
-
-def _by_effect(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
-    """Trials by the names of their effects, the largest gain first."""
-    found: dict[str, list[Trial]] = {}
-    for one in sorted(tried, key=lambda one: -one.gain):
-        found.setdefault(one.chosen.effect.name, []).append(one)
-    return found
-
-
-def _fits(base: SameRoadFit, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3,
-          share: float = 0.1, least: float = 6.0, starts: int = 2, first_steps: int = 2) -> dict[str, SameRoadFit]:
-    """Fit the effects with the largest gains on top of the model, by name; the best of so many ``first_steps`` from
-    each start goes on.
-
-    most, share, least    so many at most, of those whose gain is this share of the largest, and so much
-    starts                so many trials at their own values, those whose gain is half of the best one's or more; this
-                          also at its best strength, which holds for small changes only
-
-    What gains less by its first steps than its numbers cost is not fitted further.
-    """
-    enough = max([least, *(share * ones[0].gain for ones in ranked.values())])
-    found = {}
-    for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
-        progress(f"fitting {name}")
-        first = ranked[name][0]
-        begins = [first.best, *(one.chosen for one in ranked[name][:starts] if one.gain > 0.5 * first.gain)]
-        tries = [fit(base.problem, _with_effect(base, one), first_steps) for one in begins]
-        gains = [one.problem.gain(base.state, one.state, nodes=2) for one in tries]
-        best = tries[int(np.argmax(gains))]
-        found[name] = fit(best.problem, best.state) if max(gains) > _cost(best.problem, best.state) else best
-    return found
-
-
 def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
     and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
@@ -251,37 +384,6 @@ def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
         return replace(now, problem=old.preconditioned(state))
     begin = problem.start(state.effects)
     return fit(problem.preconditioned(begin), begin)
-
-
-def _with_effect(base: SameRoadFit, one: Chosen) -> RoadFitState:
-    """The state of a model with one more effect."""
-    effects = (*base.state.effects, one)
-    return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
-
-
-def _candidates(base: SameRoadFit, models: Mapping[str, SameRoadFit], count: int, error: float) -> list[Candidate]:
-    """Fitted effects as candidates of so many, best first, each with those that cannot be distinguished from it."""
-    imitation = IMITATION * _full_explanation(base)
-    found = [replace(_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count),
-                     imitation=imitation) for one in models.values()]
-    found.sort(key=lambda one: -one.gain)
-    there = [one for one in found if one.helps(error)]
-    return [replace(one, confused_with=tuple(other.name for other in there if other is not one and one in there
-                                             and abs(other.gain - one.gain) < INDISTINGUISHABLE)) for one in found]
-
-
-def _cost(problem: SameRoad, state: RoadFitState) -> float:
-    """What the numbers of the last effect of a state cost of its gain."""
-    return len(free_parameters_of([state.effects[-1]])) * float(np.log(problem.samples))
-
-
-def _candidate(problem: SameRoad, state: RoadFitState, gain: float, count: int, fitted: bool = True) -> Candidate:
-    """The last effect of a state as one of so many candidates. Its gain in minus twice the log of the likelihood, less
-    what its numbers cost (G. Schwarz 1978), is that in the evidence."""
-    one = state.effects[-1]
-    gain -= _cost(problem, state)
-    return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted,
-                     stands_in=not problem.is_linear([one], state.logs))
 
 
 # --- the residual ---
@@ -306,19 +408,12 @@ def _confounded_numbers(model: SameRoadFit) -> tuple[Finding, ...]:
     return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
 
 
-def _full_explanation(model: SameRoadFit) -> float:
-    """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as explained;
-    at least 0."""
-    noise = model.problem.noise(model.state)
-    over = model.state.noise_mps2 / ((1 + UNEXPLAINED) * noise.deviation_mps2)
-    return max(0.0, 2 * PASS_OF_RATE * model.problem.samples * 2 * float(np.log(over)))
-
-
-def _excess(model: SameRoadFit, noise: Noise) -> float:
+def _excess(model: RoadModel) -> float:
     """Share by which what no road explains is above the noise; where chance may give as much, no more than
     ``UNEXPLAINED``. Degrees of freedom of a sample are reduced by the recorder's filter."""
     from scipy.stats import norm
 
+    noise = model.noise
     above = model.state.noise_mps2 / noise.deviation_mps2 - 1
     freedom = 2 * PASS_OF_RATE * model.problem.samples
     error = np.hypot(noise.standard_error_mps2 / noise.deviation_mps2, (2 * freedom) ** -0.5)

@@ -139,8 +139,7 @@ def test_friction_is_not_taken_for_another_damping() -> None:
 
 
 def test_what_may_only_imitate_is_not_named() -> None:
-    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0, imitation=200.0)
-    assert one.helps(0.3) and one.may_imitate and not replace(one, imitation=50.0).may_imitate
+    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
     reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]

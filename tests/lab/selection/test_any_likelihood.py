@@ -1,0 +1,127 @@
+"""The search on a likelihood that is made up, in which everything is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import pytest
+
+from logger.lab.selection.evidence import IMITATION, probability_by_chance
+from logger.lab.selection.holdout import HoldOut
+from logger.lab.selection.stepwise import Effort, Progress, Search, names_of
+from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
+
+from ...support.lab.secret_runs import EFFECTS
+
+WORTH = {"sensor_gain": 300.0, "tire_damping": 120.0, "sensor_offset": 60.0, "time_offset": 2.0}
+"""Gain of each, whatever else is there; all of 480 is to be explained."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A model with some effects."""
+
+    effects: tuple[Chosen, ...] = ()
+    explains: float = 480.0
+
+    @property
+    def score(self) -> float:
+        return -sum(WORTH[one] for one in names_of(self))
+
+    @property
+    def explanation(self) -> float:
+        return self.explains
+
+    @property
+    def hold_out(self) -> HoldOut:
+        return HoldOut(1.0 / (1 + len(self.effects)), 0.0)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """An effect tried on a model."""
+
+    model: Made
+    gain: float
+
+    @property
+    def chosen(self) -> Chosen:
+        return self.model.effects[-1]
+
+    @property
+    def effect(self) -> Effect:
+        return self.chosen.effect
+
+
+@dataclass(frozen=True)
+class MadeUp:
+    """The likelihood; some effects are doubtful."""
+
+    doubtful: tuple[str, ...] = ()
+
+    def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+                 pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
+        tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual))), WORTH[one.name])
+                 for one in effects]
+        return sorted(tried, key=lambda one: -one.gain)
+
+    def laid_anew(self, base: Made) -> None: ...
+
+    def stripped(self, now: Made, name: str) -> None: ...
+
+    def without(self, now: Made, name: str) -> Made:
+        return replace(now, effects=tuple(one for one in now.effects if one.effect.name != name))
+
+    def fitted_roughly(self, score: float, base: Made, one: Tried) -> list[Tried]:
+        return [replace(one, gain=score - one.model.score)]
+
+    def refined(self, base: Made, one: Tried, least: float) -> Tried:
+        return one
+
+    def with_effect(self, one: Tried) -> Made:
+        return one.model
+
+    def chance(self, one: Chosen, gain: float, base: Made, candidates: int) -> float:
+        return probability_by_chance(gain, candidates)
+
+    def is_doubtful(self, base: Made, one: Tried) -> bool:
+        return one.effect.name in self.doubtful
+
+    def leaves_noise(self, there: Made | Tried) -> bool:
+        return False
+
+
+def search(*doubtful: str, effects: int = 4) -> Search[Made, Tried, Tried]:
+    return Search([EFFECTS[name] for name in WORTH], 0, Misalignment(1.0, 0.0), workers=1,
+                  effort=Effort(effects=effects), likelihood=MadeUp(doubtful))
+
+
+def test_all_that_is_evident_is_found_the_most_telling_first() -> None:
+    found = search().run(Made())
+    assert found.gains == {name: WORTH[name] for name in ("sensor_gain", "tire_damping", "sensor_offset")}
+    assert [name for name, _ in found.steps] == ["sensor_gain", "tire_damping", "sensor_offset"]
+    assert [one.effect.name for one in (*found.last.fits, *found.last.unfitted)] == ["time_offset"]
+
+
+def test_no_more_are_found_than_were_sought_until_it_goes_on() -> None:
+    one = search(effects=1)
+    found = one.run(Made())
+    assert list(found.gains) == ["sensor_gain"] and not found.last.fits
+    one.effort = replace(one.effort, effects=2)
+    assert list(one.go_on(found).gains) == ["sensor_gain", "tire_damping"]
+
+
+def test_what_is_doubtful_is_not_found() -> None:
+    assert list(search("sensor_gain").run(Made()).gains) == ["tire_damping", "sensor_offset"]
+
+
+@pytest.mark.parametrize(("to_explain", "named"), [(590.0, True), (610.0, False)])
+def test_what_gains_a_tenth_of_what_is_left_may_only_imitate(to_explain: float, named: bool) -> None:
+    assert IMITATION == 0.1
+    sought = search()
+    found = sought.run(Made(explains=to_explain))
+    assert ("sensor_offset" in found.gains) == named
+    undecided = [one.effect.name for one in found.last.fits if sought.may_imitate(found.now, one)]
+    assert undecided == ([] if named else ["sensor_offset"])
