@@ -51,6 +51,7 @@ class Effort:
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
+    least                      gain below which nothing is fitted
     """
 
     effects: int = 4
@@ -60,6 +61,7 @@ class Effort:
     refine_share: float = 0.25
     tie_share: float = 0.9
     round_share: float = 0.02
+    least: float = 0.0
 
 
 class Model(Protocol):
@@ -352,7 +354,7 @@ class Search(Generic[M, P, F]):
 
     def _promising_of(self, unfitted: Sequence[P], required_gain: float) -> list[P]:
         """The first of some screenings in the order of their gain, down to a share of the largest."""
-        least = self.effort.fit_share * max(unfitted[0].gain, required_gain)
+        least = max(self.effort.least, self.effort.fit_share * max(unfitted[0].gain, required_gain))
         return [one for one in unfitted[: self.effort.fitted] if one.gain > least]
 
     def is_accepted(self, now: M, one: F) -> bool:

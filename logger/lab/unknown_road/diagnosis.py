@@ -33,8 +33,6 @@ from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 
-_EFFORT = Effort(effects=3, fitted=3, fit_share=0.1)
-"""A fit takes as long as ten over a measured road, so that fewer are made."""
 ABSORBED_BY_ROAD = 0.02
 """The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
 show it seven times as well (root of 1 / 0.02)."""
@@ -287,7 +285,9 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     as_filed = before.problem.error(replace(nominal, roads=before.state.roads))
     base = RoadModel(replace(before, problem=before.problem.moved_as(before.state)))
     search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
-        tried, len(present), Misalignment(1.0, 0.0), progress, effort=_EFFORT, likelihood=UnmeasuredRoad(progress))
+        tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
+        # A fit takes as long as ten over a measured road; 6 is less than what one number costs.
+        effort=Effort(effects=3, fitted=3, fit_share=0.1, least=6.0))
     selection = search.run(base)
     now, steps = selection.now, dict(selection.steps)
     names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
