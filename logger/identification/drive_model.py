@@ -181,7 +181,7 @@ class DriveModel:
     ``road``.
 
     A free number is the car's (``named_parameters.names``), an effect's
-    (``effect_parameters.free_parameter_named``) or the road's (``unknown_inputs``). The car comes to the first sample
+    (``named_parameters.free_parameter_named``) or the road's (``unknown_inputs``). The car comes to the first sample
     of a record at the speed it has there, over the road that the track has there. ValueError for a name that none of
     them has a number of, or that sets what another one sets.
 
