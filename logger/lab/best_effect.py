@@ -15,7 +15,8 @@ from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.map_fit import align
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.selection.screening import Baseline, misalignment
+from logger.lab.selection.candidate_fit import CandidateFit
+from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Search
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
@@ -34,7 +35,7 @@ def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Seque
     if not tried:
         return np.inf
     start = posterior.start(present)
-    search = Search(tried, len(present), misalignment(posterior, start))
+    search: Search[Baseline, Screened, CandidateFit] = Search(tried, len(present), misalignment(posterior, start))
     nominal = align(posterior, start).with_number_slopes(posterior.number_slopes(start, posterior.prior.steps))
     fits = search.round(Baseline.of(nominal), tried).fits
     return min((posterior.error(one.found.state) for one in fits), default=np.inf)
