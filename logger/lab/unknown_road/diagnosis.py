@@ -20,7 +20,7 @@ from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structu
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import shared_parameters
 from logger.lab.selection.stepwise import Effort, Search, Selection, names_of
@@ -319,7 +319,10 @@ def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count
         error = hold_outs.get(name, now.hold_out).error
         found.append(Candidate(one, error, probability_by_chance(gain, count), gain, selection.rivals.get(name, ()),
                                stands_in=not now.problem.is_linear([one], now.state.logs)))
-    others = [_candidate(one, count) for one in selection.first.fits]
+    fits = selection.first.fits
+    others = [replace(_candidate(one, count), confused_with=tuple(
+        other.effect.name for other in fits if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE
+        and probability_by_chance(one.gain, count) < FALSE_ALARM)) for one in fits]
     before = selection.before
     for trial in selection.first.unfitted:
         best = trial.starts[0].best
