@@ -228,15 +228,20 @@ class UnmeasuredRoad:
         """The fit to its end; one that gains less by its first steps than its numbers cost is not fitted further."""
         if one.gain <= 0:
             return one
-        return self._candidate(base, fit(one.model.problem, one.model.state), base.score, 3)
+        further = self._candidate(base, fit(one.model.problem, one.model.state), base.score, 3)
+        return max(further, one, key=lambda one: one.gain)  # steps may diverge
 
     def with_effect(self, one: RoadCandidate) -> RoadModel:
-        """The model with the effect, its equations near it, and its drives laid on each other anew where their
-        distances are a receiver's."""
-        now, state = one.model.fit, one.model.state
+        """The model with the effect fitted to its end, its equations near it, and its drives laid on each other anew
+        where their distances are a receiver's."""
+        now, score = fit(one.model.problem, one.model.state), one.model.score
+        if (gain := now.problem.gain(one.model.state, now.state)) > 0:
+            score -= gain
+        else:
+            now = one.model.fit
         if now.problem.exact_places:
-            return replace(one.model, fit=replace(now, problem=now.problem.preconditioned(state)))
-        return replace(one.model, fit=_placed_anew(now, self.progress))
+            return RoadModel(replace(now, problem=now.problem.preconditioned(now.state)), score)
+        return RoadModel(_placed_anew(now, self.progress), score)
 
     def chance(self, one: Chosen, gain: float, base: RoadModel, candidates: int) -> float:
         """The bound of the evidence: a gain that is integrated from slopes of simulated drives is too rough for more.
