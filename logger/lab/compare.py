@@ -126,13 +126,13 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     state = linear.state
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
-    removed = removed_from(posterior, plain.residuals.predictions, state)
+    removed, errors = removed_from(posterior, plain.residuals.predictions, state), standard_errors(linear)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
-                      tuple(posterior.prior.beyond(state.logs, standard_errors(linear).logs)),
+                      tuple(posterior.prior.beyond_tolerance(state.logs, errors.covariance)),
                       (Step(AS_FILED, plain.error), Step(REFITTED, cross_validate(linear).error)),
                       floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
                       removed, _tests(refitted, removed, plain))

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
@@ -27,7 +28,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -46,6 +47,7 @@ from logger.runs import BY_ROAD
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.named_parameters import free_parameters_of
 
+Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
 ALREADY_PRESENT = "the model has it"
@@ -86,7 +88,10 @@ class Diagnosis:
     obstacles            effects that could not be tried, and why
     verdict              names of the effects that the model lacks, the most certain first
     excess               share by which the residual is above the noise in the run where it is largest
-    conflicts            numbers of the car that are in conflict with their prior, with their relative change
+    beyond               numbers of the car that the runs move beyond their tolerance, with their relative change
+    in_conflict          whether one of these is farther off than numbers are by chance
+    moved                the others that the runs move for sure: their relative change and its standard error, the
+                         farthest first, by their tolerance
     effects              of the model that it ends with, with standard errors
     undetectable         effects that these runs could not show at their usual strength
     shape                of the unexplained residual; None where it is noise
@@ -109,7 +114,8 @@ class Diagnosis:
     obstacles: Mapping[str, str]
     verdict: tuple[str, ...]
     excess: float
-    conflicts: Mapping[str, float]
+    beyond: Mapping[str, float]
+    in_conflict: bool
     steps: tuple[Step, ...]
     effects: tuple[Chosen, ...]
     undetectable: tuple[Undetectable, ...]
@@ -121,6 +127,7 @@ class Diagnosis:
     coloured: bool = False
     tolerance: float = Tolerance().share
     no_better: tuple[str, ...] = ()
+    moved: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def exceeds_noise(self) -> bool:
@@ -130,7 +137,7 @@ class Diagnosis:
     @property
     def unexplained(self) -> bool:
         """Whether the effects of the verdict, in a car within its priors, do not explain all."""
-        return self.exceeds_noise or bool(self.conflicts)
+        return self.exceeds_noise or self.in_conflict
 
     @property
     def missing(self) -> tuple[Chosen, ...]:
@@ -208,7 +215,10 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
                                                                                fine.error(state)),
         candidates=(found := _candidates(selection, state, len(tried)))[0], no_better=found[1],
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
-        conflicts=fine.prior.beyond(state.logs, errors.logs), steps=_steps(selection, posterior.error(nominal)),
+        beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
+        in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
+        moved={name: one for name, one in _moved(fine, state, errors.logs).items() if name not in beyond},
+        steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
@@ -255,6 +265,13 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
                 return selection, after
             ended = [weakest.effect.name]
         selection = search.without_effect(selection, ended[0])
+
+
+def _moved(posterior: Posterior, state: State, errors: Array) -> dict[str, tuple[float, float]]:
+    """Relative changes of the numbers of the car that the runs move for sure, and their standard errors."""
+    logs, prior = state.logs, posterior.prior
+    return {prior.names[index]: (float(np.expm1(logs[index])), float(np.exp(logs[index]) * errors[index]))
+            for index in np.argsort(-np.abs(logs / prior.deviations)) if abs(logs[index]) > CONFLICT_SIGMA * errors[index]}
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:

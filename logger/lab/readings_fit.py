@@ -133,8 +133,8 @@ def _shift(model: DriveModel, found: Fit, errors: Sequence[RecordError | None], 
         if error is None or k is None:
             solved.append(None)
             continue
-        record, places = model.records[run], len(error.basis)
-        by_place = (error.slopes(predictions[run])[:places] * record.read)[:, record.first:]
+        record, places = model.records[run], error.places
+        by_place = (error.slopes(predictions[run])[:places].toarray() * record.read)[:, record.first:]
         columns = found.noise.whiteners[run](found.low_pass.apply(by_place.T))
         prior = error.precision(USUAL)[:places, :places]
         whole = columns.T @ columns + prior
@@ -151,7 +151,7 @@ def _shift(model: DriveModel, found: Fit, errors: Sequence[RecordError | None], 
             moved.append(None)
             continue
         there = k.copy()
-        there[: len(error.basis)] += own[:, -1] - own[:, :-1] @ step
+        there[: error.places] += own[:, -1] - own[:, :-1] @ step
         moved.append(there)
     return _Shift(moved, lost, freedom)
 

@@ -54,7 +54,7 @@ def nothing_is_missing(found: Diagnosis) -> bool:
 
 def test_a_car_as_its_file_says_lacks_nothing(flawless: SimulatedRuns) -> None:
     found = diagnosed(flawless)
-    assert nothing_is_missing(found) and not found.conflicts and not found.missing
+    assert nothing_is_missing(found) and not found.beyond and not found.missing
     assert found.final_error == pytest.approx(found.noise_floor_error, rel=0.05)
     assert found.noise.deviation_mps2 == pytest.approx(NOISE_MPS2, rel=0.05)
     assert all(one.p_value > FALSE_ALARM for one in found.candidates)
@@ -160,9 +160,9 @@ def test_what_only_another_car_would_explain_is_unexplained() -> None:
     stiff = changed(CAR, {name: 1.35 * read(CAR, name) for name in SPRINGS})
     found = diagnosed(secret_runs(car=stiff), ("sensor_gain", "sensor_mount_resonance"), tolerance=Tolerance(0.05))
     assert found.verdict == () and found.unexplained
-    assert {*SPRINGS} <= found.conflicts.keys()
-    assert all(abs(np.log1p(share)) > Tolerance.band * 0.02 for share in found.conflicts.values())
-    assert all(0.15 < found.conflicts[name] < 0.40 for name in SPRINGS)
+    assert {*SPRINGS} <= found.beyond.keys()
+    assert all(abs(np.log1p(share)) > Tolerance.band * 0.02 for share in found.beyond.values())
+    assert all(0.15 < found.beyond[name] < 0.40 for name in SPRINGS)
     assert not found.exceeds_noise and found.shape is None
 
 

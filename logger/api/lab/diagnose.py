@@ -168,10 +168,10 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
     if found.missing:
         one = found.missing[0].effect.name
         return "Next: " + question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
-    if found.conflicts and not found.exceeds_noise:
-        words = (f"Next: see whether {', '.join(found.conflicts)} of the vehicle's file can be right. From the runs "
+    if found.beyond and not found.exceeds_noise:
+        words = (f"Next: see whether {', '.join(found.beyond)} of the vehicle's file can be right. From the runs "
                  "alone they are found by")
-        return wrapped([words]) + "\n" + question.command(f"identify --free {','.join(found.conflicts)} {{}}")
+        return wrapped([words]) + "\n" + question.command(f"identify --free {','.join(found.beyond)} {{}}")
     if found.unexplained:
         return wrapped(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where the residual is."])
@@ -356,8 +356,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"Candidates that improve the fit by less than {IMITATION:.0%} of what a full explanation "
                          "would are not named: they may only imitate what is missing.")
-    if found.conflicts:
-        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
+    if found.beyond:
+        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
         lines.append(f"These numbers of the vehicle's file are beyond their tolerance: {off}. Measure them: the file "
                      "is wrong there, or an effect is missing that no candidate explains.")
     lines += error_words(found.steps, found.noise_floor_error)
@@ -456,7 +456,7 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
              "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
             for one in found.candidates],
         "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
-        "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
+        "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.beyond),
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
@@ -580,7 +580,7 @@ def car_sections(found: LabDiagnosis) -> Html:
         return EMPTY
     bars = Bars("How far each number was refitted", "% of the file's value", tuple(
         (name, 100 * share) for name, (share, _) in found.car.moved.items()))
-    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "more than it should" if name in found.conflicts else "")
+    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "more than it should" if name in found.beyond else "")
             for name, (share, tolerance) in found.car.moved.items()]
     numbers = chart(bars) + grid(("Number", "Refitted by", "Usual", ""), rows, words=(0, 3)) + hint(
         "A number that has to move far may stand in for an effect that is not among the candidates.")

@@ -90,13 +90,14 @@ class RecordError:
     """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
     of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop).
 
-    basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]
+    basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]; a sparse array, as of a spline's
+                   four are not 0 at a sample
     knot_s         time between the knots of the spline
     delay_std_s    standard error of the delay of its places; None: they have none
     """
 
     run: Run
-    basis: Array
+    basis: csr_array
     tolerance: Tolerance
     knot_s: float
     delay_std_s: float | None = None
@@ -104,23 +105,30 @@ class RecordError:
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
         """The record error of a run."""
+        from scipy.sparse import csr_array, vstack
+
         lasts_s = (run.count - 1) / run.rate_hz
         pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
         delay_std_s = run.facts.late_std_s
         late = [run.speed_mps] if delay_std_s else []
-        basis = np.vstack([_cubic_b_splines(pieces, run.count), *late, run.distance_m - run.distance_m[0],
-                           -_roughness(run)])
+        basis = csr_array(vstack([_cubic_b_splines(pieces, run.count), *map(csr_array, (
+            one[None] for one in (*late, run.distance_m - run.distance_m[0], -_roughness(run))))]))
         return RecordError(run, basis, tolerance, lasts_s / pieces, delay_std_s)
 
     @property
     def count(self) -> int:
         """Number of the numbers k."""
-        return len(self.basis) + 2
+        return self.places + 2
+
+    @property
+    def places(self) -> int:
+        """Number of the numbers of the distance, the first of k."""
+        return int(self.basis.shape[0])
 
     @property
     def spline_count(self) -> int:
         """Number of coefficients of the spline, the first of k."""
-        return len(self.basis) - (2 if self.delay_std_s is None else 3)
+        return self.places - (2 if self.delay_std_s is None else 3)
 
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
@@ -134,7 +142,7 @@ class RecordError:
     def trend(self) -> Array:
         """Columns (k, t) whose products with k are the start and the scale error."""
         found = np.zeros((self.count, 2))
-        found[: self.spline_count, 0], found[-4, 1] = self.basis[: self.spline_count, 0], 1.0
+        found[: self.spline_count, 0], found[-4, 1] = self.basis[: self.spline_count, [0]].toarray()[:, 0], 1.0
         return found
 
     def trend_precisions(self, size: ErrorSize) -> Array:
@@ -161,14 +169,7 @@ class RecordError:
 
     def distance_error_m(self, k: Array) -> Array:
         """Distance driven minus distance recorded (n,) [m]."""
-        return np.asarray(self._sparse_basis @ k[: len(self.basis)])
-
-    @cached_property
-    def _sparse_basis(self) -> csr_array:
-        """The transposed basis (n, k - 2), of which four in a row are the spline's."""
-        from scipy.sparse import csr_array
-
-        return csr_array(self.basis.T)
+        return np.asarray(self.basis.T @ k[: self.places])
 
     def without_trend(self, k: Array) -> Array:
         """The numbers (k,) without start and scale error: a straight line along the way is subtracted. A delay is
@@ -176,37 +177,43 @@ class RecordError:
         moved, way = self.distance_error_m(k), self.run.distance_m - self.run.distance_m[0]
         trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
         found = self.coefficients_of(moved - trend)
-        roughness = len(self.basis) - 1
+        roughness = self.places - 1
         found[roughness:] = k[roughness:]
         return found
 
     def without_distance_error(self, k: Array) -> Array:
         """The numbers (k,) with an exact distance and the same recorder."""
-        return np.concatenate([np.zeros(len(self.basis)), k[len(self.basis):]])
+        return np.concatenate([np.zeros(self.places), k[self.places :]])
 
     def coefficients_of(self, distance_error_m: Array) -> Array:
         """Numbers (k,) of the least-squares spline through a distance error (n,) [m], with an exact recorder."""
-        curve, *_ = np.linalg.lstsq(self.basis[: self.spline_count].T, distance_error_m, rcond=None)
+        from scipy.sparse.linalg import spsolve
+
+        spline = self.basis[: self.spline_count]
+        curve = spsolve((spline @ spline.T).tocsc(), spline @ distance_error_m)
         return np.concatenate([curve, np.zeros(self.count - len(curve))])
 
     def with_recorder_error(self, prediction: Array, k: Array) -> Array:
         """A prediction (n,), or more signals joined to it, as a recorder with these numbers (k,) records it."""
         main = self.run.main(prediction)
         rise = derivative(main, self.run.rate_hz)
-        found = np.asarray(main + k[len(self.basis) :] @ _recorder_slopes(main, rise, self.run))
+        found = np.asarray(main + k[self.places :] @ _recorder_slopes(main, rise, self.run))
         return np.concatenate([found, prediction[len(main) :]]) if len(main) < len(prediction) else found
 
-    def slopes(self, prediction: Array) -> Array:
-        """Derivatives of a prediction (n,), or of more signals joined to it, by each of k: (k, n) [m/s2 per unit]. The
-        distance moves all signals; the recorder's numbers are those of the sensor."""
-        n, places = self.run.count, len(self.basis)
-        found = np.empty((self.count, len(prediction)))
+    def slopes(self, prediction: Array) -> csr_array:
+        """Derivatives of a prediction (n,), or of more signals joined to it, by each of k: a sparse array (k, n) [m/s2
+        per unit]. The distance moves all signals; the recorder's numbers are those of the sensor."""
+        from scipy.sparse import block_array, csr_array
+
+        n, found = self.run.count, []
         for start in range(0, len(prediction), n):
             rise = derivative(prediction[start : start + n], self.run.rate_hz)
             by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
-            np.multiply(self.basis, by_place, out=found[:places, start : start + n])
-            found[places:, start : start + n] = 0.0 if start else _recorder_slopes(prediction[:n], rise, self.run)
-        return found
+            moved = csr_array((self.basis.data * by_place[self.basis.indices], self.basis.indices, self.basis.indptr),
+                              self.basis.shape)
+            recorded = csr_array((2, n)) if start else csr_array(_recorder_slopes(prediction[:n], rise, self.run))
+            found.append([[moved], [recorded]])
+        return csr_array(block_array([[column[row][0] for column in found] for row in range(2)], format="csr"))
 
 
 class RigRecordError(RecordError):
@@ -243,7 +250,9 @@ class RigRecordError(RecordError):
 
 def record_error(run: Run, tolerance: Tolerance) -> RecordError:
     """The record error of a run, on a road or on a rig."""
-    return RigRecordError(run, np.empty((0, run.count)), tolerance, 1.0) if run.timed else (
+    from scipy.sparse import csr_array
+
+    return RigRecordError(run, csr_array((0, run.count)), tolerance, 1.0) if run.timed else (
         RecordError.of(run, tolerance))
 
 
@@ -261,16 +270,16 @@ def unusual_distance_error_m(errors: Sequence[RecordError], record: Sequence[Arr
     return found
 
 
-def _cubic_b_splines(pieces: int, count: int) -> Array:
+def _cubic_b_splines(pieces: int, count: int) -> csr_array:
     """Cubic B-splines with a knot after each of so many pieces, at ``count`` places from end to end (pieces + 3, n)."""
+    from scipy.sparse import csr_array
+
     place = np.linspace(0, pieces, count)
     first = np.minimum(place.astype(np.intp), pieces - 1)
     u = place - first
-    found = np.zeros((pieces + 3, count))
-    for later, weight in enumerate((
-            (1 - u) ** 3, (3 * u - 6) * u**2 + 4, ((3 - 3 * u) * u + 3) * u + 1, u**3)):
-        found[first + later, np.arange(count)] = weight / 6
-    return found
+    weights = np.stack([(1 - u) ** 3, (3 * u - 6) * u**2 + 4, ((3 - 3 * u) * u + 3) * u + 1, u**3]) / 6
+    rows, columns = first + np.arange(4)[:, None], np.broadcast_to(np.arange(count), (4, count))
+    return csr_array((weights.ravel(), (rows.ravel(), columns.ravel())), (pieces + 3, count))
 
 
 def _roughness(run: Run, smooth_s: float = 1.0) -> Array:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,14 @@ from logger.lab.likelihood.signals import JointWhitener
 from logger.lab.likelihood.whittle import Whitener
 from logger.vehicle.named_parameters import free_parameters_of
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 Array = npt.NDArray[np.float64]
 
+_COLUMNS_AT_ONCE = 32
+"""So many derivatives of a record are whitened at once: their spectra before the choice of bands are 30 MB of a drive of
+ten minutes. Measured: more of them gain no time."""
 _UNINFORMATIVE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
 """Start and scale error as good as free: their precisions are a millionth of a good recorder's, above what would make
 the information of a run without either singular."""
@@ -31,14 +38,34 @@ the information of a run without either singular."""
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """The record error of one run at a state: its whitened derivatives (k, kept), their products (k, k), the gradient
-    of its numbers (k,), and these."""
+    """The record error of one run at a state: its derivatives (k, n), the products of these whitened (k, k), the
+    gradient of its numbers (k,), and these. The derivatives are sparse; whitened they are not, and are not kept: what
+    they are multiplied with is whitened once more instead (``projected``)."""
 
     error: RecordError
-    white: Array
+    slopes: csr_array
+    whitener: Whitener | JointWhitener
     gram: Array
     gradient: Array
     here: Array
+
+    @staticmethod
+    def of(error: RecordError, slopes: csr_array, whitener: Whitener | JointWhitener, residual: Array,
+           here: Array) -> _Record:
+        """With derivatives (k, n), at a residual (n,) and the numbers (k,)."""
+        white = np.empty((error.count, whitener.kept))
+        for start in range(0, error.count, _COLUMNS_AT_ONCE):
+            part = slice(start, start + _COLUMNS_AT_ONCE)
+            white[part] = whitener(slopes[part].toarray())
+        return _Record(error, slopes, whitener, white @ white.T, white @ whitener(residual), here)
+
+    def projected(self, white: Array) -> Array:
+        """Products (k,) or (k, m) of the whitened derivatives with whitened samples (kept,) or (m, kept)."""
+        return np.asarray(self.slopes @ self.whitener.adjoint(white).T)
+
+    def change(self, step: Array) -> Array:
+        """Whitened change (kept,) of the prediction by steps of the numbers (k,), to first order."""
+        return self.whitener(self.slopes.T @ step)
 
     def root(self, size: ErrorSize) -> Array:
         """Lower Cholesky factor of the information (k, k)."""
@@ -91,20 +118,20 @@ class RecordErrorFit:
 
     record           numbers of the record errors (k,) per run
     squares          sum of squares of the whitened residuals and of these numbers
-    before, steps    whitened residuals (kept,) per run before the record errors took these steps (k,) ...
-    slopes           ... along their derivatives (k, kept)
+    before, steps    whitened residuals (kept,) per run before the record errors took these steps (k,)
     """
 
     record: list[Array]
     squares: float
     before: list[Array]
     steps: list[Array]
-    slopes: list[Array]
+    _records: list[_Record]
 
     @cached_property
     def residuals(self) -> list[Array]:
         """Whitened residuals (kept,) per run, with these record errors."""
-        return [white - step @ slopes for white, step, slopes in zip(self.before, self.steps, self.slopes, strict=True)]
+        return [white - one.change(step) for white, step, one in zip(
+            self.before, self.steps, self._records, strict=True)]
 
 
 class LinearModel:
@@ -124,12 +151,12 @@ class LinearModel:
         self.whiteners: list[Whitener | JointWhitener] = [
             one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)
         ] if expected is None else list(expected)
-        self._records = []
-        for error, whitener, readings, prediction, residual, here in zip(
+        self._records = [
+            _Record.of(error, (error.slopes(prediction) * readings.sensitive(prediction)).tocsr(), whitener, residual,
+                       here)
+            for error, whitener, readings, prediction, residual, here in zip(
                 posterior.record_errors, self.whiteners, posterior.readings, state.predictions, residuals, state.record,
-                strict=True):
-            white = whitener(readings.without_insensitive_samples(error.slopes(prediction), prediction))
-            self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
+                strict=True)]
         self.size = self._most_likely_size(state.size) if expected is None else state.size
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
         self._precisions = [one.error.precision(self.size) for one in self._records]
@@ -139,7 +166,7 @@ class LinearModel:
     def _set_number_slopes(self, numbers: Sequence[Array] | None) -> None:
         self.numbers = numbers
         self.count = 0 if numbers is None else len(self.prior.names)
-        self.white = [np.empty((0, one.white.shape[1])) for one in self._records] if numbers is None else (
+        self.white = [np.empty((0, one.kept)) for one in self.whiteners] if numbers is None else (
             self.whitened(numbers))
         self._record_projections = self.record_projections(self.white)
 
@@ -206,7 +233,7 @@ class LinearModel:
         absorb of the products of the columns."""
         from scipy.linalg import solve_triangular
 
-        return [solve_triangular(root, one.white @ columns.T, lower=True)
+        return [solve_triangular(root, one.projected(columns), lower=True)
                 for root, one, columns in zip(self._roots, self._records, white, strict=True)]
 
     def whitened(self, columns: Sequence[Array]) -> list[Array]:
@@ -234,13 +261,13 @@ class LinearModel:
         for residual, whitener, root, precision, one, here in zip(
                 residuals, self.whiteners, self._roots, self._precisions, self._records, record, strict=True):
             white = whitener(residual)
-            owed = one.white @ white - precision @ here
+            owed = one.projected(white) - precision @ here
             step = cho_solve((root, True), owed)
             whites.append(white)
             steps.append(step)
             found.append(here + step)
             squares += float(white @ white + here @ precision @ here - owed @ step)
-        return RecordErrorFit(found, squares, whites, steps, [one.white for one in self._records])
+        return RecordErrorFit(found, squares, whites, steps, self._records)
 
     def objective(self, predictions: Sequence[Array], logs: Array) -> float:
         """Sum of squares of the whitened residuals and cost of the priors, with the most likely record errors."""

@@ -83,19 +83,45 @@ class VehiclePrior:
         """Half of the cost's first derivative (p,)."""
         return np.asarray(logs / self.deviations**2)
 
-    def beyond(self, logs: Array, errors: Array) -> dict[str, float]:
-        """Relative changes of the numbers that runs move beyond their tolerance, the farthest first, by name.
+    def beyond_tolerance(self, logs: Array, covariance: Array) -> dict[str, float]:
+        """Relative changes of the numbers that the runs move beyond their tolerance, the farthest first, by name.
+
+        logs, covariance    fitted logarithms (p,) and their covariance (p, p), which includes the prior
+
+        Of all cars within the tolerance the likeliest is found, by the likelihood alone to second order. Where it
+        explains the runs worse than the fitted one by ``CONFLICT_SIGMA`` squared, the file is wrong in those numbers
+        that are at the end of their tolerance in it. So two lengths of which the runs know the sum alone, a wheelbase,
+        show an error of that.
+        """
+        from scipy.optimize import lsq_linear
+
+        # In units of the prior: the posterior's information is that of the runs and one.
+        place, scaled = logs / self.deviations, covariance / np.outer(self.deviations, self.deviations)
+        variances, ways = np.linalg.eigh(scaled)
+        # A direction of which the runs say less than a thousandth of what the prior does is where the prior has it.
+        known = (variances > 0) & (variances < 1 / (1 + 1e-3))
+        weights = 1 / variances[known] - 1
+        columns = np.sqrt(weights)[:, None] * ways[:, known].T
+        # The fitted place is the mean of the runs' own estimate and of the prior's, by their information.
+        likeliest = (1 + weights) / np.sqrt(weights) * (ways[:, known].T @ place)
+        within = np.asarray(lsq_linear(columns, likeliest, (-Tolerance.band, Tolerance.band)).x, float)
+        worse = ((columns @ within - likeliest) ** 2).sum() - ((columns @ place - likeliest) ** 2).sum()
+        ended = (np.abs(within) > (1 - 1e-3) * Tolerance.band) & (np.abs(place) > Tolerance.band)
+        if not worse > CONFLICT_SIGMA**2:
+            return {}
+        return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-np.abs(place)) if ended[index]}
+
+    def is_in_conflict(self, logs: Array, errors: Array) -> bool:
+        """Whether the runs move a number beyond its tolerance, and farther than numbers are off by chance.
 
         logs, errors    fitted logarithms and their standard errors (p,), which include the prior
 
         Where the prior is right, a fitted number scatters around it by the root of what the runs took from its
-        variance. One that lies outside of its band and farther off than ``UNUSUAL_SIGMA`` times that is beyond. So two
-        lengths of which the runs know the sum alone, a wheelbase, show an error of that.
+        variance.
         """
         scatter = np.sqrt(np.maximum(self.deviations**2 - errors**2, 0.0))
-        moved, off = np.abs(logs), np.abs(logs / self.deviations)
-        return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-off)
-                if off[index] > Tolerance.band and moved[index] > UNUSUAL_SIGMA * scatter[index]}
+        return bool(((np.abs(logs) > Tolerance.band * self.deviations)
+                     & (np.abs(logs) > UNUSUAL_SIGMA * scatter)).any())
 
     @property
     def precision(self) -> Array:

@@ -73,13 +73,15 @@ class Readings:
     def without_insensitive_samples(self, columns: Array, prediction: Array) -> Array:
         """Derivatives of a prediction (n,), or of more signals joined to it, (n,) or (m, n), zero where the readings
         would not change with it."""
+        return columns if self.run.usable is None else np.asarray(columns * self.sensitive(prediction))
+
+    def sensitive(self, prediction: Array) -> Bools:
+        """Whether the readings would change with a prediction (n,), or more signals joined to it, at each sample."""
         usable, run = self.run.usable, self.run
         if usable is None:
-            return columns
-        main = run.main(prediction)
-        reached = (usable == CLIPPED) & (run.residual(main) == 0)
-        counts = np.concatenate([run.read & ~reached, *(run.read for _ in run.signals)])
-        return np.asarray(columns * counts[: len(prediction)])
+            return np.ones(len(prediction), dtype=bool)
+        reached = (usable == CLIPPED) & (run.residual(run.main(prediction)) == 0)
+        return np.concatenate([run.read & ~reached, *(run.read for _ in run.signals)])[: len(prediction)]
 
     def given(self, prediction: Array) -> Readings:
         """The readings taken for bounds, given a prediction (n,), or more signals joined to it; with their rounding as

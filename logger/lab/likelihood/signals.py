@@ -64,9 +64,18 @@ class JointWhitener:
 
     each: list[Whitener]
 
+    @property
+    def kept(self) -> int:
+        return sum(one.kept for one in self.each)
+
     def __call__(self, samples: Array) -> Array:
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
+
+    def adjoint(self, white: Array) -> Array:
+        kept = np.cumsum([one.kept for one in self.each])[:-1]
+        return np.concatenate([one.adjoint(np.ascontiguousarray(part)) for one, part in zip(
+            self.each, np.split(white, kept, axis=-1), strict=True)], axis=-1)
 
     def in_time(self, samples: Array) -> Array:
         parts = np.split(samples, len(self.each), axis=-1)

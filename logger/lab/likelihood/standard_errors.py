@@ -26,12 +26,13 @@ class StandardErrors:
     """Standard errors of a fitted model.
 
     effects    its effects, with those of their numbers; larger than the whole range of a number: infinite
-    logs       of the logarithms of the car's numbers (p,)
+    logs       of the logarithms of the car's numbers (p,), and their covariance (p, p)
     numbers    of all numbers of car and effects, in their own units, with their correlations
     """
 
     effects: tuple[Chosen, ...]
     logs: Array
+    covariance: Array
     numbers: NumberErrors
 
 
@@ -44,7 +45,8 @@ def standard_errors(found: LinearModel) -> StandardErrors:
     own, free_parameters = deviations[linear.count:], free_parameters_of(state.effects)
     ranges = [range_of(state.effects[free.effect].effect.parameters[free.parameter]) for free in free_parameters]
     effects = with_standard_errors(state.effects, free_parameters, np.where(own < ranges, own, np.inf))
-    return StandardErrors(effects, deviations[: linear.count], _number_errors(linear, covariance))
+    p = linear.count
+    return StandardErrors(effects, deviations[:p], covariance[:p, :p], _number_errors(linear, covariance))
 
 
 def deviations_from_null(one: Chosen) -> float:

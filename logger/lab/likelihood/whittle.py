@@ -147,16 +147,32 @@ class Whitener:
         middle = 0.5 * (edges[1:] + edges[:-1])
         self._gain = np.exp(-0.5 * np.interp(f_hz[self._inside], middle, np.log(levels)))
 
+    @property
+    def kept(self) -> int:
+        """Number of the numbers that whitened samples are."""
+        return 2 * len(self._gain)
+
     def __call__(self, samples: Array) -> Array:
         """Samples (n,) or (columns, n), whole, as numbers (..., kept) whose products are those of the whitened samples
         that count, in units of the noise: Parseval's theorem, without the frequencies outside of all bands."""
         both_sides = np.sqrt(2 / self._padded)
         return (self._spectrum(samples) * (both_sides * self._gain)).view(float)
 
+    def adjoint(self, white: Array) -> Array:
+        """Samples (..., n), whole, whose products with other samples are those of numbers (..., kept) with these
+        whitened."""
+        found = np.zeros((*white.shape[:-1], self._first + self._count))
+        found[..., self._first :] = self._in_time(white.view(complex) * (np.sqrt(self._padded / 2) * self._gain))
+        return found
+
     def in_time(self, samples: Array) -> Array:
         """Whitened samples that count (..., n - first) of samples (n,) or (columns, n), in units of the noise."""
-        spectrum = np.zeros((*samples.shape[:-1], self._padded // 2 + 1), complex)
-        spectrum[..., self._inside] = self._spectrum(samples) * self._gain
+        return self._in_time(self._spectrum(samples) * self._gain)
+
+    def _in_time(self, inside: npt.NDArray[np.complex128]) -> Array:
+        """Samples that count (..., n - first) by their spectrum at the frequencies of the bands."""
+        spectrum = np.zeros((*inside.shape[:-1], self._padded // 2 + 1), complex)
+        spectrum[..., self._inside] = inside
         return np.fft.irfft(spectrum, self._padded, axis=-1)[..., : self._count]
 
     def _spectrum(self, samples: Array) -> npt.NDArray[np.complex128]:

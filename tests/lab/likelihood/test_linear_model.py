@@ -61,7 +61,7 @@ class Dense:
 def dense(one: Case) -> Dense:
     linear, parts = one.linear, []
     assert linear.numbers is not None
-    record = [whitener(error.slopes(prediction)) for whitener, error, prediction in zip(
+    record = [whitener(error.slopes(prediction).toarray()) for whitener, error, prediction in zip(
         linear.whiteners, one.posterior.record_errors, one.state.predictions, strict=True)]
     for index, (whitener, numbers, own) in enumerate(zip(linear.whiteners, linear.numbers, one.own, strict=True)):
         of_records = [block if index == other else np.zeros((len(block), record[index].shape[1]))
@@ -147,7 +147,7 @@ def test_the_sizes_are_those_with_the_most_evidence() -> None:
     posterior = drawn([], 3, ErrorSize(0.01, 0.04, 0.0003), lasts_s=6.0).posterior
     linear = LinearModel(posterior, posterior.start())
     white = linear.whitened(posterior.residuals(linear.state))
-    slopes = [whitener(error.slopes(each)) for whitener, error, each in zip(
+    slopes = [whitener(error.slopes(each).toarray()) for whitener, error, each in zip(
         linear.whiteners, posterior.record_errors, linear.state.predictions, strict=True)]
 
     def minus_twice_log_density(residual: Array, slope: Array, precision: Array) -> float:

@@ -69,7 +69,7 @@ class Dense:
         assert linear.numbers is not None
         self._linear = linear
         numbers = linear.whitened(linear.numbers)
-        records = linear.whitened([one.slopes(y) for one, y in zip(errors, state.predictions, strict=True)])
+        records = linear.whitened([one.slopes(y).toarray() for one, y in zip(errors, state.predictions, strict=True)])
         p, counts = len(numbers[0]), [one.count for one in errors]
         ends = p + np.cumsum([0, *counts])
         self.count, self.prior = p, np.zeros((ends[-1], ends[-1]))
