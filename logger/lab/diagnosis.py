@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
@@ -28,7 +27,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -36,7 +35,7 @@ from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
-from logger.lab.selection.detectability import Undetectable, undetectable_effects
+from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
 from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
@@ -47,7 +46,6 @@ from logger.runs import BY_ROAD
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.named_parameters import free_parameters_of
 
-Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
 ALREADY_PRESENT = "the model has it"
@@ -91,7 +89,8 @@ class Diagnosis:
     beyond               numbers of the car that the runs move beyond their tolerance, with their relative change
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
-                         farthest first, by their tolerance
+                         farthest first, by their tolerance; of masses and forces, against their mean
+    as_moved             the effect that changes the records as the move of all of these does; None: none does
     effects              of the model that it ends with, with standard errors
     undetectable         effects that these runs could not show at their usual strength
     shape                of the unexplained residual; None where it is noise
@@ -128,6 +127,7 @@ class Diagnosis:
     tolerance: float = Tolerance().share
     no_better: tuple[str, ...] = ()
     moved: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    as_moved: Chosen | None = None
 
     @property
     def exceeds_noise(self) -> bool:
@@ -217,7 +217,8 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
-        moved={name: one for name, one in _moved(fine, state, errors.logs).items() if name not in beyond},
+        moved={name: one for name, one in fine.prior.moved(state.logs, errors.covariance).items() if name not in beyond},
+        as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
@@ -265,13 +266,6 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
                 return selection, after
             ended = [weakest.effect.name]
         selection = search.without_effect(selection, ended[0])
-
-
-def _moved(posterior: Posterior, state: State, errors: Array) -> dict[str, tuple[float, float]]:
-    """Relative changes of the numbers of the car that the runs move for sure, and their standard errors."""
-    logs, prior = state.logs, posterior.prior
-    return {prior.names[index]: (float(np.expm1(logs[index])), float(np.exp(logs[index]) * errors[index]))
-            for index in np.argsort(-np.abs(logs / prior.deviations)) if abs(logs[index]) > CONFLICT_SIGMA * errors[index]}
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:

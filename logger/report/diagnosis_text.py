@@ -49,6 +49,10 @@ def summary(found: Diagnosis) -> list[str]:
                      "is wrong there, or an effect is missing that no candidate explains.")
     if found.moved:
         lines.append(_moved(found))
+    if found.as_moved is not None:
+        one = found.as_moved
+        lines.append(f"All of this move together is what {one.effect.name} does ({one.effect.title}): "
+                     f"{numbers_of(one)}. To know: {one.effect.shown_by}.")
     lines += error_words(found.steps, found.noise_floor_error)
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
@@ -78,14 +82,13 @@ def untested(found: Diagnosis) -> list[str]:
 
 
 def _moved(found: Diagnosis) -> str:
-    """What the runs say of the car's numbers, the farthest first, and which effect would do the same."""
-    alike = {one.alike: one.effect.name for one in reversed(found.undetectable) if one.alike}
-    shown = [f"{name} by {share:+.1%} ± {error:.1%}" + (f" (as {alike[name]} would)" if name in alike else "")
+    """What the runs say of the car's numbers, the farthest first."""
+    shown = [f"{name} by {share:+.1%} ± {error:.1%}"
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
     rest = len(found.moved) - len(shown)
-    return (f"Within their tolerance the runs move numbers of the vehicle's file for sure: {', '.join(shown)}"
-            f"{f', and {rest} more' * bool(rest)}. Measure what matters to you: a number that is right in the file "
-            "shows an effect that is hidden by it now.")
+    return (f"Within their tolerance the runs move numbers of the vehicle's file: {', '.join(shown)}"
+            f"{f', and {rest} more' * bool(rest)}. Measure them: with a number that is right in the file, and a "
+            "smaller --tolerance, an effect that it hides would be named.")
 
 
 def _alike(one: Undetectable) -> str:
@@ -159,6 +162,8 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.beyond),
         "numbers_moved": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},
+        "moved_as_by": None if found.as_moved is None else {
+            "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,

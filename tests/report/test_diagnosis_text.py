@@ -108,6 +108,24 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
                                "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
 
 
+def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:
+    found = replace(NOTHING, beyond={"front.cg_distance_m": 0.054, "rear.cg_distance_m": 0.046})
+    nothing, beyond, _ = summary(found)
+    assert not found.unexplained
+    assert nothing.startswith("No effect is missing") and "within their tolerance" not in nothing
+    assert "front.cg_distance_m by +5%, rear.cg_distance_m by +5%. Measure them" in beyond
+
+
+def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_same() -> None:
+    found = replace(NOTHING, moved={"sprung_mass_kg": (0.104, 0.014)}, as_moved=chosen(
+        EFFECTS["payload"], {"mass_kg": 108.05}))
+    _, moved, same, _ = summary(found)
+    assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure" in moved
+    assert same.startswith("All of this move together is what payload does") and "mass_kg 108 kg" in same
+    assert as_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
+    assert as_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
+
+
 def test_distances_that_are_off_are_reported() -> None:
     off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
     assert any("up to 0.34 m. That makes 40% of" in one for one in diagnosis_summary(off))

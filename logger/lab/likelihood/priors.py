@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.effect_sizes import grows_with_mass
 from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.vehicle import Vehicle
 
@@ -110,6 +111,17 @@ class VehiclePrior:
         if not worse > CONFLICT_SIGMA**2:
             return {}
         return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-np.abs(place)) if ended[index]}
+
+    def moved(self, logs: Array, covariance: Array) -> dict[str, tuple[float, float]]:
+        """Relative changes of the numbers that the runs move for sure, and their standard errors, the farthest first,
+        by their tolerance; arguments as of ``beyond_tolerance``. A car in which all masses and forces are larger by one
+        factor moves the same: these are counted from their mean change."""
+        scaling = np.array([float(grows_with_mass(name)) for name in self.names])
+        against = np.eye(len(logs)) - np.outer(scaling, scaling / max(scaling.sum(), 1.0))
+        logs, errors = against @ logs, np.sqrt(np.maximum(np.diag(against @ covariance @ against.T), 0.0))
+        return {self.names[index]: (float(np.expm1(logs[index])), float(np.exp(logs[index]) * errors[index]))
+                for index in np.argsort(-np.abs(logs / self.deviations))
+                if abs(logs[index]) > CONFLICT_SIGMA * errors[index]}
 
     def is_in_conflict(self, logs: Array, errors: Array) -> bool:
         """Whether the runs move a number beyond its tolerance, and farther than numbers are off by chance.

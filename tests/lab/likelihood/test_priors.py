@@ -43,17 +43,49 @@ def test_logarithms_bring_one_car_to_another_and_back() -> None:
         assert read(other, name) == pytest.approx(read(CAR, name) * np.exp(log))
 
 
-def test_a_number_is_beyond_its_tolerance_where_the_runs_move_it_farther_than_chance() -> None:
-    """Drawn from the prior and measured with an error, a number is rarely beyond; a wheelbase of which the runs know
-    the sum alone, half of it at either end, is beyond at two of its prior's deviations each."""
+def covariance_of(information: np.ndarray) -> np.ndarray:
+    """Posterior covariance by the information of the runs (p, p), in units of the prior."""
+    return np.linalg.inv(information + np.eye(len(PRIOR.names))) * np.outer(PRIOR.deviations, PRIOR.deviations)
+
+
+def test_numbers_are_in_conflict_where_the_runs_move_them_farther_than_chance() -> None:
+    """Drawn from the prior and measured with an error, a number is rarely so."""
     rng, deviations = np.random.default_rng(2), PRIOR.deviations
     known = 0.3 * deviations
     errors = (deviations**-2 + known**-2) ** -0.5
     drawn = [errors**2 / known**2 * (rng.normal(0, deviations) + rng.normal(0, known)) for _ in range(400)]
-    assert sum(bool(PRIOR.beyond(one, errors)) for one in drawn) / 400 < 0.06  # 13 numbers, three deviations: 0.035
+    assert sum(PRIOR.is_in_conflict(one, errors) for one in drawn) / 400 < 0.06  # 13 numbers, three deviations: 0.035
+    assert not PRIOR.is_in_conflict(np.full(len(deviations), 1.5) * deviations, 0.999 * deviations)  # within the band
+
+
+def test_a_number_is_beyond_its_tolerance_where_no_car_within_it_explains_the_runs() -> None:
     lengths = np.isin(PRIOR.names, ["front.cg_distance_m", "rear.cg_distance_m"])
-    half = np.where(lengths, deviations / np.sqrt(2), deviations)
-    moved = np.where(lengths, 2.2 * deviations, 0.0)
-    assert {*PRIOR.beyond(moved, half)} == {"front.cg_distance_m", "rear.cg_distance_m"}
-    assert not PRIOR.beyond(moved, np.where(lengths, known, deviations))  # known well, they may be so far off
-    assert not PRIOR.beyond(np.full(len(deviations), 1.5) * deviations, 0.999 * deviations)  # within the band
+    well = covariance_of(np.diag(np.where(lengths, 400.0, 1.0)))  # known to a twentieth of the prior
+    assert {*PRIOR.beyond_tolerance(2.2 * lengths * PRIOR.deviations, well)} == {
+        "front.cg_distance_m", "rear.cg_distance_m"}
+    badly = covariance_of(np.diag(np.where(lengths, 4.0, 1.0)))
+    assert not PRIOR.beyond_tolerance(2.2 * lengths * PRIOR.deviations, badly)
+    assert not PRIOR.beyond_tolerance(1.5 * lengths * PRIOR.deviations, well)
+
+
+def test_a_wheelbase_of_which_the_runs_know_the_sum_alone_is_beyond_at_both_ends() -> None:
+    lengths = np.isin(PRIOR.names, ["front.cg_distance_m", "rear.cg_distance_m"]).astype(float)
+    sum_alone = covariance_of(400.0 * np.outer(lengths, lengths))
+    assert {*PRIOR.beyond_tolerance(2.2 * lengths * PRIOR.deviations, sum_alone)} == {
+        "front.cg_distance_m", "rear.cg_distance_m"}
+    apart = covariance_of(np.diag(1e-9 * lengths))
+    assert not PRIOR.beyond_tolerance(2.2 * lengths * PRIOR.deviations, apart)
+
+
+def test_what_surely_moved_is_counted_from_the_common_scale_of_masses_and_forces() -> None:
+    """A load moves the mass against all others, though no run tells the size of all of them together."""
+    scaling = np.array([not name.endswith("_m") or "_per_m" in name for name in PRIOR.names], float)
+    load = (np.array(PRIOR.names) == "sprung_mass_kg") * np.log(1.1)
+    against = np.eye(len(load)) - np.outer(scaling, scaling) / scaling.sum()
+    found = PRIOR.moved(against @ load, covariance_of(1e4 * against))
+    (name, (share, error)), *others = found.items()
+    assert name == "sprung_mass_kg" and share == pytest.approx(0.9 * 0.1, abs=0.003) and error < 0.002
+    assert all(abs(less) < 0.012 for _, (less, _) in others)
+    assert not PRIOR.moved(against @ load, covariance_of(1e-3 * against))
+
+

@@ -7,13 +7,14 @@ import pytest
 
 from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.selection.detectability import DETECTABLE_SIGMA, undetectable_effects
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, effect_as_moved, undetectable_effects
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
 from ...support.lab.runs_with_residual import CAR, a_run, measuring
-from ...support.lab.secret_runs import EFFECTS, Dense, posterior_of, secret_runs
+from ...support.lab.secret_runs import EFFECTS, Dense, hidden, posterior_of, secret_runs
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +94,14 @@ def test_a_road_that_hardly_moves_the_car_hides_them_all() -> None:
     found = undetectable_effects(beside(slow_run(0.0, of_motion=40.0)), [EFFECTS[name] for name in NAMES])
     assert {one.effect.name for one in found} == set(NAMES)
     assert all(one.deviations < 1 for one in found)
+
+
+@pytest.mark.parametrize(("name", "values"), [("payload", {"mass_kg": 90.0}), ("cg_shift", {"shift_m": -0.1}), (None, {})])
+def test_an_effect_that_the_numbers_absorb_is_told_by_their_move(name: str | None, values: dict[str, float]) -> None:
+    """A load, or another centre of gravity, within the tolerance of 20 %; with nothing hidden there is no word."""
+    runs = posterior_of(secret_runs([hidden(name, **values)] if name else []), tolerance=Tolerance())
+    found = effect_as_moved(refit(runs, runs.start()).linear, [EFFECTS[one] for one in (
+        "payload", "cg_shift", "sensor_offset", "tire_enveloping", "tire_damping")])
+    assert (found and found.effect.name) == name
+    for number, value in values.items():
+        assert found is not None and found.values[number] == pytest.approx(value, rel=0.12)
