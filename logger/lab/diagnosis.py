@@ -217,7 +217,8 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
-        moved={name: one for name, one in fine.prior.moved(state.logs, errors.covariance).items() if name not in beyond},
+        moved={name: one for name, one in fine.prior.moved(state.logs, errors.covariance).items()
+               if name not in beyond},
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,

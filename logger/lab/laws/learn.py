@@ -215,7 +215,7 @@ def is_above_noise(model: Baseline) -> bool:
 
 
 def exceeds_noise(model: Baseline) -> bool:
-    """Whether the residual of a model is above the sensor's noise, or a number of the car is in conflict with its prior."""
+    """Whether the residual of a model is above the sensor's noise, or a number of the car conflicts with its prior."""
     errors = standard_errors(model.linear).logs
     return is_above_noise(model) or model.posterior.prior.is_in_conflict(model.state.logs, errors)
 

@@ -90,8 +90,8 @@ class RecordError:
     """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
     of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop).
 
-    basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]; a sparse array, as of a spline's
-                   four are not 0 at a sample
+    basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]; sparse: of a spline's, four
+                   are not 0 at a sample
     knot_s         time between the knots of the spline
     delay_std_s    standard error of the delay of its places; None: they have none
     """

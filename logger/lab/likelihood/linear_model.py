@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _COLUMNS_AT_ONCE = 32
-"""So many derivatives of a record are whitened at once: their spectra before the choice of bands are 30 MB of a drive of
-ten minutes. Measured: more of them gain no time."""
+"""So many derivatives of a record are whitened at once: 30 MB of spectra in a drive of ten minutes. Measured: more of
+them gain no time."""
 _UNINFORMATIVE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
 """Start and scale error as good as free: their precisions are a millionth of a good recorder's, above what would make
 the information of a run without either singular."""

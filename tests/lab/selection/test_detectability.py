@@ -96,7 +96,8 @@ def test_a_road_that_hardly_moves_the_car_hides_them_all() -> None:
     assert all(one.deviations < 1 for one in found)
 
 
-@pytest.mark.parametrize(("name", "values"), [("payload", {"mass_kg": 90.0}), ("cg_shift", {"shift_m": -0.1}), (None, {})])
+@pytest.mark.parametrize(("name", "values"), [
+    ("payload", {"mass_kg": 90.0}), ("cg_shift", {"shift_m": -0.1}), (None, {})])
 def test_an_effect_that_the_numbers_absorb_is_told_by_their_move(name: str | None, values: dict[str, float]) -> None:
     """A load, or another centre of gravity, within the tolerance of 20 %; with nothing hidden there is no word."""
     runs = posterior_of(secret_runs([hidden(name, **values)] if name else []), tolerance=Tolerance())
