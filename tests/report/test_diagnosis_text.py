@@ -95,14 +95,9 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
-<<<<<<< HEAD
-    found = replace(NOTHING, conflicts={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13})
-    conflict, _ = diagnosis_summary(found)
-=======
     found = replace(NOTHING, beyond={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13},
                     in_conflict=True)
-    conflict, _ = summary(found)
->>>>>>> a967c639 (Derivatives by a record's errors stay sparse: memory of a diagnosis no longer holds them whitened; numbers of a file beyond their tolerance are those that no car within it explains)
+    conflict, _ = diagnosis_summary(found)
     assert found.unexplained and not found.exceeds_noise
     assert conflict.startswith("These numbers of the vehicle's file are beyond their tolerance: "
                                "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
@@ -110,7 +105,7 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
 
 def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:
     found = replace(NOTHING, beyond={"front.cg_distance_m": 0.054, "rear.cg_distance_m": 0.046})
-    nothing, beyond, _ = summary(found)
+    nothing, beyond, _ = diagnosis_summary(found)
     assert not found.unexplained
     assert nothing.startswith("No effect is missing") and "within their tolerance" not in nothing
     assert "front.cg_distance_m by +5%, rear.cg_distance_m by +5%. Measure them" in beyond
@@ -119,11 +114,11 @@ def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:
 def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_same() -> None:
     found = replace(NOTHING, moved={"sprung_mass_kg": (0.104, 0.014)}, as_moved=chosen(
         EFFECTS["payload"], {"mass_kg": 108.05}))
-    _, moved, same, _ = summary(found)
+    _, moved, same, _ = diagnosis_summary(found)
     assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure" in moved
     assert same.startswith("All of this move together is what payload does") and "mass_kg 108 kg" in same
-    assert as_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
-    assert as_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
+    assert diagnosis_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
+    assert diagnosis_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
 
 
 def test_distances_that_are_off_are_reported() -> None:

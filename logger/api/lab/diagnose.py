@@ -333,7 +333,7 @@ def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuesti
         raise BadInput(f"{word}: {error}") from None
 
 
-_MOST_HIDDEN = 6
+_MOST_HIDDEN, _MOST_MOVED = 6, 3
 _SUSPECT = 0.1
 """An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
 
@@ -345,8 +345,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
-        lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
-                     "is hardly more than the sensor's noise.")
+        what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
+        lines.append(f"{what} is missing: with the car's numbers refitted{how}, the residual is hardly more than the "
+                     "sensor's noise.")
     if found.coloured and not found.exceeds_noise:
         lines.append("The sensor's noise is louder at some frequencies than at others: it is as loud where the car is "
                      "shaken little as where it is shaken much, and has nothing to do with the road.")
@@ -360,6 +361,12 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
         lines.append(f"These numbers of the vehicle's file are beyond their tolerance: {off}. Measure them: the file "
                      "is wrong there, or an effect is missing that no candidate explains.")
+    if found.moved:
+        lines.append(_moved(found))
+    if found.as_moved is not None:
+        one = found.as_moved
+        lines.append(f"All of this move together is what {one.effect.name} does ({one.effect.title}): "
+                     f"{numbers_of(one)}. To know: {one.effect.shown_by}.")
     lines += error_words(found.steps, found.noise_floor_error)
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
@@ -386,6 +393,16 @@ def untested(found: LabDiagnosis) -> list[str]:
     if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
         lines.append(f"These runs could also miss: {', '.join(rest)}.")
     return lines
+
+
+def _moved(found: Diagnosis) -> str:
+    """What the runs say of the car's numbers, the farthest first."""
+    shown = [f"{name} by {share:+.1%} ± {error:.1%}"
+             for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
+    rest = len(found.moved) - len(shown)
+    return (f"Within their tolerance the runs move numbers of the vehicle's file: {', '.join(shown)}"
+            f"{f', and {rest} more' * bool(rest)}. Measure them: with a number that is right in the file, and a "
+            "smaller --tolerance, an effect that it hides would be named.")
 
 
 def _alike(one: Undetectable) -> str:
@@ -457,6 +474,10 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
             for one in found.candidates],
         "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.beyond),
+        "numbers_moved": {name: {"share": share, "standard_error": error}
+                          for name, (share, error) in found.moved.items()},
+        "moved_as_by": None if found.as_moved is None else {
+            "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,

@@ -342,7 +342,7 @@ def ending(story: Story) -> list[str]:
         lines.append(f"Found missing and not added: {', '.join(story.not_added)}. Go on with the last file.")
     if story.refused or story.not_added:
         return [*lines, *with_what]
-    if diagnosis.conflicts and not diagnosis.exceeds_noise:
+    if diagnosis.beyond and not diagnosis.exceeds_noise:
         lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
     elif diagnosis.unexplained and story.law is None:
         lines.append("Something is missing still that no effect explains: ridelog learn may find a law, or an effect "
