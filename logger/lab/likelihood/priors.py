@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect_sizes import grows_with_mass
 from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.uncertain import grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
