@@ -395,7 +395,7 @@ def untested(found: LabDiagnosis) -> list[str]:
     return lines
 
 
-def _moved(found: Diagnosis) -> str:
+def _moved(found: LabDiagnosis) -> str:
     """What the runs say of the car's numbers, the farthest first."""
     shown = [f"{name} by {share:+.1%} ± {error:.1%}"
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
