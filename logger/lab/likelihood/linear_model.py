@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-_COLUMNS_AT_ONCE = 32
-"""So many derivatives of a record are whitened at once: 30 MB of spectra in a drive of ten minutes. Measured: more of
-them gain no time."""
 _UNINFORMATIVE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
 """Start and scale error as good as free: their precisions are a millionth of a good recorder's, above what would make
 the information of a run without either singular."""
@@ -54,8 +52,7 @@ class _Record:
            here: Array) -> _Record:
         """With derivatives (k, n), at a residual (n,) and the numbers (k,)."""
         white = np.empty((error.count, whitener.kept))
-        for start in range(0, error.count, _COLUMNS_AT_ONCE):
-            part = slice(start, start + _COLUMNS_AT_ONCE)
+        for part in np.array_split(np.arange(error.count), isqrt(error.count)):  # a spectrum of all would be large
             white[part] = whitener(slopes[part].toarray())
         return _Record(error, slopes, whitener, white @ white.T, white @ whitener(residual), here)
 

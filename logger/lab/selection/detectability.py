@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.selection.evidence import IMITATION
 from logger.lab.selection.screening import scale_strength
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
@@ -22,9 +23,6 @@ DETECTABLE_SIGMA = 6.0
 them in one search of a thousand, an effect of one number has to gain 16.4 in minus twice the log-likelihood
 (chi-squared with one degree of freedom), one of three numbers with six starts 26.5: 4.1 to 5.1 deviations. What is
 found scatters by one deviation around what is expected."""
-_AS_MOVED = 0.9
-"""Share of the change, in squares, from which on an effect is said to do the same. Measured: a load of 100 kg and a
-centre of gravity 0.1 m ahead, which the numbers of a car of 875 kg absorb, do 0.98 of it, others 0.79 at most."""
 _NO_CHANGE = 0.1  # standard deviations, a sixtieth of what is detectable: the vehicle has these values already
 
 
@@ -50,12 +48,14 @@ def undetectable_effects(found: LinearModel, effects: Sequence[Effect]) -> tuple
 
 def effect_as_moved(found: LinearModel, effects: Sequence[Effect]) -> Chosen | None:
     """The effect that changes the records as the refit of the car's numbers does, with its strength: one that is a
-    combination of numbers in the file. None: none explains ``_AS_MOVED`` of that change, or it is within the noise."""
+    combination of numbers in the file. None: none explains all of that
+    change but the share that imitations may have, or it is within the noise. A load of 100 kg and a centre of gravity
+    0.1 m ahead, which the numbers of a car of 875 kg absorb, explain 0.98 of it, others 0.79 at most."""
     sensitivity = _Sensitivity(found)
     alike = [sensitivity.as_moved(chosen(effect, effect.usual)) for effect in effects
              if isinstance(effect, VehicleEffect) and any(one.null is not None for one in effect.parameters)]
     share, best = max(alike, key=lambda pair: pair[0], default=(0.0, None))
-    return best if share > _AS_MOVED else None
+    return best if share > 1 - IMITATION else None
 
 
 def is_uninformative_at_usual(effect: Effect, deviations: float) -> bool:
