@@ -35,11 +35,10 @@ _SECOND = 100
 
 @dataclass(frozen=True)
 class Belief:
-    """The spectrum, the standard error of its log level, and log of the noise variance over the sensor's."""
+    """The spectrum, and log of the noise variance over the sensor's."""
 
     spectrum: RoadSpectrum
     log_noise: float = 0.0
-    log_level_std: float = _LEVEL_DEVIATION
 
 
 def learnt(
@@ -66,11 +65,7 @@ def learnt(
         curvature += np.diag(precision)
     step = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
     level, waviness = now + step
-    return Belief(
-        RoadSpectrum(float(level), float(np.clip(waviness, *_WAVINESS_RANGE))),
-        belief.log_noise,
-        float(np.sqrt(np.linalg.inv(curvature)[0, 0])),
-    )
+    return Belief(RoadSpectrum(float(level), float(np.clip(waviness, *_WAVINESS_RANGE))), belief.log_noise)
 
 
 def _priors(before: RoadSpectrum | None) -> list[tuple[RoadSpectrum, tuple[float, float]]]:

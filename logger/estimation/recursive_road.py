@@ -43,7 +43,10 @@ Bools = npt.NDArray[np.bool_]
 _STEPS = 8
 _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
-_COARSE_ROUNDS, _COARSE_STEPS = 2, 3
+_COARSE_ROUNDS, _COARSE_STEPS = 2, 2
+# Where steps hide the road, bounds and level follow one another slowly, and from below: so many more rounds, until the
+# level moves by less than changes an IRI by 2 %.
+_MORE_ROUNDS, _STILL_MOVES = 4, 0.04
 _MOST_DEVIATIONS = 3.0
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
@@ -216,14 +219,17 @@ class FollowedRoad:
         or one for all what was taken off the readings, ``beyond_variance`` how uncertain that is [(m/s2)2], ``turns``
         how often the block is solved, which share rounds and steps, and ``is_last`` whether this is the last time."""
         rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
+        most = rounds + _MORE_ROUNDS // turns if self._is_coarse else rounds
         if not self._begun:
-            rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
+            rounds, most, steps = _FIRST_ROUNDS, _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         self._begun = True
         seen = block.seen(read)
-        for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, seen, steps, before, left == 0, is_last, beyond_mps2,
+        for done in range(1, most + 1):
+            result = self._round(block, samples, read, seen, steps, before, done == rounds, is_last, beyond_mps2,
                                  beyond_variance)
+            if done >= rounds and self._roughness.moved < _STILL_MOVES:
+                break
         return result
 
     def _round(
@@ -269,13 +275,15 @@ class FollowedRoad:
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
 
-        resolved = mean_resolved(gain, (local * ratio)[seen > 0])
-        # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
-        most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count)
-        white = np.clip(solution.innovations / np.sqrt(local), -most, most)
-        power = np.abs(np.fft.rfft(white)) ** 2 / block.count
-        # The level goes with the roughness along the block: two that follow the same slope would overshoot.
-        now = learnt(self._belief, power, resolved, block.log_waves, seen_share, before)
+        now = self._belief
+        if learns or before is None:
+            resolved = mean_resolved(gain, (local * ratio)[seen > 0])
+            # A lone obstacle is no level: an innovation counts with at most some expected deviations.
+            most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count)
+            white = np.clip(solution.innovations / np.sqrt(local), -most, most)
+            power = np.abs(np.fft.rfft(white)) ** 2 / block.count
+            # The level goes with the roughness along the block: two that follow the same slope would overshoot.
+            now = learnt(now, power, resolved, block.log_waves, seen_share, before)
         self._roughness.learn(first, exp(0.5 * above_common) * solution.innovations, log_variance,
                               exp(-above_common) * gain, seen, ratio, learns and is_last and before is not None)
         found = self._roughness.at(first, block.count)

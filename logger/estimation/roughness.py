@@ -20,7 +20,7 @@ filter, for such processes are Markov's. Their variances are learnt by scoring i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -54,8 +54,7 @@ _CLASSES = 8
 class _Level:
     """L of cells from number ``first`` on (c,), what readings say of it, ``shown``, with ``information`` about it.
 
-    Of the cells from ``edge`` on: ``prior`` is the covariance of L before them, ``spread`` the inverse of that of what
-    is shown, both (e, e). ``state`` (k,) and ``state_covariance`` (k, k) are what cells before the edge say of the
+    Of the cells from ``edge`` on: ``prior`` (e, e) is the covariance of L before them. ``state`` (k,) and ``state_covariance`` (k, k) are what cells before the edge say of the
     processes there.
     """
 
@@ -65,9 +64,26 @@ class _Level:
     information: Array
     edge: int
     prior: Array
-    spread: Array
     state: Array
     state_covariance: Array
+
+    @cached_property
+    def _root(self) -> Array:
+        return np.sqrt(self.information[self.edge - self.first:])
+
+    @cached_property
+    def _narrowed(self) -> Array:
+        return np.eye(len(self.prior)) + self._root[:, None] * self.prior * self._root
+
+    @cached_property
+    def spread(self) -> Array:
+        """The inverse (e, e) of the covariance of what is shown."""
+        return self._root[:, None] * np.linalg.inv(self._narrowed) * self._root
+
+    def pull(self, mean: Array) -> Array:
+        """``spread`` times what is shown less ``mean`` (e,): times ``prior`` it is by how much L rises."""
+        off = self._root * (self.shown[self.edge - self.first:] - mean)
+        return self._root * np.linalg.solve(self._narrowed, off)
 
     def cells(self, first: int, count: int) -> tuple[Array, Array, Array]:
         """L, what is shown, and information of other cells: beyond those that are known L goes on as there."""
@@ -90,6 +106,7 @@ class Roughness:
         self._level: _Level | None = None
         self._log_variances = np.log(_COMMON_VARIANCES)
         self._curvature: Array | float = 0.0
+        self.moved = 0.0  # root mean square change of L by the last step, over its cells
         self._common = _COMMON
         self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
 
@@ -177,8 +194,7 @@ class Roughness:
         if old is None:
             nothing = np.zeros(1)
             state = np.zeros(len(LENGTHS_M))
-            none = np.zeros((1, 1))
-            old = _Level(edge, nothing, nothing, nothing, edge, none, none, state, np.diag(self.variances))
+            old = _Level(edge, nothing, nothing, nothing, edge, np.zeros((1, 1)), state, np.diag(self.variances))
         edge = max(edge, old.edge, end - _MOST_CELLS)
         state, state_covariance = self._carried(old, edge)
         now, total = old.cells(edge, end - edge)[0], end - edge
@@ -192,17 +208,15 @@ class Roughness:
         freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
         slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
         bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)
-        shown, root = now + slope / bend, np.sqrt(bend)
-        spread = root[:, None] * np.linalg.inv(np.eye(total) + root[:, None] * prior * root) * root
-        pull = spread @ (shown - mean)
-        step = np.clip(mean + prior @ pull - now, -_LARGEST_STEP, _LARGEST_STEP)
-        now = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
-        if learns:
-            self._learn_variances(alike[_LEARNT], pull, spread)
         level, shown, information = (np.concatenate(pair) for pair in zip(
-            old.cells(begin, edge - begin), (now, shown, bend), strict=True))
-        self._level = _Level(begin, level, shown, information, edge, prior, spread, state,
-                             state_covariance)
+            old.cells(begin, edge - begin), (now, now + slope / bend, bend), strict=True))
+        self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
+        pull = self._level.pull(mean)
+        step = np.clip(mean + prior @ pull - now, -_LARGEST_STEP, _LARGEST_STEP)
+        level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
+        self.moved = float(np.sqrt(np.mean(step**2)))
+        if learns:
+            self._learn_variances(alike[_LEARNT], pull, self._level.spread)
 
     def _carried(self, old: _Level, edge: int) -> tuple[Array, Array]:
         """State and its covariance by a Kalman filter over the cells between the old edge and this one."""

@@ -27,12 +27,8 @@ class SteadyMotion:
         """Of the acceleration before anything is read [(m/s2)2]."""
         return float(self.psd.mean()) * self.rate_hz / 2
 
-    def remaining_variance(self, variance: Array | float) -> Array | float:
-        """Variance that is left of each acceleration [(m/s2)2], for one variance of the readings or for many."""
-        return variance * self.resolved_per_reading(variance)
-
     def covariance_left(self, variance: float) -> Array:
-        """The same by lag, (2 (f - 1),), as in a record that repeats [(m/s2)2]."""
+        """What is left by lag, (2 (f - 1),), as in a record that repeats [(m/s2)2], for readings of one variance."""
         return np.fft.irfft(self._resolved(variance), 2 * (len(self.psd) - 1)) * variance
 
     def resolved_per_reading(self, variance: Array | float) -> Array | float:

@@ -70,7 +70,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
     assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)
 
-    left = steady_motion(CAR, speed_mps, spectrum, RATE_HZ, 8192).remaining_variance(deviation**2)
+    left = steady_motion(CAR, speed_mps, spectrum, RATE_HZ, 8192).covariance_left(deviation**2)[0]
     assert left == pytest.approx((accel - fitted).var(), rel=0.05)
 
     numbers = range(COUNT // POINTS - 1)

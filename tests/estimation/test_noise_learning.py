@@ -143,7 +143,7 @@ def test_uneven_readings_leave_what_dense_algebra_says(clustered: float) -> None
     found, each = cavity(motion, variance)
     assert np.log(found / exact).mean() == pytest.approx(0.0, abs=0.1)
     assert np.log(found / exact).std() < 0.6 * np.log(exact).std()
-    by_mean_precision = 1 / motion.remaining_variance(1 / np.mean(1 / variance))
+    by_mean_precision = 1 / motion.covariance_left(1 / np.mean(1 / variance))[0]
     assert by_mean_precision > 1.1 * np.mean(1 / exact + 1 / variance)
 
     freedom = np.trace(prior @ inverse) / count
