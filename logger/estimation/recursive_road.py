@@ -45,8 +45,8 @@ _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 2
 # Where steps hide the road, bounds and level follow one another slowly, and from below: so many more rounds, until the
-# level moves by less than changes an IRI by 2 %.
-_MORE_ROUNDS, _STILL_MOVES = 4, 0.04
+# level moves by less than changes an IRI by 3 %.
+_MORE_ROUNDS, _STILL_MOVES = 4, 0.06
 _MOST_DEVIATIONS = 3.0
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver

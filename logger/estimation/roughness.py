@@ -35,8 +35,8 @@ _VARIANCE_LOG_STD = 1.5  # by how much roads differ in that
 _LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-3, 4.0
 _BLOCK_SHARE = 0.1  # of a block of 20 s is new
 _SMOOTHEST, _ROUGHEST = -12.0, 8.0  # L of roads that have an IRI of 0.006 and 140 m/km
-_CELL_M = 4.0
-_MOST_CELLS = 512  # at once: 2 km, and blocks of 20 s are shorter. A place that jumps must cost no memory
+_CELL_M = 8.0
+_MOST_CELLS = 256  # at once: 2 km, and blocks of 20 s are shorter. A place that jumps must cost no memory
 _REACH_M = 1.0
 _COMMON = 4.0  # points, before the scatter is known, and never fewer
 _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
@@ -54,8 +54,8 @@ _CLASSES = 8
 class _Level:
     """L of cells from number ``first`` on (c,), what readings say of it, ``shown``, with ``information`` about it.
 
-    Of the cells from ``edge`` on: ``prior`` (e, e) is the covariance of L before them. ``state`` (k,) and ``state_covariance`` (k, k) are what cells before the edge say of the
-    processes there.
+    Of the cells from ``edge`` on: ``prior`` (e, e) is the covariance of L before them. ``state`` (k,) and
+    ``state_covariance`` (k, k) are what cells before the edge say of the processes there.
     """
 
     first: int

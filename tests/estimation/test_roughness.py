@@ -115,7 +115,7 @@ def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[],
     power, taken, own, squares = (around @ (row * seen) for row in (
         innovations**2, resolved, freedom, innovations**2 - (resolved - freedom) * before))
 
-    size = round(4.0 / SPACING_M)
+    size = round(8.0 / SPACING_M)
     cells = np.arange(block.count) // size
     cells = cells - cells[np.flatnonzero(seen)[0]]
     inside = cells >= 0
@@ -215,7 +215,7 @@ def learnt_from(first: int, innovations: np.ndarray, found: Roughness) -> None:
 
 def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None:
     """The filter that carries it is exact: the same levels and errors as from one long block."""
-    size = round(4.0 / SPACING_M)
+    size = round(8.0 / SPACING_M)
     innovations = np.random.default_rng(3).standard_normal(60 * size) * np.repeat([1.0, 3.0, 0.5], 20 * size)
     whole, parts = Roughness(SPACING_M), Roughness(SPACING_M)
     learnt_from(0, innovations, whole)
