@@ -140,7 +140,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
 @pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [5.0, 14.0, 30.0])
 def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
-    """Thirty roads of random amplitudes; errors over the stated standard error, and the bias of the level."""
+    """Thirty roads of random amplitudes; errors over the standard error by the waves' information, and the bias."""
     count = 2048
     rng = np.random.default_rng(round(speed_mps))
     block = a_block(count, speed_mps)
@@ -161,7 +161,10 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
                 belief = learnt(
                     belief, whitened(block, solution, even), resolved, block.log_waves, share, None
                 )
-            scores.append((belief.spectrum.log_level - true.log_level) / belief.log_level_std)
+            rows = np.stack([np.ones(len(resolved)), -block.log_waves])
+            information = (rows * share * resolved**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+            std = np.sqrt(np.linalg.inv(information)[0, 0])
+            scores.append((belief.spectrum.log_level - true.log_level) / std)
             wavinesses.append(belief.spectrum.waviness - waviness)
     assert abs(np.mean(scores)) < 0.6
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.4
