@@ -45,7 +45,7 @@ Bools = npt.NDArray[np.bool_]
 
 BLOCK_SAMPLES = 2048
 HOP_SAMPLES = 200
-LAG_S = 6.0  # the rear axle and the body's swing need 4; bounds of coarse readings go through more rounds by then
+LAG_S = 4.0
 FAINT_BELOW = 0.2
 VEHICLE_ERROR = 0.05
 SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be distinguished from drift
