@@ -401,8 +401,8 @@ def _moved(found: LabDiagnosis) -> str:
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
     rest = len(found.moved) - len(shown)
     return (f"Within their tolerance the runs move numbers of the vehicle's file: {', '.join(shown)}"
-            f"{f', and {rest} more' * bool(rest)}. Measure them: with a number that is right in the file, and a "
-            "smaller --tolerance, an effect that it hides would be named.")
+            f"{f', and {rest} more' * bool(rest)}. Measure them: if a number is right in the file, an effect hides "
+            "behind it, and a smaller --tolerance shows which.")
 
 
 def _alike(one: Undetectable) -> str:
