@@ -211,11 +211,6 @@ class Run:
         """The measured signals other than the acceleration of the sensor."""
         return self.facts.signals
 
-    @property
-    def joined_count(self) -> int:
-        """How many samples all signals have together."""
-        return self.count * (1 + len(self.signals))
-
     def main(self, joined: Array) -> Array:
         """The part (n,) of the sensor's acceleration of signals that are joined ((1 + s) n,)."""
         return joined[: self.count]

@@ -163,7 +163,7 @@ def pieces_of(lines: Sequence[tuple[Array, Array]]) -> RoadPieces:
 
 
 class RoadMap:
-    """Finds the roads of a map. ``keys`` is what ``drive_rows`` wants."""
+    """Finds the roads of a map. ``keys`` is what ``filed_rows`` wants."""
 
     def __init__(self, pieces: RoadPieces) -> None:
         from scipy.spatial import cKDTree

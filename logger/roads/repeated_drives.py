@@ -1,9 +1,7 @@
 """Several drives over the same places: what they say together, how far they agree, which place to visit.
 
-What several passes over one place say together: a mean, its standard error, and what changed.
-
 The model of a value y of pass i over cell k of the road: y_ik = mu_k (1 + d_i + e_ik) + s_ik. s is the estimate's own
-error, whose standard error follows from those in the log (``window_errors``). d is common to a drive: calibration, tire
+error, whose standard error follows from those in the log (``WindowErrors``). d is common to a drive: calibration, tire
 pressure, load, temperature. e is of the pass alone: its lane, and the metres by which it was laid wrong. The last two
 are not known beforehand; their variances are estimated from all cells that were passed more than once (moments of the
 random-effects model; DerSimonian & Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and

@@ -115,7 +115,7 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
     found = replace(NOTHING, moved={"sprung_mass_kg": (0.104, 0.014)}, as_moved=chosen(
         EFFECTS["payload"], {"mass_kg": 108.05}))
     _, moved, same, _ = diagnosis_summary(found)
-    assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure" in moved
+    assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "can be measured" in moved
     assert same.startswith("All of this move together is what payload does") and "mass_kg 108 kg" in same
     assert diagnosis_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
     assert diagnosis_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}

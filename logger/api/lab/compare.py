@@ -224,7 +224,7 @@ def headline(found: LabComparison) -> list[str]:
                      f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
-        lines.append(f"The refit moved {named}, which is beyond their tolerance. Measure them: the vehicle's file is "
+        lines.append(f"The refit moved numbers beyond their tolerance: {named}. Measure them: the vehicle's file is "
                      "wrong there, or an effect that the model lacks biases them.")
     return lines
 

@@ -400,9 +400,10 @@ def _moved(found: LabDiagnosis) -> str:
     shown = [f"{name} by {share:+.1%} ± {error:.1%}"
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
     rest = len(found.moved) - len(shown)
-    return (f"Within their tolerance the runs move numbers of the vehicle's file: {', '.join(shown)}"
-            f"{f', and {rest} more' * bool(rest)}. Measure them: if a number is right in the file, an effect hides "
-            "behind it, and a smaller --tolerance shows which.")
+    more = f", and {rest} more" * bool(rest)
+    return ("The runs move numbers of the vehicle's file (masses, springs and dampers against each other, as no run "
+            f"shows a factor that all share): {', '.join(shown)}{more}. If one of them can be measured, put it into the "
+            "file: an effect that does the same would then show.")
 
 
 def _alike(one: Undetectable) -> str:
@@ -512,8 +513,9 @@ def diagnosis_lines(found: LabDiagnosis, most: int | None) -> list[str]:
         shown += ["", "What it looks like:", wrapped(described, "- ")]
     rows = [("Effect", "Error", "p-value", "Numbers"), *table(found, most)]
     more = len(found.candidates) - len(rows) + 1
-    shown += ["", "One effect at a time on the refitted model, those of the verdict first; p-values are for all",
-              "candidates together:", *columns(rows)]
+    if len(rows) > 1:
+        shown += ["", "One effect at a time on the refitted model, those of the verdict first; p-values are for all",
+                  "candidates together:", *columns(rows)]
     if more > 0:
         shown.append(f"and {more} more (ridelog diagnose --all)")
     if found.no_better:

@@ -26,9 +26,6 @@ in thirty comparisons (normal distribution)."""
 CONFLICT_SIGMA = 4.0
 """A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
 as far in 1300 comparisons (normal distribution)."""
-WORTH_SAYING = 0.5
-"""A number that moves by a smaller share of its prior's standard deviation is as right as files are: six in ten right
-numbers are farther off (normal distribution)."""
 
 
 @dataclass(frozen=True)
@@ -116,15 +113,21 @@ class VehiclePrior:
         return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-np.abs(place)) if ended[index]}
 
     def moved(self, logs: Array, covariance: Array) -> dict[str, tuple[float, float]]:
-        """Relative changes of the numbers that the runs move for sure and far enough to tell of something, and their
-        standard errors, the farthest first, by their tolerance; arguments as of ``beyond_tolerance``. A car in which
-        all masses and forces are larger by one factor moves the same: these are counted from their mean change."""
-        scaling = np.array([float(grows_with_mass(name)) for name in self.names])
-        against = np.eye(len(logs)) - np.outer(scaling, scaling / max(scaling.sum(), 1.0))
+        """Relative changes of the numbers that the runs move for sure and farther than half of all right numbers are
+        off, and their standard errors, the farthest first, by their tolerance; arguments as of ``beyond_tolerance``.
+
+        A car in which all masses and forces are larger by one factor moves the same. So these are counted against the
+        one of them that moves as the median does: where most are right, a wrong one is named alone.
+        """
+        scaling = np.flatnonzero([grows_with_mass(name) for name in self.names])
+        against = np.eye(len(logs))
+        if len(scaling):
+            middle = scaling[np.argsort(logs[scaling])[len(scaling) // 2]]
+            against[scaling, middle] -= 1.0
         logs, errors = against @ logs, np.sqrt(np.maximum(np.diag(against @ covariance @ against.T), 0.0))
+        least = np.maximum(CONFLICT_SIGMA * errors, 0.6745 * self.deviations)  # the upper quartile of a normal density
         return {self.names[index]: (float(np.expm1(logs[index])), float(np.exp(logs[index]) * errors[index]))
-                for index in np.argsort(-np.abs(logs / self.deviations))
-                if abs(logs[index]) > max(CONFLICT_SIGMA * errors[index], WORTH_SAYING * self.deviations[index])}
+                for index in np.argsort(-np.abs(logs / self.deviations)) if abs(logs[index]) > least[index]}
 
     def is_in_conflict(self, logs: Array, errors: Array) -> bool:
         """Whether the runs move a number beyond its tolerance, and farther than numbers are off by chance.

@@ -77,15 +77,14 @@ def test_a_wheelbase_of_which_the_runs_know_the_sum_alone_is_beyond_at_both_ends
     assert not PRIOR.beyond_tolerance(2.2 * lengths * PRIOR.deviations, apart)
 
 
-def test_what_surely_moved_is_counted_from_the_common_scale_of_masses_and_forces() -> None:
-    """A load moves the mass against all others, though no run tells the size of all of them together."""
+@pytest.mark.parametrize("wrong", [{"sprung_mass_kg": 0.1}, {"front.suspension_stiffness_n_per_m": 0.38},
+                                   {"front.suspension_stiffness_n_per_m": 0.38, "sprung_mass_kg": -0.14}])
+def test_where_no_run_shows_the_common_factor_of_masses_and_forces_the_wrong_ones_move(wrong: dict[str, float]) -> None:
     scaling = np.array([not name.endswith("_m") or "_per_m" in name for name in PRIOR.names], float)
-    load = (np.array(PRIOR.names) == "sprung_mass_kg") * np.log(1.1)
-    against = np.eye(len(load)) - np.outer(scaling, scaling) / scaling.sum()
-    found = PRIOR.moved(against @ load, covariance_of(1e4 * against))
-    (name, (share, error)), *others = found.items()
-    assert name == "sprung_mass_kg" and share == pytest.approx(0.9 * 0.1, abs=0.003) and error < 0.002
-    assert all(abs(less) < 0.012 for _, (less, _) in others)
-    assert not PRIOR.moved(against @ load, covariance_of(1e-3 * against))
-
-
+    no_common_factor = np.eye(len(scaling)) - np.outer(scaling, scaling) / scaling.sum()
+    moved = np.array([np.log1p(wrong.get(name, 0.0)) for name in PRIOR.names])
+    posterior = covariance_of(1e4 * no_common_factor)
+    found = PRIOR.moved(no_common_factor @ moved, posterior)
+    assert {name: share for name, (share, _) in found.items()} == pytest.approx(wrong, abs=0.003)
+    assert all(error < 0.004 for _, error in found.values())
+    assert not PRIOR.moved(no_common_factor @ moved, covariance_of(1e-3 * no_common_factor))

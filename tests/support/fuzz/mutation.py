@@ -2,7 +2,7 @@
 
 A reader is run in the process on one input at a time. It must end in time, in little memory, and either accept the
 input or refuse it with an error of its own family, in one line that names the file. What it accepted must be in the
-bytes; how that is known differs from reader to reader (``fuzz_targets``).
+bytes; how that is known differs from reader to reader (``targets``).
 
 Guidance without instrumentation: every refusal has a place in the sources (the lines of its traceback), every
 acceptance a shape. An input that ends somewhere new is kept and damaged further, so the search walks from check to
