@@ -95,7 +95,7 @@ def test_the_ride_of_a_car_that_its_engine_shakes_has_that_shaking_in_it(
     still = ride.drive(level_m_per_km)
     shaken = replace(still, accel_mps2=still.accel_mps2 + line(0.2, len(still.accel_mps2)))
 
-    def drive(_: float) -> Drive:
+    def drive(*_: float) -> Drive:
         return shaken
 
     monkeypatch.setattr(ride, "drive", drive)

@@ -402,8 +402,8 @@ def _moved(found: LabDiagnosis) -> str:
     rest = len(found.moved) - len(shown)
     more = f", and {rest} more" * bool(rest)
     return ("The runs move numbers of the vehicle's file (masses, springs and dampers against each other, as no run "
-            f"shows a factor that all share): {', '.join(shown)}{more}. If one of them can be measured, put it into the "
-            "file: an effect that does the same would then show.")
+            f"shows a factor that all share): {', '.join(shown)}{more}. If one of them can be measured, put it into "
+            "the file: an effect that does the same would then show.")
 
 
 def _alike(one: Undetectable) -> str:
