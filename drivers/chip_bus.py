@@ -1,26 +1,4 @@
-"""Chips on an I2C bus: their registers, what a failed transfer means, and buffers that the host empties.
-
-Register fields as declarations.
-
-Problem: shifts and masks scattered through a driver go wrong silently: a value too large for its field spills
-into the neighbour, a write clears bits that somebody else owns, and some registers change the chip when they are
-merely read. Solution: a driver declares each register and field once. A field refuses what does not fit, an update
-touches only the declared bits and reads them back, and a register whose read has a side effect is of another type
-that has no plain ``read`` at all.
-
-An ``OSError`` of the bus passes through; the driver knows what it means for its device.
-
-What chips on an I2C bus have in common: what a failed transfer means, which address a chip answers at, and whether
-it still holds its settings.
-
-What chips have in common that sample by their own clock into a buffer, which the host empties on a bus.
-
-Problem: such a chip's rate is no more than nominal, its buffer gives samples without times, and one that ran over has
-lost some. Solution: ``BufferedChip`` empties the buffer and says where entries were lost, also by a transfer that
-failed; ``BufferedDecoder`` gives the samples their times (``SampleClock``) and starts them over after a loss;
-``buffered_source`` looks often enough that the buffer stays half empty. A chip's own file has its registers, the bytes
-of an entry, and their scale.
-"""
+"""Chips on an I2C bus: their registers, what a failed transfer means, and buffers that the host empties."""
 
 from __future__ import annotations
 
@@ -73,7 +51,16 @@ class RegisterField:
 
 @dataclass(frozen=True)
 class Register:
-    """A byte register that may be read at any time. ``reset_value`` is what it holds after power-on."""
+    """A byte register that may be read at any time. ``reset_value`` is what it holds after power-on.
+
+    Problem: shifts and masks scattered through a driver go wrong silently: a value too large for its field spills
+    into the neighbour, a write clears bits that somebody else owns, and some registers change the chip when they are
+    merely read. Solution: a driver declares each register and field once. A field refuses what does not fit, an update
+    touches only the declared bits and reads them back, and a register whose read has a side effect is of another type
+    that has no plain ``read`` at all.
+
+    An ``OSError`` of the bus passes through; the driver knows what it means for its device.
+    """
 
     name: str
     address: int
@@ -236,6 +223,12 @@ class BufferState(NamedTuple):
 
 class BufferedChip(ConfiguredChip, ABC):
     """One chip on a bus. A driver's ``start`` empties the buffer and sets ``_lost``: what was before is gone.
+
+    Problem: such a chip's rate is no more than nominal, its buffer gives samples without times, and one that ran over
+    has lost some. Solution: ``BufferedChip`` empties the buffer and says where entries were lost, also by a transfer
+    that failed; ``BufferedDecoder`` gives the samples their times (``SampleClock``) and starts them over after a loss;
+    ``buffered_source`` looks often enough that the buffer stays half empty. A chip's own file has its registers, the
+    bytes of an entry, and their scale.
 
     entry_bytes     of one entry, which a read at ``data_address`` takes out of the buffer
     """

@@ -1,26 +1,4 @@
-"""The wires of this machine: what drivers ask of one, how one is opened, and which is the board's own.
-
-The two kinds of wire a driver may hold, as protocols. Real ones and replayed ones look the same.
-
-Which serial port is on the pins of a Raspberry Pi, where somebody named another one.
-
-Problem. /dev/serial0 is on pins 8 and 10 of every Raspberry Pi but the 5 and its like, where it is the three-pin debug
-connector: a receiver on the pins is silent there, however right its wires. And /dev/ttyAMA0, which is right on those,
-is the Bluetooth chip on a 3, a 4 and a Zero W. Solution. What the names lead to, and the model, are read from the
-kernel.
-
-Sources: Raspberry Pi documentation, computers/configuration/uart.adoc (primary and secondary UART by model; pull
-request 3294 of raspberrypi/documentation); overlays/README (dtparam uart0).
-
-Real wires: the only file that imports smbus2 and pyserial.
-
-Problem: both libraries report a missing device, missing rights and a pulled plug in ways of their own, and pyserial's
-``read`` waits for a full buffer; and some USB adapters cannot read several I2C registers in one transfer. Solution: two
-functions that open a wire behind these protocols. What cannot be opened is NotPresent with the next
-step to take; what breaks later is an ``OSError`` with an errno, whatever the library raises; closing raises nothing.
-
-What a source may use of the computer that it runs on, handed in, so that tests can hand in another one.
-"""
+"""The wires of this machine: what drivers ask of one, how one is opened, and which is the board's own."""
 
 from __future__ import annotations
 
@@ -70,7 +48,16 @@ _ON_THE_PINS = "pins 8 and 10 of a {model} are /dev/ttyAMA0: write dtparam=uart0
 
 def port_advice(port: str, root: Path = Path("/")) -> str:
     """What to do about a port of the board that is not the one on its pins, or is off; empty: nothing is known.
-    ``root``: below it lie ``dev`` and ``sys``."""
+    ``root``: below it lie ``dev`` and ``sys``.
+
+    Problem. /dev/serial0 is on pins 8 and 10 of every Raspberry Pi but the 5 and its like, where it is the three-pin
+    debug connector: a receiver on the pins is silent there, however right its wires. And /dev/ttyAMA0, which is right
+    on those, is the Bluetooth chip on a 3, a 4 and a Zero W. Solution. What the names lead to, and the model, are read
+    from the kernel.
+
+    Sources: Raspberry Pi documentation, computers/configuration/uart.adoc (primary and secondary UART by model; pull
+    request 3294 of raspberrypi/documentation); overlays/README (dtparam uart0).
+    """
     try:
         place = root / Path(port).relative_to("/")
         target = place.resolve()
@@ -189,6 +176,12 @@ class ByteReads:
 
 def open_serial(path: str, baud: int) -> BytePort:
     """Serial port ``path`` at ``baud`` 8N1, locked against other programs, without input from before.
+
+    Problem: both libraries report a missing device, missing rights and a pulled plug in ways of their own, and
+    pyserial's ``read`` waits for a full buffer; and some USB adapters cannot read several I2C registers in one
+    transfer. Solution: two functions that open a wire behind these protocols. What cannot be opened is NotPresent with
+    the next step to take; what breaks later is an ``OSError`` with an errno, whatever the library raises; closing
+    raises nothing.
 
     NotPresent when it is not there or may not be opened; SettingsError on a baud rate it cannot have.
     """

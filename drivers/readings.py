@@ -1,27 +1,4 @@
-"""What goes between a wire and a user: bytes, readings, words of recordings that are believed, settings.
-
-What a wire brought: bytes, with their source and time.
-
-What instruments say, after decoding: frozen readings with their time beside them.
-
-Times are integer microseconds of the monotonic clock (``t_us``): the resolution of a recorded dump,
-so that a drive that was recorded and one that is replayed carry the very same times.
-
-Which words of a recording are believed.
-
-Problem. A recording comes from anybody. A word in it that is taken for a path would have a file of this machine read,
-written or, where it is Python, run. Solution. What a recording says is asked for here and nowhere else, and comes back
-as a plain number, as yes or no, or as one of the names that are registered on this machine; anything else is refused.
-No string of a recording is given out as it stands. What a recording is called may become the name of a folder, and
-never leads out of the folder that it is put into.
-
-What a setting may be, as data.
-
-Problem: an instrument's settings belong into its own file, but how a settings file is read and how a wrong value is
-refused with its line belongs to the program that reads it. Solution: an instrument declares for each key what may stand
-there; the reader knows these few kinds. Only what fits none of them brings a function of its own (``Special``), and
-that asks a ``SettingNode``.
-"""
+"""What goes between a wire and a user: bytes, readings, words of recordings that are believed, settings."""
 
 from __future__ import annotations
 
@@ -82,6 +59,9 @@ class AccelerationBlock:
 class Fix:
     """One epoch of a GPS receiver. What the receiver did not say is None, never zero.
 
+    Times are integer microseconds of the monotonic clock (``t_us``): the resolution of a recorded dump,
+    so that a drive that was recorded and one that is replayed carry the very same times.
+
     t_us              monotonic arrival of the first byte of the epoch's first sentence [us]
     valid             the receiver vouches for position and speed (rule in ``drivers.nmea``)
     utc_us            time of the fix, microseconds since 1970-01-01 UTC; None while the date is unknown or refused
@@ -108,7 +88,14 @@ ANYTHING = object()
 
 class RecordedWords:
     """What a recording says about itself, by key. Each asking method gives ``usual`` for what it does not say, and
-    raises SettingsError for what cannot be."""
+    raises SettingsError for what cannot be.
+
+    Problem. A recording comes from anybody. A word in it that is taken for a path would have a file of this machine
+    read, written or, where it is Python, run. Solution. What a recording says is asked for here and nowhere else, and
+    comes back as a plain number, as yes or no, or as one of the names that are registered on this machine; anything
+    else is refused. No string of a recording is given out as it stands. What a recording is called may become the name
+    of a folder, and never leads out of the folder that it is put into.
+    """
 
     def __init__(self, said: Mapping[str, Any]) -> None:
         self._said = said
@@ -174,7 +161,13 @@ def folder_name(word: str) -> str:
 
 class SettingNode(Protocol):
     """A value of a settings file, with its line. Each asking method raises the reader's own error when the value is
-    something else; ``wrong`` makes that error: file, line, what was expected, what was found."""
+    something else; ``wrong`` makes that error: file, line, what was expected, what was found.
+
+    Problem: an instrument's settings belong into its own file, but how a settings file is read and how a wrong value is
+    refused with its line belongs to the program that reads it. Solution: an instrument declares for each key what may
+    stand there; the reader knows these few kinds. Only what fits none of them brings a function of its own
+    (``Special``), and that asks a ``SettingNode``.
+    """
 
     @property
     def content(self) -> Any: ...

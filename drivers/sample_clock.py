@@ -1,31 +1,4 @@
-"""The times of samples whose instrument says none, out of the times at which they arrived.
-
-The period of a sampler from the times at which some of its samples arrived at once.
-
-The problem: samples that are lost at even intervals look like a slower sensor. How many arrived in how much time does
-not distinguish one from the other.
-
-The solution: what arrives at once does so a multiple of the true period after any other such sample, however many are
-lost between them: the arrivals stand on a comb. Its period is where the periodogram of the instants is largest
-(Schuster 1898), which is the mean resultant length of their phases (Mardia and Jupp 2000, 2.3): 1 where all have one
-phase, 0.9 with a jitter of a quarter of the period, 0.64 with half of it. By chance m phases come to R or more with
-probability exp(-m R^2) (Rayleigh's test).
-
-Times of samples taken at even intervals, from the times at which they arrived on a serial line.
-
-The problem: a line delivers late and in bursts, and it says neither at which rate the samples were taken nor which of
-them were lost on the way. A rate that is taken for another one, or a lost sample that is closed up, makes a smooth road
-rough without any sign of it.
-
-The solution: a sample arrives a latency after it was taken that is never negative and now and then small. Arrival minus
-index times period is therefore bounded below by the true time line, and the line is the lower envelope. Where samples
-are lost, the envelope makes a step up by whole periods, and stays; where the link only jams, it comes back.
-
-Decoded samples that wait for their times.
-
-Problem: where the times of samples are recovered from arrivals (``drivers.sample_clock``), they are known a second or
-so after the samples. Solution: samples are queued here beside the clock, and come out as a block with their times.
-"""
+"""The times of samples whose instrument says none, out of the times at which they arrived."""
 
 from __future__ import annotations
 
@@ -53,6 +26,15 @@ STEPS_PER_CYCLE = 8  # of the whole span: a comb between two of the periods trie
 def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_gap_us: float,
                     lost_most: float) -> float | None:
     """The period [us] of the comb on which the arrivals stand, where it says that samples are lost; else None.
+
+    The problem: samples that are lost at even intervals look like a slower sensor. How many arrived in how much time
+    does not distinguish one from the other.
+
+    The solution: what arrives at once does so a multiple of the true period after any other such sample, however many
+    are lost between them: the arrivals stand on a comb. Its period is where the periodogram of the instants is largest
+    (Schuster 1898), which is the mean resultant length of their phases (Mardia and Jupp 2000, 2.3): 1 where all have
+    one phase, 0.9 with a jitter of a quarter of the period, 0.64 with half of it. By chance m phases come to R or more
+    with probability exp(-m R^2) (Rayleigh's test).
 
     instants_us      (m,) arrivals [us], those with the least latency of each piece of time
     count            samples that came from the first of them to the last
@@ -129,6 +111,14 @@ class _Point(NamedTuple):
 
 class SampleClock:
     """Follows the time line of one device.
+
+    The problem: a line delivers late and in bursts, and it says neither at which rate the samples were taken nor which
+    of them were lost on the way. A rate that is taken for another one, or a lost sample that is closed up, makes a
+    smooth road rough without any sign of it.
+
+    The solution: a sample arrives a latency after it was taken that is never negative and now and then small. Arrival
+    minus index times period is therefore bounded below by the true time line, and the line is the lower envelope. Where
+    samples are lost, the envelope makes a step up by whole periods, and stays; where the link only jams, it comes back.
 
     1. Finding the rate. Samples are held for ``FIND_US`` of arrival time. The slope of their lower envelope is the
        period. A rate that is not that of the profile, to within its tolerance, is taken as it is found; one below
@@ -562,6 +552,10 @@ JUDGED_SAMPLES = 500
 
 class UndatedSamples(NamedTuple):
     """Samples without times: arrivals (n,) [us], acceleration (n, 3) [m/s2], clipped (n,), good (n,).
+
+    Problem: where the times of samples are recovered from arrivals (``drivers.sample_clock``), they are known a second
+    or so after the samples. Solution: samples are queued here beside the clock, and come out as a block with their
+    times.
 
     after_loss    others may be missing between them and those before
     good          a bad one takes the place of a sample, and is left out in the end

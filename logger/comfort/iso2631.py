@@ -1,28 +1,4 @@
-"""Ride comfort and health by ISO 2631-1, of a record, and of a day.
-
-How a vibration feels, by ISO 2631-1: figures of a weighted acceleration and the word that goes with it.
-
-Problem: one number cannot say both how a road shakes and how hard it hits. The standard has several, all from
-the weighted acceleration: its r.m.s. over the stretch, the largest running r.m.s. over one second, the fourth-power
-dose, and the crest factor that says which of them to believe.
-
-Solution: plain functions of the weighted samples, the standard's rule for which of them to use, and running r.m.s.
-values that work on a stream and do not drift however long the stream is.
-
-What a day of vibration does to health: daily exposure, its legal limits, and the caution zone of ISO 2631-1.
-
-Problem: the same shaking is harmless for a minute and harmful for a working life, and there is no agreement on how
-strength and duration trade: a^n t is constant (Eq 2.18 of Blum 2015) with n = 2 for one school, n = 4 for the other.
-
-Solution: both, side by side. The European directive has a value for each, of which a state chooses one: A(8) goes with
-n = 2, the vibration dose value with n = 4. The caution zone has a pair of lines for each, which lie close together
-between 4 and 8 hours a day; there the zone has most behind it.
-
-All values are those of the axis that is worst once multiplied by its health factor
-(``logger.comfort.iso2631.HEALTH_FACTORS``), for people who sit.
-
-How a recorded ride feels: its axes weighted as they belong together, and the figures of each (ISO 2631-1).
-"""
+"""Ride comfort and health by ISO 2631-1, of a record, and of a day."""
 
 from __future__ import annotations
 
@@ -135,7 +111,15 @@ class AxisFigures:
 
 
 def axis_figures(weighted_mps2: Floats, rate_hz: float) -> AxisFigures:
-    """All figures of a weighted axis (n,), n > 0, sampled at ``rate_hz`` [Hz]."""
+    """All figures of a weighted axis (n,), n > 0, sampled at ``rate_hz`` [Hz].
+
+    Problem: one number cannot say both how a road shakes and how hard it hits. The standard has several, all from
+    the weighted acceleration: its r.m.s. over the stretch, the largest running r.m.s. over one second, the fourth-power
+    dose, and the crest factor that says which of them to believe.
+
+    Solution: plain functions of the weighted samples, the standard's rule for which of them to use, and running r.m.s.
+    values that work on a stream and do not drift however long the stream is.
+    """
     return AxisFigures(
         duration_s=len(weighted_mps2) / rate_hz,
         a_w_mps2=a_w(weighted_mps2),
@@ -210,7 +194,19 @@ S_PER_HOUR = 3600.0
 
 @dataclass(frozen=True)
 class ExposureLimits:
-    """A value from which to act, and one not to be exceeded."""
+    """A value from which to act, and one not to be exceeded.
+
+    Problem: the same shaking is harmless for a minute and harmful for a working life, and there is no agreement on how
+    strength and duration trade: a^n t is constant (Eq 2.18 of Blum 2015) with n = 2 for one school, n = 4 for the
+    other.
+
+    Solution: both, side by side. The European directive has a value for each, of which a state chooses one: A(8) goes
+    with n = 2, the vibration dose value with n = 4. The caution zone has a pair of lines for each, which lie close
+    together between 4 and 8 hours a day; there the zone has most behind it.
+
+    All values are those of the axis that is worst once multiplied by its health factor
+    (``logger.comfort.iso2631.HEALTH_FACTORS``), for people who sit.
+    """
 
     action: float
     limit: float

@@ -1,30 +1,4 @@
-"""Comfort values with their standard errors, and the part of a sensor's noise in them.
-
-Comfort figures of a weighted acceleration that is not known exactly, each with its standard error.
-
-Problem. A reading is the ride, noise and rounding. The r.m.s. of readings counts all three as ride; the r.m.s. of the
-most probable ride is too low, because what the readings leave open is missing in it.
-
-Solution. The weighted acceleration is known as a Gaussian process: a mean m and a covariance C of what is left open.
-The sums that the figures are made of, of its square and its fourth power, have means and variances in closed form,
-because a power of m + s z is a short sum of Hermite polynomials of z (Isserlis, Biometrika 12, 1918, for moments;
-Mehler's formula for covariances). A figure is a root of such a sum, which is taken to be gamma distributed.
-
-What white noise in the readings adds to comfort figures, and the figures without it.
-
-Problem. Noise and rounding shake nobody, and are counted. Solution. White noise of a variance s^2 has after the
-weighting the power K = s^2 times the mean of |W|^2 over frequency. It is independent of the ride, so in expectation
-
-    sum w^2 = sum x^2 + n K,    sum w^4 = sum x^4 + 6 K sum x^2 + 3 n K^2
-
-(moments of a normal distribution), whatever the ride is: no model of car or road is needed. How far a window's sums
-scatter about that follows from the correlation of the weighted noise. Rounding is such noise where noise and ride blur
-the steps (Widrow and Kollar, Quantization Noise, 2008); where they do not, nothing is known but a bound.
-
-MTVV is the largest of many running means, and the noise falls otherwise in each. Of the power d by which the largest
-lies above the mean of the window, noise alone would make c s: s is the scatter of one running mean, c the largest of a
-white noise's in a window so long. Independent scatters add by their squares: the ride's own is sqrt(d^2 - (c s)^2).
-"""
+"""Comfort values with their standard errors, and the part of a sensor's noise in them."""
 
 from __future__ import annotations
 
@@ -92,6 +66,15 @@ class PowerSum:
 @dataclass(frozen=True)
 class RideSums:
     """What the figures are made of, for consecutive stretches.
+
+    Problem. A reading is the ride, noise and rounding. The r.m.s. of readings counts all three as ride; the r.m.s. of
+    the most probable ride is too low, because what the readings leave open is missing in it.
+
+    Solution. The weighted acceleration is known as a Gaussian process: a mean m and a covariance C of what is left
+    open. The sums that the figures are made of, of its square and its fourth power, have means and variances in closed
+    form, because a power of m + s z is a short sum of Hermite polynomials of z (Isserlis, Biometrika 12, 1918, for
+    moments; Mehler's formula for covariances). A figure is a root of such a sum, which is taken to be gamma
+    distributed.
 
     count      samples
     squares    sum of the squares over them; ``fourths`` of the fourth powers
@@ -215,6 +198,20 @@ class RawFigures:
 
 class NoiseFloor:
     """For readings ``rate_hz`` a second whose weighting has the gain (n,) at frequencies evenly from 0 to half of that.
+
+    Problem. Noise and rounding shake nobody, and are counted. Solution. White noise of a variance s^2 has after the
+    weighting the power K = s^2 times the mean of |W|^2 over frequency. It is independent of the ride, so in expectation
+
+        sum w^2 = sum x^2 + n K,    sum w^4 = sum x^4 + 6 K sum x^2 + 3 n K^2
+
+    (moments of a normal distribution), whatever the ride is: no model of car or road is needed. How far a window's sums
+    scatter about that follows from the correlation of the weighted noise. Rounding is such noise where noise and ride
+    blur the steps (Widrow and Kollar, Quantization Noise, 2008); where they do not, nothing is known but a bound.
+
+    MTVV is the largest of many running means, and the noise falls otherwise in each. Of the power d by which the
+    largest lies above the mean of the window, noise alone would make c s: s is the scatter of one running mean, c the
+    largest of a white noise's in a window so long. Independent scatters add by their squares: the ride's own is
+    sqrt(d^2 - (c s)^2).
 
     step_mps2    that readings are rounded to; 0: none
     reads        so many such readings are thinned out to one of the ``rate_hz``

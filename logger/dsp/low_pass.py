@@ -1,20 +1,4 @@
-"""Low-pass filters: Butterworth's, a sinc in a Kaiser window, and one that lowers the rate.
-
-Butterworth's low-pass (S. Butterworth, On the Theory of Filter Amplifiers, 1930), of any order.
-
-Low-pass filters of linear phase: a sinc in a Kaiser window, by Kaiser's two rules.
-
-J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function (1974); Oppenheim and Schafer,
-Discrete-Time Signal Processing, 7.6. A transition of width w [rad/sample] that ends A dB down takes (A - 7.95) / (2.285
-w) steps and a window of beta = 0.1102 (A - 8.7), for A above 50.
-
-Only what lies below a frequency: a low-pass filter that also lowers the rate.
-
-Problem: a filter alone (the 20 Hz of 6.2.1 of Blum 2015) leaves samples that hardly differ from their neighbours, and
-whatever weighs residuals afterwards takes the emptied band for certainty. Solution: behind the filter only as many
-samples are kept as the band needs, two and a half per period of its upper edge; what was independent stays nearly so.
-Measurement and prediction go through the same filter, so its shape biases nothing.
-"""
+"""Low-pass filters: Butterworth's, a sinc in a Kaiser window, and one that lowers the rate."""
 
 from __future__ import annotations
 
@@ -66,7 +50,12 @@ def beta(stop_db: float) -> float:
 
 def low_pass_taps(half: int, steps: int, cutoff: float, stop_db: float) -> Array:
     """Filter (2 half + 1,), symmetric, its sum 1, for taking one sample in ``steps``: half the amplitude at ``cutoff``
-    [of half the rate that is left]."""
+    [of half the rate that is left].
+
+    J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function (1974); Oppenheim and Schafer,
+    Discrete-Time Signal Processing, 7.6. A transition of width w [rad/sample] that ends A dB down takes (A - 7.95) /
+    (2.285 w) steps and a window of beta = 0.1102 (A - 8.7), for A above 50.
+    """
     taps = np.sinc(cutoff * (np.arange(-half, half + 1) / steps)) * np.kaiser(2 * half + 1, beta(stop_db))
     return np.asarray(taps / taps.sum())
 
@@ -80,6 +69,11 @@ def kaiser_window(offset: Array, half: float, stop_db: float) -> Array:
 @dataclass(frozen=True)
 class DecimatingLowPass:
     """Passes up to ``cutoff_hz`` of a record at ``rate_hz``; None passes all and keeps every sample.
+
+    Problem: a filter alone (the 20 Hz of 6.2.1 of Blum 2015) leaves samples that hardly differ from their neighbours,
+    and whatever weighs residuals afterwards takes the emptied band for certainty. Solution: behind the filter only as
+    many samples are kept as the band needs, two and a half per period of its upper edge; what was independent stays
+    nearly so. Measurement and prediction go through the same filter, so its shape biases nothing.
 
     ValueError for a cut-off that is not above 0 and below half the rate.
     """

@@ -1,44 +1,4 @@
-"""Samples that are none: repeated ones, those at the end of a range, and bursts of calls.
-
-Where samples follow each other of which something holds.
-
-Samples that come in bursts: the times are those of a buffer that was emptied, not those at which it was filled.
-
-Problem: a recorder that empties a sensor's buffer every now and then gives several samples one time, or nearly one.
-Solution: the last sample of a burst is the newest, and is no later than the burst. A sensor with a clock of its own
-takes samples evenly, so the straight line through number and time of those is the time of all.
-
-Samples that were written more often than they were taken, distinguished from a coarse sensor that rightly stays on
-one code.
-
-Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that no
-car makes stand between the held values, and the ride reads too rough. A sensor with coarse steps repeats values too,
-for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not distinguish one from the
-other.
-
-Solution: where a sensor moves by several steps before and after, a sample at which it hardly moves is a turning point,
-and there a move by one or two steps either way is as likely as none: the density of moves is flat over so few steps.
-So among the stretches of small moves between two large ones (``SMALL`` and ``LARGE`` steps) at most about one in five
-stands still, on all axes at once. In a held record nearly all of them do. That so many more than half of them do has,
-without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23, 1952): repeats are
-reported where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis are left out: there a
-sensor may stand at the end of its range. What never moves by several steps between two samples is not judged.
-
-That judges many short holds by their number. A few long ones are judged by their length: where a sensor moves by m
-steps from sample to sample right before and right after, each further sample that stands still on all axes has, by the
-same flat density, a chance of 1 in m. A car that comes to rest, or a coarse sensor on a quiet road, moves by single
-steps before it stands still, and is not meant.
-
-Samples that stand at the end of a sensor's range, where no more than the end could be read.
-
-Problem: an accelerometer that was set to 2 g reads 2 g in a pothole, and the ride reads smoother than it was. Nothing
-in the record says what the range was, and the largest value of a ride is no sign: every ride has one.
-
-Solution: at the end of its range a sensor arrives by a jump, stands for samples, and leaves by a jump. A crest that is
-passed does not: of three equal samples and those beside them the moves of any smooth crest are at most 4 steps. By
-chance each further sample that stands still where the moves are of ``JUMP`` steps has a probability of 1 in ``JUMP`` at
-most, by a flat density of moves.
-"""
+"""Samples that are none: repeated ones, those at the end of a range, and bursts of calls."""
 
 from __future__ import annotations
 
@@ -83,7 +43,12 @@ def burst_ends(t_s: Array) -> npt.NDArray[np.int64] | None:
 
 
 def spread(t_s: Array, ends: npt.NDArray[np.int64]) -> Array:
-    """Even times (n,) [s] of samples that came in bursts. ValueError where no even rate stands behind them."""
+    """Even times (n,) [s] of samples that came in bursts. ValueError where no even rate stands behind them.
+
+    Problem: a recorder that empties a sensor's buffer every now and then gives several samples one time, or nearly one.
+    Solution: the last sample of a burst is the newest, and is no later than the burst. A sensor with a clock of its own
+    takes samples evenly, so the straight line through number and time of those is the time of all.
+    """
     ends = ends[1:-1]  # those that the record cuts off
     if len(ends) < 3:
         raise ValueError(f"found {len(ends)} bursts of samples and no rate")
@@ -113,6 +78,25 @@ _ON_COMB = 1.0  # samples: a held reading is written at the next instant
 @dataclass(frozen=True, eq=False)
 class RepeatedSamples:
     """Samples that repeat the one before.
+
+    Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that
+    no car makes stand between the held values, and the ride reads too rough. A sensor with coarse steps repeats values
+    too, for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not distinguish one from
+    the other.
+
+    Solution: where a sensor moves by several steps before and after, a sample at which it hardly moves is a turning
+    point, and there a move by one or two steps either way is as likely as none: the density of moves is flat over so
+    few steps. So among the stretches of small moves between two large ones (``SMALL`` and ``LARGE`` steps) at most
+    about one in five stands still, on all axes at once. In a held record nearly all of them do. That so many more than
+    half of them do has, without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23,
+    1952): repeats are reported where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis
+    are left out: there a sensor may stand at the end of its range. What never moves by several steps between two
+    samples is not judged.
+
+    That judges many short holds by their number. A few long ones are judged by their length: where a sensor moves by m
+    steps from sample to sample right before and right after, each further sample that stands still on all axes has, by
+    the same flat density, a chance of 1 in m. A car that comes to rest, or a coarse sensor on a quiet road, moves by
+    single steps before it stands still, and is not meant.
 
     share         of all samples that repeat
     chance        probability bound of so many without a fault
@@ -299,7 +283,16 @@ _LEAST_SAMPLES = 3
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """``at`` an end of the range stand ``samples``; the bound of its ``chance`` without an end."""
+    """``at`` an end of the range stand ``samples``; the bound of its ``chance`` without an end.
+
+    Problem: an accelerometer that was set to 2 g reads 2 g in a pothole, and the ride reads smoother than it was.
+    Nothing in the record says what the range was, and the largest value of a ride is no sign: every ride has one.
+
+    Solution: at the end of its range a sensor arrives by a jump, stands for samples, and leaves by a jump. A crest that
+    is passed does not: of three equal samples and those beside them the moves of any smooth crest are at most 4 steps.
+    By chance each further sample that stands still where the moves are of ``JUMP`` steps has a probability of 1 in
+    ``JUMP`` at most, by a flat density of moves.
+    """
 
     at: float
     samples: int

@@ -1,35 +1,4 @@
-"""A drive along a measured line: the line, the motion, and how it is laid on the line.
-
-A measured line on the ground: which place of it a car passed, by the positions of a receiver.
-
-Problem: a profile has distances, a receiver positions; a drive begins before the line, ends behind it, may leave it and
-come back, or go the other way. Solution: each position is laid on the nearest piece of the line. Where that place moves
-along as far as the car does, position after position, the car was on it; such stretches are the passes.
-
-Speed and distance of a car over a whole drive, by all fixes before and after each instant.
-
-Problem: a receiver gives the speed once or ten times a second, with noise, now and then wildly wrong; a model needs the
-distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its acceleration
-is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch, F. Tung and C.
-Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration wanders, and how large
-the errors of the fixes are, is chosen by evidence; wild ones count less. Places along a line that are known from
-elsewhere enter as further observations, with errors by Student's t. Errors come from drawing the motion that all could
-be (G. Papandreou and A. Yuille, NIPS 2010).
-
-A pass over a measured profile, laid on the profile's own distance.
-
-Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself shows it. A
-model of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is
-found where what it should have felt and what it felt are most alike; then the two are compared window by window
-(``lab.likelihood.lag``), and where a window was felt is one more observation for the smoother of the motion.
-
-Readings of several even pieces on the one grid of a run.
-
-Problem: after a hole a recorder's readings go on at instants of their own, up to half a step beside those before it;
-a run, whose times lie on one grid, could not be read again. To interpolate them would smooth what a coarse sensor read.
-Solution: a reading keeps its value and the instant at which it was taken, where the car is looked up, and gets the
-nearest number on the grid that is free.
-"""
+"""A drive along a measured line: the line, the motion, and how it is laid on the line."""
 
 from __future__ import annotations
 
@@ -61,7 +30,12 @@ _SPACING_M = 1.0
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLine:
-    """Places (m,) along a line: distances, growing [m], east and north of the first one [m]."""
+    """Places (m,) along a line: distances, growing [m], east and north of the first one [m].
+
+    Problem: a profile has distances, a receiver positions; a drive begins before the line, ends behind it, may leave it
+    and come back, or go the other way. Solution: each position is laid on the nearest piece of the line. Where that
+    place moves along as far as the car does, position after position, the car was on it; such stretches are the passes.
+    """
 
     distance_m: Array
     east_m: Array
@@ -208,6 +182,14 @@ class TrackMotion:
 
 def motion_of(speeds: Observations, places: Observations | None = None, like: TrackMotion | None = None) -> TrackMotion:
     """The motion by two fixes or more, in order of time and ``NEAREST_FIXES_S`` apart.
+
+    Problem: a receiver gives the speed once or ten times a second, with noise, now and then wildly wrong; a model needs
+    the distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its
+    acceleration is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch,
+    F. Tung and C. Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration
+    wanders, and how large the errors of the fixes are, is chosen by evidence; wild ones count less. Places along a line
+    that are known from elsewhere enter as further observations, with errors by Student's t. Errors come from drawing
+    the motion that all could be (G. Papandreou and A. Yuille, NIPS 2010).
 
     speeds    with no deviations of their own (ones) but where these differ: they are scaled by evidence
     places    along the way [m]; None: the way begins at 0
@@ -428,6 +410,11 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
                track: Track, predict: Predict) -> Registered:
     """Lay a pass on its profile.
 
+    Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself shows it. A
+    model of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is
+    found where what it should have felt and what it felt are most alike; then the two are compared window by window
+    (``lab.likelihood.lag``), and where a window was felt is one more observation for the smoother of the motion.
+
     speeds, places    of the receiver: of the front tires, the latter by the profile's distance [m]
     time_s            (n,) of the readings, at ``rate_hz``, within the times of the fixes
     accel_mps2        (n,) what was read; 0 where nothing was
@@ -484,6 +471,11 @@ _OFF = 0.1
 @dataclass(frozen=True, eq=False)
 class RunGrid:
     """Samples (m,) of a run, made of readings (n,).
+
+    Problem: after a hole a recorder's readings go on at instants of their own, up to half a step beside those before
+    it; a run, whose times lie on one grid, could not be read again. To interpolate them would smooth what a coarse
+    sensor read. Solution: a reading keeps its value and the instant at which it was taken, where the car is looked up,
+    and gets the nearest number on the grid that is free.
 
     time_s     evenly spaced, from the first reading on [s]
     taken_s    the instants that they stand for, growing, within a step of ``time_s`` [s]

@@ -1,31 +1,4 @@
-"""A phone's record made even and upright.
-
-Where a recorded drive can be cut into stretches that a model can be driven along.
-
-Problem: a recording goes on while the car is parked, the receiver sees no sky, or the sensor is silent; a model needs
-speed and readings without a break. Solution: a stretch ends where fixes or readings are missing for too long, or where
-the car stands for long; what is shorter than that stays inside, marked.
-
-Samples of a recorder that keeps no even time, on the grid of a run.
-
-Problem: a phone samples at 51, 104 or 417 Hz, unevenly, writes each reading several times, gives times in bursts, and
-stops for a while. Solution: repeats are dropped (``dsp.repeated_samples``), bursts ``spread``, and what
-lies between two long silences is laid on an even grid through an anti-alias filter (``dsp.whole_record``); where a few
-samples are missing, or were clipped, the grid says so.
-
-Which way is up for a recorder that lies anyhow: gravity shows it.
-
-Problem: a phone sits in its mount at any angle, its program may write g or m/s2, count all axes the other way round,
-leave gravity out, and the phone may slip half way. Solution: over tens of seconds of driving what a recorder feels is
-gravity, for braking, curves and hills come to little; a mean that outliers do not move is taken of the means of short
-blocks. Its size shows the unit, its direction the vertical. An accelerometer at rest feels a push upwards of 1 g; a
-program that writes the opposite does so for every acceleration, so along the direction in which gravity is felt both
-read the same.
-
-A turn in the mount is a lasting change of that direction that is larger than braking and curves can feign: within the
-time that is compared a car changes its velocity by no more than ``_CHANGE_MPS``, and what is left is held against the
-scatter of the blocks (``estimation.mounting``).
-"""
+"""A phone's record made even and upright."""
 
 from __future__ import annotations
 
@@ -62,6 +35,10 @@ KEPT_STANDING_S = 5.0
 def stretches(time_s: Array, present: Bools, fix_s: Array, speed_mps: Array, longest_gap_s: float,
               longest_standing_s: float, stationary_mps: float) -> list[tuple[float, float]]:
     """Begin and end of each [s], in order.
+
+    Problem: a recording goes on while the car is parked, the receiver sees no sky, or the sensor is silent; a model
+    needs speed and readings without a break. Solution: a stretch ends where fixes or readings are missing for too long,
+    or where the car stands for long; what is shorter than that stays inside, marked.
 
     time_s, present       (n,) of readings, and whether there was one
     fix_s, speed_mps      (k,) of fixes
@@ -134,7 +111,13 @@ def clipped_samples(samples: Array, range_end: float | None) -> Bools:
 
 
 def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float | None = None) -> EvenSamples:
-    """Lay samples (n, axes) at times (n,), not decreasing [s], on a grid. ValueError where that cannot be."""
+    """Lay samples (n, axes) at times (n,), not decreasing [s], on a grid. ValueError where that cannot be.
+
+    Problem: a phone samples at 51, 104 or 417 Hz, unevenly, writes each reading several times, gives times in bursts,
+    and stops for a while. Solution: repeats are dropped (``dsp.repeated_samples``), bursts ``spread``, and what lies
+    between two long silences is laid on an even grid through an anti-alias filter (``dsp.whole_record``); where a few
+    samples are missing, or were clipped, the grid says so.
+    """
     pieces = _pieces(time_s)
     if not pieces:
         raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
@@ -262,7 +245,19 @@ def steady_mean(means: Array) -> Array:
 
 def upwards(time_s: Array, samples: Array) -> tuple[Array, float]:
     """What of samples (n, axes) [m/s2] points up (n,), without gravity, and how far gravity lies from the nearest axis
-    [rad]."""
+    [rad].
+
+    Problem: a phone sits in its mount at any angle, its program may write g or m/s2, count all axes the other way
+    round, leave gravity out, and the phone may slip half way. Solution: over tens of seconds of driving what a recorder
+    feels is gravity, for braking, curves and hills come to little; a mean that outliers do not move is taken of the
+    means of short blocks. Its size shows the unit, its direction the vertical. An accelerometer at rest feels a push
+    upwards of 1 g; a program that writes the opposite does so for every acceleration, so along the direction in which
+    gravity is felt both read the same.
+
+    A turn in the mount is a lasting change of that direction that is larger than braking and curves can feign: within
+    the time that is compared a car changes its velocity by no more than ``_CHANGE_MPS``, and what is left is held
+    against the scatter of the blocks (``estimation.mounting``).
+    """
     gravity = felt(time_s, samples).mean
     size = float(np.linalg.norm(gravity))
     up = gravity / size

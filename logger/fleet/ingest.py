@@ -1,29 +1,4 @@
-"""From logs to the rows of a dataset.
-
-Cars by a pseudonym: the keyed hash of a name (HMAC-SHA-256, RFC 2104), whose key lies beside the dataset.
-
-Who has the dataset alone cannot tell which car is which, nor try names. Its owner reads names: beside the key lies a
-table of them, by pseudonym. The number has 63 bits: among a million cars the chance of two alike is one in ten million.
-
-The intact rows of a log as arrays, for logs by the thousand.
-
-Problem: the reader of logs makes a record of each row, some 50 us; a year of a fleet would take days. Solution: the
-check values are compared line by line, and where all fit, Arrow reads the numbers. Where a line does not fit, or
-holds what no column may, the reader of logs judges the file row by row, so that both give the same rows; but a number
-that fits its check value and is spelt otherwise than a logger does (1e3) is taken here.
-
-The rows of a session as they are filed: with a direction, a road key, and the passes they make.
-
-A pass is a car once over a piece of road; its windows share the car's track, so passes, not windows, are what a
-standard error counts. The row in the middle of a pass carries its mean, so that a summary needs one grouping, not
-two.
-
-Logs into a dataset: what is new, once, whatever was ingested before and whenever it was killed.
-
-A log whose bytes are known is passed over. Of a session that is known in part, rows are compared by number and check
-value; a row of the same number and time with another check value is a contradiction, counted, and the first one
-stays. So an ingest that was cut off goes on where it was when it is started again.
-"""
+"""From logs to the rows of a dataset."""
 
 from __future__ import annotations
 
@@ -80,7 +55,12 @@ def own_key(dataset: Path) -> bytes:
 
 
 def pseudonym(name: str, key: bytes) -> int:
-    """The number of a car, 63 bits."""
+    """The number of a car, 63 bits.
+
+    Who has the dataset alone cannot tell which car is which, nor try names. Its owner reads names: beside the key lies
+    a table of them, by pseudonym. The number has 63 bits: among a million cars the chance of two alike is one in ten
+    million.
+    """
     return int.from_bytes(hmac.digest(key, name.encode("utf-8", "surrogateescape"), "sha256")[:8], "big") >> 1
 
 
@@ -154,7 +134,13 @@ def read_bytes(log: Path) -> tuple[bytes, str]:
 
 
 def columns_of(logs: Sequence[tuple[bytes, str]]) -> list[LogColumns]:
-    """The rows of logs, damaged or not, each given as its bytes and their digest."""
+    """The rows of logs, damaged or not, each given as its bytes and their digest.
+
+    Problem: the reader of logs makes a record of each row, some 50 us; a year of a fleet would take days. Solution: the
+    check values are compared line by line, and where all fit, Arrow reads the numbers. Where a line does not fit, or
+    holds what no column may, the reader of logs judges the file row by row, so that both give the same rows; but a
+    number that fits its check value and is spelt otherwise than a logger does (1e3) is taken here.
+    """
     headers = {data[:data.find(b"\n")] for data, _ in logs} & set(_HEADERS)
     if len(headers) > 1:
         return [one for log in logs for one in columns_of([log])]
@@ -269,6 +255,10 @@ class Filed:
 
 def filed_rows(session: Mapping[str, npt.NDArray[Any]], keyed: Keyed, trim_m: float) -> Filed:
     """The rows of one session, all its logs together.
+
+    A pass is a car once over a piece of road; its windows share the car's track, so passes, not windows, are what a
+    standard error counts. The row in the middle of a pass carries its mean, so that a summary needs one grouping, not
+    two.
 
     keyed     makes the keys of roads
     trim_m    how much of each drive's start and end is left out [m]
@@ -403,7 +393,12 @@ def sessions_of(logs: Iterable[tuple[Path, int]]) -> list[Session]:
 def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed, *, roads: str, trim_m: float,
                     batch_rows: int = BATCH_ROWS) -> Counts:
     """Add what is new; the dataset is being written to by this process. Raises BadInput and OSError, and then what was
-    committed stays."""
+    committed stays.
+
+    A log whose bytes are known is passed over. Of a session that is known in part, rows are compared by number and
+    check value; a row of the same number and time with another check value is a contradiction, counted, and the first
+    one stays. So an ingest that was cut off goes on where it was when it is started again.
+    """
     counts, waiting = Counts(), _Waiting()
     past = _Past(dataset)
     for unread in _read_together(sessions, past, counts):

@@ -1,54 +1,4 @@
-"""The International Roughness Index: its reference car, of a profile, by wavelength and place by place.
-
-The IRI's reference car as a filter that runs along a road, in blocks of any size.
-
-Problem: the IRI drives a quarter car at 80 km/h over a profile, step by step and exactly (a straight line between
-samples is a constant slope over a step), and a stream must give the same numbers as the whole profile at once.
-
-Solution: driven by the road's slope, the suspension's slope z_s' - z_u' is -(kt / mu) s^2 / D(s), D the characteristic
-polynomial with two pairs of complex poles p. Its response to a slope that is held over a step has a closed form,
-
-    H(z) = (1 - 1/z) sum over p of r q / (1 - q / z),   q = exp(p dx / V),   r = -(kt / mu) p / product of (p - others),
-
-the value at the end of a step coming with the slope of that step. The residues r sum to zero, which leaves a
-numerator of second order beside the factor 1 - 1/z: two second-order sections, exact for the profile as it is sampled.
-That factor also makes a straight grade exactly smooth, which the printed coefficients of World Bank Technical Paper 46
-do not. At rest on a constant slope is the start that ASTM E1926 asks for (states: slope, slope, 0, 0).
-
-What the IRI hears: its response to each wavelength of the road (Fig 2.13 of Blum 2015).
-
-The IRI is no average of heights. It passes waves from about 1.2 to 30 m and is deaf to much shorter and longer ones;
-its gain peaks near 0.065 cycles per metre, where the body bounces, and near 0.42, where the wheel hops (the
-dissertation has these two the wrong way round).
-
-International Roughness Index of a measured profile, exactly as defined.
-
-The IRI is the mean rectified slope between body and wheel of the Golden Car at 80 km/h (Eq 2.8 of Blum 2015). A
-program that integrates it with ordinary steps gets another number; the standard says how: the profile is a straight
-line between samples, so each step of the car is taken exactly (ASTM E1926; Sayers, "On the calculation of
-International Roughness Index from longitudinal road profile", TRR 1501, 1995; World Bank Technical Paper 46).
-
-What is meant here, where sources differ:
-
-- The 250 mm tire average is the slope from a sample to the one 250 mm ahead of it (Sayers). Eq 2.7 of the
-  dissertation prints the sum around the other way. As in Sayers' program the base is the whole number of samples
-  nearest to 250 mm, so from about 167 mm of spacing on it is a single step, which is no average.
-- The car starts with the mean slope of the first 11 m (ASTM), not of 0.5 s.
-- The sum runs over end points of the steps; the last is the one whose tire base still lies on the profile. A window
-  that cuts through a step takes its share of it.
-- With two wheel tracks, MRI is the mean of the tracks' IRI and HRI the IRI of the tracks' mean (the half car, which
-  does not feel roll). HRI is never above MRI.
-
-The IRI of a whole profile of one or two wheel tracks, and of its windows.
-
-Areas of localized roughness: where the IRI over a base length that slides along the road is above a limit.
-
-AASHTO R 54 (Accepting Pavement Ride Quality) slides a base of 25 ft over a profile; an area begins where the sliding
-value rises above the limit and ends where it falls below again. A profile has a value at each sample. A log has one
-number for each window of 25 ft, taken as even inside: the mean over a base that lies across two windows is then their
-mean by length, so that between the windows' middles the sliding value is a straight line. It can reach no higher than
-the worst window: of a bump that lies on the limit of two windows each shows a part only, at the least half.
-"""
+"""The International Roughness Index: its reference car, of a profile, by wavelength and place by place."""
 
 from __future__ import annotations
 
@@ -100,6 +50,22 @@ def golden_car_sections(spacing_m: float) -> Array:
 class GoldenCarFilter:
     """Elevations in, rectified slopes |z_s' - z_u'| out; any split of a profile gives the same bits.
 
+    Problem: the IRI drives a quarter car at 80 km/h over a profile, step by step and exactly (a straight line between
+    samples is a constant slope over a step), and a stream must give the same numbers as the whole profile at once.
+
+    Solution: driven by the road's slope, the suspension's slope z_s' - z_u' is -(kt / mu) s^2 / D(s), D the
+    characteristic polynomial with two pairs of complex poles p. Its response to a slope that is held over a step has a
+    closed form,
+
+        H(z) = (1 - 1/z) sum over p of r q / (1 - q / z),   q = exp(p dx / V),   r = -(kt / mu) p / product of (p -
+          others),
+
+    the value at the end of a step coming with the slope of that step. The residues r sum to zero, which leaves a
+    numerator of second order beside the factor 1 - 1/z: two second-order sections, exact for the profile as it is
+    sampled. That factor also makes a straight grade exactly smooth, which the printed coefficients of World Bank
+    Technical Paper 46 do not. At rest on a constant slope is the start that ASTM E1926 asks for (states: slope, slope,
+    0, 0).
+
     spacing_m      distance between elevations [m], above 0 and at most 300 mm (else ValueError)
     make_filter    what runs the sections: floating point, or the integers of ``logger.dsp.fixed_point``
 
@@ -136,6 +102,10 @@ class GoldenCarFilter:
 
 def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M) -> Array:
     """Amplitude of the suspension's slope z_s' - z_u' per amplitude of the road's slope, for a sinusoidal road.
+
+    The IRI is no average of heights. It passes waves from about 1.2 to 30 m and is deaf to much shorter and longer
+    ones; its gain peaks near 0.065 cycles per metre, where the body bounces, and near 0.42, where the wheel hops (the
+    dissertation has these two the wrong way round).
 
     wave_number_cpm    (n,) [cycles per metre]; tire_base_m [m] of the moving average, 0 for a tire that touches in
     a point. Fig 2.13; the Golden Car at 80 km/h as a continuous system, so for a finely sampled profile.
@@ -178,7 +148,24 @@ def rectified_slope(elevation_m: npt.ArrayLike, spacing_m: float) -> Array:
 
 
 def iri(elevation_m: npt.ArrayLike, spacing_m: float) -> float:
-    """IRI of a whole profile [m/km]. Arguments and errors as in ``rectified_slope``."""
+    """IRI of a whole profile [m/km]. Arguments and errors as in ``rectified_slope``.
+
+    The IRI is the mean rectified slope between body and wheel of the Golden Car at 80 km/h (Eq 2.8 of Blum 2015). A
+    program that integrates it with ordinary steps gets another number; the standard says how: the profile is a straight
+    line between samples, so each step of the car is taken exactly (ASTM E1926; Sayers, "On the calculation of
+    International Roughness Index from longitudinal road profile", TRR 1501, 1995; World Bank Technical Paper 46).
+
+    What is meant here, where sources differ:
+
+    - The 250 mm tire average is the slope from a sample to the one 250 mm ahead of it (Sayers). Eq 2.7 of the
+      dissertation prints the sum around the other way. As in Sayers' program the base is the whole number of samples
+      nearest to 250 mm, so from about 167 mm of spacing on it is a single step, which is no average.
+    - The car starts with the mean slope of the first 11 m (ASTM), not of 0.5 s.
+    - The sum runs over end points of the steps; the last is the one whose tire base still lies on the profile. A window
+      that cuts through a step takes its share of it.
+    - With two wheel tracks, MRI is the mean of the tracks' IRI and HRI the IRI of the tracks' mean (the half car, which
+      does not feel roll). HRI is never above MRI.
+    """
     return float(PER_KM * rectified_slope(elevation_m, spacing_m).mean())
 
 
@@ -331,6 +318,13 @@ class Area:
 def areas(middle_m: Array, iri_m_per_km: Array, limit_m_per_km: float, iri_std_m_per_km: Array | None = None,
           gap_m: float = np.inf) -> list[Area]:
     """Areas of a sliding IRI, given at the middles of its bases (n,), growing; between them a straight line.
+
+    AASHTO R 54 (Accepting Pavement Ride Quality) slides a base of 25 ft over a profile; an area begins where the
+    sliding value rises above the limit and ends where it falls below again. A profile has a value at each sample. A log
+    has one number for each window of 25 ft, taken as even inside: the mean over a base that lies across two windows is
+    then their mean by length, so that between the windows' middles the sliding value is a straight line. It can reach
+    no higher than the worst window: of a bump that lies on the limit of two windows each shows a part only, at the
+    least half.
 
     NaN ends an area where the value before it stands, and so does a step of more than ``gap_m``.
     """

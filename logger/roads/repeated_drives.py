@@ -9,28 +9,6 @@ stand in each standard error. The variance of d does not fall with the passes of
 length of a stretch: it falls with the number of drives. Of s, what is common to all windows of a car and its sensor
 does not fall with anything; the difference of two periods does not have it. So it is with the part of s that drives
 over one place have alike.
-
-Places that somebody should go and see: a single bump, a rough stretch, or a ride that is bad on a smooth road.
-
-Table 6.5 of Blum 2015 lists such places of a drive by the comfort there and the reason found. Here a place is a row of
-neighbouring cells of the road, of any length, of which each is as rough, or rides as badly, with so much confidence.
-
-What OpenStreetMap's key ``smoothness`` would say of a way, as far as its IRI can tell.
-
-Problem: the key is defined by which vehicles a way is fit for, not by a number. Solution: both sides have a scale in
-the speed at which a car is driven there. OpenStreetMap (wiki, ``Key:smoothness``, and the rules of thumb behind it): a
-car's speed is not affected on ``excellent`` and ``good`` ways, somewhat reduced (to 50 to 90 %) on ``intermediate``
-ones, to less than half on ``bad`` ones. World Bank Technical Paper 46 (Sayers, Gillespie & Paterson 1986; also in ASTM
-E1926, appendix X2) describes paved roads at marks of the IRI: about 2 m/km is comfortable above 120 km/h, 4 up to 100
-to 120 km/h, 6 up to 70 to 90 km/h, 8 up to 50 to 60 km/h. A way is given the word of the nearest mark.
-
-``very_bad`` and worse ask for more clearance than a car has: that an IRI cannot show, so nothing worse than ``bad`` is
-suggested.
-
-How well estimates of IRI agree with a reference, window by window, and how two lines of windows are laid together.
-
-Problem: one figure hides what another shows. R2 depends on how much the roads differ, a bias is mended by one factor,
-standard errors may be wrong where the values are right. Solution: all of them, side by side, of the same windows.
 """
 
 from __future__ import annotations
@@ -333,6 +311,10 @@ def places_to_visit(mean: Means, a_w_mps2: Array, a_w_std_mps2: Array, length_m:
                     ) -> tuple[PlaceToVisit, ...]:
     """The places of means over cells of a length (k,), those first that are furthest above their limit.
 
+    Table 6.5 of Blum 2015 lists such places of a drive by the comfort there and the reason found. Here a place is a row
+    of neighbouring cells of the road, of any length, of which each is as rough, or rides as badly, with so much
+    confidence.
+
     a_w_mps2, a_w_std_mps2    of the cells; NaN: not known
     above_m_per_km            from which IRI a cell is rough
     """
@@ -430,7 +412,19 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
 
 
 def suggestion(iri_m_per_km: float, iri_std_m_per_km: float) -> tuple[str, float]:
-    """The word for a mean IRI, and how likely the true one asks for the same word, by a normal distribution."""
+    """The word for a mean IRI, and how likely the true one asks for the same word, by a normal distribution.
+
+    Problem: the key is defined by which vehicles a way is fit for, not by a number. Solution: both sides have a scale
+    in the speed at which a car is driven there. OpenStreetMap (wiki, ``Key:smoothness``, and the rules of thumb behind
+    it): a car's speed is not affected on ``excellent`` and ``good`` ways, somewhat reduced (to 50 to 90 %) on
+    ``intermediate`` ones, to less than half on ``bad`` ones. World Bank Technical Paper 46 (Sayers, Gillespie &
+    Paterson 1986; also in ASTM E1926, appendix X2) describes paved roads at marks of the IRI: about 2 m/km is
+    comfortable above 120 km/h, 4 up to 100 to 120 km/h, 6 up to 70 to 90 km/h, 8 up to 50 to 60 km/h. A way is given
+    the word of the nearest mark.
+
+    ``very_bad`` and worse ask for more clearance than a car has: that an IRI cannot show, so nothing worse than ``bad``
+    is suggested.
+    """
     from scipy.special import ndtr
 
     number = int(np.searchsorted(LIMITS_M_PER_KM, iri_m_per_km, side="right"))
@@ -462,7 +456,12 @@ class Agreement:
 
 def agreement(iri_m_per_km: Array, iri_std_m_per_km: Array | None, reference_m_per_km: Array) -> Agreement | None:
     """Of arrays (n,), where both are known and above 0; None for fewer than two such windows, or a reference that is
-    the same everywhere."""
+    the same everywhere.
+
+    Problem: one figure hides what another shows. R2 depends on how much the roads differ, a bias is mended by one
+    factor, standard errors may be wrong where the values are right. Solution: all of them, side by side, of the same
+    windows.
+    """
     known = (iri_m_per_km > 0) & (reference_m_per_km > 0)  # False for NaN
     mine, theirs = iri_m_per_km[known], reference_m_per_km[known]
     if len(mine) < 2 or np.ptp(theirs) == 0:

@@ -1,47 +1,4 @@
-"""Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed.
-
-Spans of time in which a signal is doubted, as far back as rows may not have been written yet.
-
-An accelerometer that drives and says nothing new.
-
-Problem: a chip that has frozen goes on giving the reading it had, and a road of no roughness at all is what comes out.
-But with steps of 0.6 m/s2 a car that is parked gives one and the same reading for hours too, and nothing is wrong.
-
-Solution: the receiver shows which of the two it is. Only time counts through which every fix said that the car moved,
-and not one axis of one reading changed. After ``FROZEN_S`` of it the sensor is frozen until a reading changes, with a
-fix or without, and its windows are flagged and left without figures: from where it began, as far as they have not been
-written yet. Before that nothing is said. A sensor without any noise, at an even speed on a perfect road, can be silent
-for half a minute too; what it says then is too little to judge a road by.
-
-An accelerometer, or what brings its samples, that says each reading more than once.
-
-Problem: a bridge that writes 200 lines a second of a sensor that takes 51 readings gives plausible numbers at an even
-rate. Between the held readings stand steps that no car makes: a quiet road reads up to a quarter too rough. Solution:
-samples are judged ``WINDOW`` at a time by the pattern of what repeats (``logger.dsp.repeated_samples``), which a coarse
-sensor that rightly stays on one code does not have. From the window in which repeats were found until one in which
-hardly any are, or which shows that none are held, or until no window has shown them for some minutes, rows are flagged
-``repeated`` and left without figures, as far as they have not been written yet.
-
-A receiver whose speed and places say different things.
-
-Problem: the road's roughness is read by the speed, and a receiver may give a wrong one: none at all while it holds its
-speed back at low signal, twice the true one in another unit, that of a simulator. Nothing in a fix shows it. Solution:
-the places give the speed too. A stretch of fixes is cut into steps of ``STEP_M``; the way by the speed is held against
-the sum of the steps by the places.
-
-How far they may differ follows from the errors of receivers that are well. Those of places last, so that along a road
-they cancel but for the first and the last of them (``PLACE_M`` each); the speed's noise (``SPEED_MPS``, each fix by
-itself) adds up as the root of time, and both may be a few per cent off (``SHARE``: the scale of a speed, and chords
-that cut corners). The limit is ``DEVIATIONS`` of the random part more than the share, and so it falls in proportion as
-the stretch grows. Where the places make more, the ``WORST`` steps are left out: a single place far off makes two, a
-place that is put right after a tunnel makes one; neither makes a way shorter. Steps in which places were held while the
-car crept do not count.
-
-On simulated drives through a town half or twice the speed is found after 12 to 17 s of driving, 0.8 of it after 42 s,
-1.2 times after 68 s (medians); in 10 h with a good receiver none is doubted (``tests/benchmarks/speed_check.py``).
-
-A stretch in which they disagree is doubtful, and so is what follows until they have been seen to agree.
-"""
+"""Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed."""
 
 from __future__ import annotations
 
@@ -99,6 +56,16 @@ LONGEST_BETWEEN_FIXES_US = 3 * US_PER_S
 
 class Stillness:
     """Follows readings and fixes, each in order of time.
+
+    Problem: a chip that has frozen goes on giving the reading it had, and a road of no roughness at all is what comes
+    out. But with steps of 0.6 m/s2 a car that is parked gives one and the same reading for hours too, and nothing is
+    wrong.
+
+    Solution: the receiver shows which of the two it is. Only time counts through which every fix said that the car
+    moved, and not one axis of one reading changed. After ``FROZEN_S`` of it the sensor is frozen until a reading
+    changes, with a fix or without, and its windows are flagged and left without figures: from where it began, as far as
+    they have not been written yet. Before that nothing is said. A sensor without any noise, at an even speed on a
+    perfect road, can be silent for half a minute too; what it says then is too little to judge a road by.
 
     spans    in which the sensor was frozen
     """
@@ -169,6 +136,13 @@ again; what it was found to do does not count for longer."""
 class Repetition:
     """Follows readings in order of time. What it finds does not depend on how they were cut into blocks.
 
+    Problem: a bridge that writes 200 lines a second of a sensor that takes 51 readings gives plausible numbers at an
+    even rate. Between the held readings stand steps that no car makes: a quiet road reads up to a quarter too rough.
+    Solution: samples are judged ``WINDOW`` at a time by the pattern of what repeats (``logger.dsp.repeated_samples``),
+    which a coarse sensor that rightly stays on one code does not have. From the window in which repeats were found
+    until one in which hardly any are, or which shows that none are held, or until no window has shown them for some
+    minutes, rows are flagged ``repeated`` and left without figures, as far as they have not been written yet.
+
     spans    in which samples were repeated
     share    of the samples of the last window that repeat the one before, while they are found to; else 0
     """
@@ -231,7 +205,27 @@ LASTING_US = 60 * US_PER_S
 
 
 class SpeedCheck:
-    """Follows fixes in order of time. ``spans`` are the stretches that are doubtful."""
+    """Follows fixes in order of time. ``spans`` are the stretches that are doubtful.
+
+    Problem: the road's roughness is read by the speed, and a receiver may give a wrong one: none at all while it holds
+    its speed back at low signal, twice the true one in another unit, that of a simulator. Nothing in a fix shows it.
+    Solution: the places give the speed too. A stretch of fixes is cut into steps of ``STEP_M``; the way by the speed is
+    held against the sum of the steps by the places.
+
+    How far they may differ follows from the errors of receivers that are well. Those of places last, so that along a
+    road they cancel but for the first and the last of them (``PLACE_M`` each); the speed's noise (``SPEED_MPS``, each
+    fix by itself) adds up as the root of time, and both may be a few per cent off (``SHARE``: the scale of a speed, and
+    chords that cut corners). The limit is ``DEVIATIONS`` of the random part more than the share, and so it falls in
+    proportion as the stretch grows. Where the places make more, the ``WORST`` steps are left out: a single place far
+    off makes two, a place that is put right after a tunnel makes one; neither makes a way shorter. Steps in which
+    places were held while the car crept do not count.
+
+    On simulated drives through a town half or twice the speed is found after 12 to 17 s of driving, 0.8 of it after 42
+      s,
+    1.2 times after 68 s (medians); in 10 h with a good receiver none is doubted (``tests/benchmarks/speed_check.py``).
+
+    A stretch in which they disagree is doubtful, and so is what follows until they have been seen to agree.
+    """
 
     def __init__(self) -> None:
         self._first: TimedFix | None = None

@@ -1,29 +1,4 @@
-"""The service as a process of the system: what it tells systemd, its turn, and its end.
-
-Being on time on a machine that has other things to do.
-
-Problem. A sample is taken when its thread runs, so the service wants to go before all else. systemd can see to that
-(``CPUSchedulingPolicy=rr``), but a kernel with scheduling of real-time groups refuses it, and then systemd does not
-start the service at all.
-
-Solution. The unit only permits it (``LimitRTPRIO=``), and the service asks for it itself. Refused, it goes on with the
-niceness that the unit gives it, and says so. Where nothing is permitted, as in a terminal, nothing is asked for.
-
-A wish to stop that signals utter.
-
-Problem: a handler runs in the main thread between any two steps of it. If that thread waits for a ``threading.Event``
-and just holds the event's lock, which is not reentrant, a handler that sets the event waits for its own thread for
-ever. Solution: the handler only writes a byte to a pipe, and the one who waits looks at the pipe.
-
-Tell systemd how the service is doing, without needing systemd.
-
-Problem. A service of Type=notify must say when it is ready and that it is alive, by datagrams to a socket named
-in the environment. It must do that in milliseconds, from its own loop, never wait for the other side, and be the
-same program where no systemd is.
-
-Solution. A datagram socket that does not block, and nothing at all where the environment names no socket. What
-cannot be delivered is dropped: the watchdog exists to notice. Source: sd_notify(3), sd_watchdog_enabled(3).
-"""
+"""The service as a process of the system: what it tells systemd, its turn, and its end."""
 
 from __future__ import annotations
 
@@ -41,7 +16,16 @@ log = logging.getLogger(__name__)
 
 
 def go_first() -> None:
-    """Make the calling thread, and all that it starts from now on, real-time (round robin), if that is permitted."""
+    """Make the calling thread, and all that it starts from now on, real-time (round robin), if that is permitted.
+
+    Problem. A sample is taken when its thread runs, so the service wants to go before all else. systemd can see to that
+    (``CPUSchedulingPolicy=rr``), but a kernel with scheduling of real-time groups refuses it, and then systemd does not
+    start the service at all.
+
+    Solution. The unit only permits it (``LimitRTPRIO=``), and the service asks for it itself. Refused, it goes on with
+    the niceness that the unit gives it, and says so. Where nothing is permitted, as in a terminal, nothing is asked
+    for.
+    """
     permitted, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
     if permitted != resource.RLIM_INFINITY and permitted < PRIORITY:
         return
@@ -52,7 +36,13 @@ def go_first() -> None:
 
 
 class Stop:
-    """Asked for once, by a handler or another thread; from then on it is set."""
+    """Asked for once, by a handler or another thread; from then on it is set.
+
+    Problem: a handler runs in the main thread between any two steps of it. If that thread waits for a
+    ``threading.Event`` and just holds the event's lock, which is not reentrant, a handler that sets the event waits for
+    its own thread for ever. Solution: the handler only writes a byte to a pipe, and the one who waits looks at the
+    pipe.
+    """
 
     def __init__(self) -> None:
         self._reader, self._writer = os.pipe()
@@ -98,7 +88,15 @@ logger = logging.getLogger(__name__)
 
 
 class Notifier:
-    """Sends states to the socket that ``NOTIFY_SOCKET`` names; does nothing without one."""
+    """Sends states to the socket that ``NOTIFY_SOCKET`` names; does nothing without one.
+
+    Problem. A service of Type=notify must say when it is ready and that it is alive, by datagrams to a socket named
+    in the environment. It must do that in milliseconds, from its own loop, never wait for the other side, and be the
+    same program where no systemd is.
+
+    Solution. A datagram socket that does not block, and nothing at all where the environment names no socket. What
+    cannot be delivered is dropped: the watchdog exists to notice. Source: sd_notify(3), sd_watchdog_enabled(3).
+    """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         name = environment.get("NOTIFY_SOCKET", "")

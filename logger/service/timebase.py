@@ -1,45 +1,4 @@
-"""The time and the way of a drive: seconds by the receiver, metres by its speed.
-
-How often a receiver sends.
-
-Problem: one fix a second is usual, but receivers send from ten times a second to once in five seconds, and one that
-sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learnt as it comes. Losses
-make intervals longer, never shorter, so it is the lower quartile of the last ones.
-
-Monotonic time to UTC, from GPS fixes alone.
-
-A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of a fix,
-but the sentence arrives late, by an amount that wobbles, or that grows for minutes where the line is too slow for what
-is sent. It never arrives early: arrival minus fix time has a floor, which is the clock difference plus the shortest
-latency, and the shortest latency is a setting (only a pulse-per-second wire could measure it). The floor is the lowest
-that was seen, raised by no more than two clocks drift apart (the lower envelope of one-way delays [1]); by it each fix
-is placed at the time that it names, however late it comes.
-
-The receiver's own clock may jump (leap seconds that it learns late): then arrivals keep the rhythm and its times do
-not. Where a fix is late its times keep the rhythm and the arrivals do not. A jump that lasts for some fixes is taken
-over. After a loss of fix neither shows; then what lasts for half a minute is a jump, unless the line is full. A fix
-that comes earlier than the floor shows a jump, or that all before were late.
-
-A line that has been full since the start has not shown its floor: until it pauses the times are not certain.
-
-Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the date.
-UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of the date
-(a receiver that jumps by a week, or corrects one) is taken over after half a minute: nobody drives into another week,
-and most such jumps are soon taken back.
-
-[1] S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM
-    1999.
-
-Speed, travelled distance and place of the car between GPS fixes.
-
-A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line, so the
-distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not bridged: what lies
-in it has no distance. Lost is what the receiver's own rhythm would have brought. Below a threshold speed the car counts
-as standing, so that the noise of a receiver at rest does not make distance.
-
-The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and `legs`
-distinguishes such stretches.
-"""
+"""The time and the way of a drive: seconds by the receiver, metres by its speed."""
 
 from __future__ import annotations
 
@@ -57,7 +16,12 @@ _INTERVALS_KEPT = 16
 
 
 class Rhythm:
-    """usual_us   interval between two of its times [us]; None: not known yet"""
+    """usual_us   interval between two of its times [us]; None: not known yet
+
+    Problem: one fix a second is usual, but receivers send from ten times a second to once in five seconds, and one that
+    sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learnt as it comes. Losses
+    make intervals longer, never shorter, so it is the lower quartile of the last ones.
+    """
 
     def __init__(self) -> None:
         self._intervals_us: deque[int] = deque(maxlen=_INTERVALS_KEPT)
@@ -108,6 +72,28 @@ class _Stray:
 
 class Timebase:
     """Follows the difference between the monotonic clock and GPS time.
+
+    A Pi has no clock at boot and its system clock may jump, so ridelog never asks it. A receiver gives the UTC of a
+    fix, but the sentence arrives late, by an amount that wobbles, or that grows for minutes where the line is too slow
+    for what is sent. It never arrives early: arrival minus fix time has a floor, which is the clock difference plus the
+    shortest latency, and the shortest latency is a setting (only a pulse-per-second wire could measure it). The floor
+    is the lowest that was seen, raised by no more than two clocks drift apart (the lower envelope of one-way delays
+    [1]); by it each fix is placed at the time that it names, however late it comes.
+
+    The receiver's own clock may jump (leap seconds that it learns late): then arrivals keep the rhythm and its times do
+    not. Where a fix is late its times keep the rhythm and the arrivals do not. A jump that lasts for some fixes is
+    taken over. After a loss of fix neither shows; then what lasts for half a minute is a jump, unless the line is full.
+    A fix that comes earlier than the floor shows a jump, or that all before were late.
+
+    A line that has been full since the start has not shown its floor: until it pauses the times are not certain.
+
+    Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the
+    date. UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of
+    the date (a receiver that jumps by a week, or corrects one) is taken over after half a minute: nobody drives into
+    another week, and most such jumps are soon taken back.
+
+    [1] S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM
+        1999.
 
     latency_s       shortest delay between the instant of a fix and the arrival of its first byte [s]
     late_us         how much later than that the last fix came [us]
@@ -249,7 +235,16 @@ class Travel:
 
 
 class Odometer:
-    """Collects timed fixes as knots of a piecewise linear speed."""
+    """Collects timed fixes as knots of a piecewise linear speed.
+
+    A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line, so
+    the distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not bridged:
+    what lies in it has no distance. Lost is what the receiver's own rhythm would have brought. Below a threshold speed
+    the car counts as standing, so that the noise of a receiver at rest does not make distance.
+
+    The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and
+    `legs` distinguishes such stretches.
+    """
 
     def __init__(self, bridge_s: float, stationary_mps: float) -> None:
         self._bridge_us = round(bridge_s * US_PER_S)

@@ -1,24 +1,4 @@
-"""What a recorder would see: a car driven over a road, or stood on a rig, with its effects.
-
-What a recorder would keep of a car with effects, at places where its own sensor does not sit.
-
-Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a fit
-asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and the
-transforms of them are kept as those of the sensor alone are: sensors are tried on them without moving the car again.
-
-Predictions of runs by a car with effects.
-
-Problem: a fit needs hundreds of predictions of the same runs, by cars that differ in a number or an effect. Solution:
-``SimulatedRuns`` caches the road under the wheels of each run (``Passage``), also for the few other distance signals
-(with a scale error, with a distance error) that were used last.
-
-A drive that never happened: a road with obstacles, a car over it, and what its sensor would have recorded.
-
-Problem: what a person asks for (a speed, obstacles, effects, a sensor) has to become what a model needs, and what no
-car can do (a jump of a kilometre, effects that a car's masses cannot follow) is to be refused in words. Solution: each
-step is a function of arrays. ``with_obstacles`` makes the road, ``motion_along`` the way driven over it, ``response``
-or ``response_with_effects`` what is felt on the way, ``as_sensed`` what a sensor makes of it.
-"""
+"""What a recorder would see: a car driven over a road, or stood on a rig, with its effects."""
 
 from __future__ import annotations
 
@@ -62,6 +42,11 @@ def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
 def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
     """What the recorder keeps of the sensor's acceleration and of other signals, these without their means, one after
     the other ((1 + s) N,).
+
+    Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a
+    fit asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and
+    the transforms of them are kept as those of the sensor alone are: sensors are tried on them without moving the car
+    again.
 
     ValueError for a signal that this car does not have.
     """
@@ -140,7 +125,12 @@ def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
 
 class SimulatedRuns:
     """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
-    laws of their own are stepped in two threads besides."""
+    laws of their own are stepped in two threads besides.
+
+    Problem: a fit needs hundreds of predictions of the same runs, by cars that differ in a number or an effect.
+    Solution: ``SimulatedRuns`` caches the road under the wheels of each run (``Passage``), also for the few other
+    distance signals (with a scale error, with a distance error) that were used last.
+    """
 
     def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
@@ -390,6 +380,11 @@ def recorded_drive(
     rate_hz: float, errors: SensorErrors,
 ) -> dict[str, Array]:
     """The columns (n,) of a drive's file, by name: those of the outputs last, but for that of ``SENSOR``.
+
+    Problem: what a person asks for (a speed, obstacles, effects, a sensor) has to become what a model needs, and what
+    no car can do (a jump of a kilometre, effects that a car's masses cannot follow) is to be refused in words.
+    Solution: each step is a function of arrays. ``with_obstacles`` makes the road, ``motion_along`` the way driven over
+    it, ``response`` or ``response_with_effects`` what is felt on the way, ``as_sensed`` what a sensor makes of it.
 
     ValueError as ``response_with_effects``.
     """

@@ -1,19 +1,4 @@
-"""The numbers of a car and of its effects by name: how a fit moves them.
-
-The numbers of a vehicle by the names that its file gives them, and those of them that a fit may change.
-
-Problem: a vehicle is a frozen record with parts in it, a fit moves a list of numbers, and a person names some of them.
-Solution: a name is the path to a number in the vehicle's file, with dots: ``sprung_mass_kg``,
-``front.suspension_damping_n_s_per_m``. ``both.`` in place of ``front.`` or ``rear.`` stands for the two axles, which
-then get the same value.
-
-Free parameters of effects: which there are, their coordinates, and effects with other coordinates.
-
-Problem: a fit varies a vector of coordinates, on suitable scales, and an effect is a frozen record with values by name.
-Solution: a ``FreeParameter`` is the index of a parameter of an effect; coordinates are those of
-``Parameter.coordinate``.
-Nothing here knows of any data.
-"""
+"""The numbers of a car and of its effects by name: how a fit moves them."""
 
 from __future__ import annotations
 
@@ -49,6 +34,11 @@ _LONGEST_PATCH_M = 1.0
 @dataclass(frozen=True)
 class Free:
     """A number that a fit may change.
+
+    Problem: a vehicle is a frozen record with parts in it, a fit moves a list of numbers, and a person names some of
+    them. Solution: a name is the path to a number in the vehicle's file, with dots: ``sprung_mass_kg``,
+    ``front.suspension_damping_n_s_per_m``. ``both.`` in place of ``front.`` or ``rear.`` stands for the two axles,
+    which then get the same value.
 
     start       where it starts
     low, high   the bounds it stays between
@@ -219,7 +209,12 @@ _LEAST_SHARE = 0.1
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A free parameter: index of the effect in the model, and of the parameter in the effect."""
+    """A free parameter: index of the effect in the model, and of the parameter in the effect.
+
+    Problem: a fit varies a vector of coordinates, on suitable scales, and an effect is a frozen record with values by
+    name. Solution: a ``FreeParameter`` is the index of a parameter of an effect; coordinates are those of
+    ``Parameter.coordinate``. Nothing here knows of any data.
+    """
 
     effect: int
     parameter: int

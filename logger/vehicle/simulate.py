@@ -1,27 +1,4 @@
-"""Simulation of a linear car over a road: the passage of its wheels, and what a recorder keeps of it.
-
-A car driven over a road, at any speed.
-
-Problem: a model's response has to be right to a ten-thousandth before its difference from a measurement means anything,
-and quick, because a fit asks for it hundreds of times. The car's equations are linear and can be stepped without error;
-what is hard is the road, whose corners pass under a tire many times within a step, each wheel at a place of its own.
-
-Solution: each wheel's elevation enters a step by its exact mean over the way driven in that step (``TirePath``), with
-the slope that the means before and after it give. Corners within a step are neither missed nor folded down to low
-frequencies, as they would be if the road were looked at once per step. The steps are then taken in blocks.
-
-``drive`` gives what a recorder writes: the car simulated finely and then band-limited as the recorder does it before it
-samples, by a linear-phase filter whose delay is taken out.
-
-A drive over a road, laid out in fine steps of time: what passes under each wheel, and what a recorder keeps.
-
-Problem: a nonlinear car has to be stepped finely, and fits step it hundreds of times over the same road, of which only
-what changed should be computed again; and a recorder's filter, a sensor's own dynamics and a late clock lie between the
-body and each sample. Solution: a ``Passage`` holds the elevations under the wheels, exact means over each step as in
-``simulate``, for the last few places that wheels stood at; everything linear behind the body, down to the recorder's
-filter and the choice of one step in ten, is one product in frequency; and the motions of the last few bodies are held
-as well, since many a sensor is tried on one body.
-"""
+"""Simulation of a linear car over a road: the passage of its wheels, and what a recorder keeps of it."""
 
 from __future__ import annotations
 
@@ -54,6 +31,18 @@ def simulate(
     distance_m: npt.ArrayLike,
 ) -> Array:
     """Outputs (N, p) of a car at the instants given, not filtered.
+
+    Problem: a model's response has to be right to a ten-thousandth before its difference from a measurement means
+    anything, and quick, because a fit asks for it hundreds of times. The car's equations are linear and can be stepped
+    without error; what is hard is the road, whose corners pass under a tire many times within a step, each wheel at a
+    place of its own.
+
+    Solution: each wheel's elevation enters a step by its exact mean over the way driven in that step (``TirePath``),
+    with the slope that the means before and after it give. Corners within a step are neither missed nor folded down to
+    low frequencies, as they would be if the road were looked at once per step. The steps are then taken in blocks.
+
+    ``drive`` gives what a recorder writes: the car simulated finely and then band-limited as the recorder does it
+    before it samples, by a linear-phase filter whose delay is taken out.
 
     time_s        (N,) evenly spaced [s]; accurate when there are some ten steps in the period of every motion
     distance_m    (N,) where the front tires stand on the track then [m]; between two instants the speed is constant
@@ -212,6 +201,13 @@ _KEPT_PLACES, _KEPT_BODIES = 3, 6
 
 class Passage:
     """One drive: N samples at an even rate.
+
+    Problem: a nonlinear car has to be stepped finely, and fits step it hundreds of times over the same road, of which
+    only what changed should be computed again; and a recorder's filter, a sensor's own dynamics and a late clock lie
+    between the body and each sample. Solution: a ``Passage`` holds the elevations under the wheels, exact means over
+    each step as in ``simulate``, for the last few places that wheels stood at; everything linear behind the body, down
+    to the recorder's filter and the choice of one step in ten, is one product in frequency; and the motions of the last
+    few bodies are held as well, since many a sensor is tried on one body.
 
     track         the road, or the rig
     rate_hz       samples a second

@@ -1,21 +1,4 @@
-"""How certain the numbers of a car are, and how large its effects usually are.
-
-How far a vehicle's numbers may be off, and the cars that it may be instead.
-
-Problem: numbers that were fitted come with standard errors, but they hang together: more mass and a stiffer spring make
-the same car as far as the fit can show, so that errors one by one make a car look less certain than it is. Solution:
-the errors with their correlations, cut into directions that have nothing to do with one another (the eigenvectors of
-the correlation matrix); for each there is the car a standard error away.
-
-Effects in the sizes of a vehicle: what is usual in a car is not in a bench rig of 2.5 kg.
-
-Problem: the values that a search begins at, and what may be asked for, are those of cars: a friction of 60 N holds a
-rig of 25 N still. Solution: a vehicle that is lighter or quicker than cars by a factor has forces, springs, dampers
-and travels that follow by their dimensions (E. Buckingham, Physical Review 4, 1914), gravity being the same for all:
-with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Places on the car
-go with its wheelbase. Factors of masses and places are powers of ten, those of times half ones, as trials are that far
-apart: of every car they are 1.
-"""
+"""How certain the numbers of a car are, and how large its effects usually are."""
 
 from __future__ import annotations
 
@@ -44,6 +27,11 @@ _FARTHEST = 1.0  # a size that may be off by more than a factor e is not known a
 @dataclass(frozen=True)
 class NumberErrors:
     """Standard errors of a model's numbers, and how they hang together.
+
+    Problem: numbers that were fitted come with standard errors, but they hang together: more mass and a stiffer spring
+    make the same car as far as the fit can show, so that errors one by one make a car look less certain than it is.
+    Solution: the errors with their correlations, cut into directions that have nothing to do with one another (the
+    eigenvectors of the correlation matrix); for each there is the car a standard error away.
 
     standard_errors    by name: ``sprung_mass_kg``, ``front.unsprung_mass_kg``, ``dry_friction.friction_force_n``
     correlations       for each of them, in their order, those with the ones before it: a triangle; empty: none
@@ -119,7 +107,15 @@ _LENGTH = "_m"
 
 
 def sized(effect: Effect, vehicle: Vehicle) -> Effect:
-    """An effect with starts, trials and bounds in the sizes of a vehicle; of a car itself."""
+    """An effect with starts, trials and bounds in the sizes of a vehicle; of a car itself.
+
+    Problem: the values that a search begins at, and what may be asked for, are those of cars: a friction of 60 N holds
+    a rig of 25 N still. Solution: a vehicle that is lighter or quicker than cars by a factor has forces, springs,
+    dampers and travels that follow by their dimensions (E. Buckingham, Physical Review 4, 1914), gravity being the same
+    for all: with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Places
+    on the car go with its wheelbase. Factors of masses and places are powers of ten, those of times half ones, as
+    trials are that far apart: of every car they are 1.
+    """
     mass, time, wheelbase = _factors(vehicle)
     found = tuple(_times(one, _factor(effect, one.name, mass, time, wheelbase)) for one in effect.parameters)
     if found == effect.parameters:

@@ -1,27 +1,4 @@
-"""CSV files of phones and other loggers: known layouts, columns that are named, and the table by role.
-
-Which column of a logger's CSV file is what: recognised by a known layout, or named by the user.
-
-Problem: a column that is taken for another one, or a unit for another, gives runs that look like any others. Solution:
-only layouts that are known are recognised, and only if one fits; all else has to be named, and the
-complaint shows how.
-
-Layouts of the CSV files that known recorders write: which column is what, in which unit.
-
-Problem: a phone's recording says "Acceleration x (m/s^2)", the next one "z" in a file called TotalAcceleration.csv.
-Solution: one table of what is known, each with its source. A file is recognised by all columns that a layout needs, and
-by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the columns
-are named.
-
-Sign: an accelerometer at rest feels gravity as a push upwards (Android), or a program writes all its axes the other way
-round (Apple's Core Motion). Both read the same along the direction in which gravity is felt, so no layout needs a sign.
-
-CSV files of phones and other loggers as columns by role.
-
-Problem: such files have columns of many names and units, cells that are empty where a sensor said nothing, times in
-units that nobody wrote down. Solution: the table is read as any other (``csv_table``); its columns are recognised or
-named; what is empty is NaN, and a time shows its unit by its size.
-"""
+"""CSV files of phones and other loggers: known layouts, columns that are named, and the table by role."""
 
 from __future__ import annotations
 
@@ -75,7 +52,17 @@ class LayoutColumn:
 @dataclass(frozen=True)
 class Layout:
     """``columns`` by role, all of which must be there; ``stem``: the name that the file must have, without .csv, in
-    small letters; empty: the header says it."""
+    small letters; empty: the header says it.
+
+    Problem: a phone's recording says "Acceleration x (m/s^2)", the next one "z" in a file called TotalAcceleration.csv.
+    Solution: one table of what is known, each with its source. A file is recognised by all columns that a layout needs,
+    and by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the
+    columns are named.
+
+    Sign: an accelerometer at rest feels gravity as a push upwards (Android), or a program writes all its axes the other
+    way round (Apple's Core Motion). Both read the same along the direction in which gravity is felt, so no layout needs
+    a sign.
+    """
 
     name: str
     columns: Mapping[str, LayoutColumn]
@@ -228,7 +215,12 @@ def unit_in(header: str, role: str) -> str | None:
 def recognise(names: Sequence[str], stem: str, named: Named | None) -> Recognised | None:
     """What is in a file with this header and name: the columns that are named and, where these are not enough for
     anything, those of a known layout in the roles that nobody named; None: nothing that is enough. BadInput for a
-    column that is there twice or named twice."""
+    column that is there twice or named twice.
+
+    Problem: a column that is taken for another one, or a unit for another, gives runs that look like any others.
+    Solution: only layouts that are known are recognised, and only if one fits; all else has to be named, and the
+    complaint shows how.
+    """
     there = [plain(one) for one in names]
     by_name, by_layout = _by_name(there, named or {}), _by_layout(there, stem)
     if by_name is None or by_name.is_enough or by_layout is None:
@@ -317,7 +309,12 @@ class Header:
 class LoggerTable:
     """The columns (n,) of a file by role, as they are written but for NaN where a cell is empty; times of the unit
     "iso" are seconds since 1970. ``lines`` (n,) in which they stand; ``is_torn``: the last line was cut short, and is
-    left out."""
+    left out.
+
+    Problem: such files have columns of many names and units, cells that are empty where a sensor said nothing, times in
+    units that nobody wrote down. Solution: the table is read as any other (``csv_table``); its columns are recognised
+    or named; what is empty is NaN, and a time shows its unit by its size.
+    """
 
     header: Header
     known: Recognised

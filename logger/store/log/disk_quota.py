@@ -1,38 +1,4 @@
-"""The disk under a folder of logs: which one it is, recordings on it, and what goes when room runs short.
-
-The raw dumps of the service: a file per session, more only where the disk or its room interrupts.
-
-Problem. A dump is bigger than all logs together and worth less: it must never stop the service, nor take the room of
-the logs. The power ends most of them in the middle of a block.
-
-Solution. A dump is called ``<session>[-<number>].dump.gz.part`` while it is written and loses the ``.part`` when it is
-ended. ``DumpRecording`` lets go of a file that the disk refuses and begins another later; what is promised of a file is
-what was flushed before. ``repair_recordings`` cuts the dumps that were left open back to the last block that fits its
-check value.
-
-Where a folder lies: on which disk, and whether on one at all.
-
-Problem. What is written to memory is gone with the power, and a copy on the disk that holds the original saves nothing;
-neither shows in a path. Solution. The kernel's table of mounts and its tree of block devices are asked.
-
-Sources: Linux, Documentation/filesystems/proc.rst (3.5, mountinfo), overlayfs.rst (statfs and options),
-Documentation/ABI/testing/sysfs-block.
-
-Room on the disk: what goes when it runs short, and in which order.
-
-Problem. A card is shared with the system that runs the logger, and nobody looks at it for months. Something has to give
-way before the disk is full, and what cannot be brought back must not be what goes first.
-
-Solution. Room is what may still be written: up to the quota of the folder and down to the floor of free space. When it
-falls below a reserve, in this order and only as far as needed:
-
-1. the oldest exported files go, logs and dumps alike: a copy of them lies on a stick;
-2. no new raw bytes are recorded: the reserve belongs to the logs;
-3. when the reserve is used up too, the oldest dumps go that were not exported, each with a warning and counted;
-4. then nothing is written any more. A log that was not exported is never removed: its drive cannot be driven again,
-   while the drive that is not recorded now is reported by ``ridelog status`` and can. The reserve holds the rows of
-   some 1,500 km, so a car whose logs are collected once a season never gets there.
-"""
+"""The disk under a folder of logs: which one it is, recordings on it, and what goes when room runs short."""
 
 from __future__ import annotations
 
@@ -65,6 +31,14 @@ log = logging.getLogger(__name__)
 
 class DumpRecording:
     """Events in, whatever the disk does.
+
+    Problem. A dump is bigger than all logs together and worth less: it must never stop the service, nor take the room
+    of the logs. The power ends most of them in the middle of a block.
+
+    Solution. A dump is called ``<session>[-<number>].dump.gz.part`` while it is written and loses the ``.part`` when it
+    is ended. ``DumpRecording`` lets go of a file that the disk refuses and begins another later; what is promised of a
+    file is what was flushed before. ``repair_recordings`` cuts the dumps that were left open back to the last block
+    that fits its check value.
 
     session    number of the session, None as long as there is none; nothing is recorded before
 
@@ -236,7 +210,14 @@ def are_on_one_disk(one: Path, other: Path) -> bool:
 
 
 def why_in_memory(folder: Path) -> str:
-    """In words, why what lies in a folder is lost with the power; empty: it lies on a disk, as far as is known."""
+    """In words, why what lies in a folder is lost with the power; empty: it lies on a disk, as far as is known.
+
+    Problem. What is written to memory is gone with the power, and a copy on the disk that holds the original saves
+    nothing; neither shows in a path. Solution. The kernel's table of mounts and its tree of block devices are asked.
+
+    Sources: Linux, Documentation/filesystems/proc.rst (3.5, mountinfo), overlayfs.rst (statfs and options),
+    Documentation/ABI/testing/sysfs-block.
+    """
     mounts = all_mounts()
     mount = mount_of(folder, mounts)
     return _why(mount, mounts) if mount is not None else ""
@@ -347,6 +328,19 @@ class _Kept:
 
 class DiskQuota:
     """Looks after the room for one folder.
+
+    Problem. A card is shared with the system that runs the logger, and nobody looks at it for months. Something has to
+    give way before the disk is full, and what cannot be brought back must not be what goes first.
+
+    Solution. Room is what may still be written: up to the quota of the folder and down to the floor of free space. When
+    it falls below a reserve, in this order and only as far as needed:
+
+    1. the oldest exported files go, logs and dumps alike: a copy of them lies on a stick;
+    2. no new raw bytes are recorded: the reserve belongs to the logs;
+    3. when the reserve is used up too, the oldest dumps go that were not exported, each with a warning and counted;
+    4. then nothing is written any more. A log that was not exported is never removed: its drive cannot be driven again,
+       while the drive that is not recorded now is reported by ``ridelog status`` and can. The reserve holds the rows of
+       some 1,500 km, so a car whose logs are collected once a season never gets there.
 
     exported     gives the names of the files that lie on a stick
 
