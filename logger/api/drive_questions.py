@@ -456,6 +456,9 @@ class ProfileQuestion(Question):
 class IriQuestion(ProfileQuestion):
     """Exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
 
+      ridelog iri road.csv --window 160.9344
+      ridelog iri road.csv --localized 2.5 --out iri.html
+
     PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]) or ERD, evenly spaced by 300 mm or less and at least
     11 m long. With two wheel tracks: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
 

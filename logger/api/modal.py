@@ -25,6 +25,7 @@ from logger.chart_data import Array, line
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.modal.mode import FoundMode, ModalResult
+from logger.printable import counted
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks
@@ -450,7 +451,8 @@ def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
     """What a person reads; ``name`` is that of the file."""
     seconds = len(record.samples) / record.rate_hz
     order = f", order {result.order}" if result.order else ""
-    shown = [f"{name}: {seconds:.4g} s at {record.rate_hz:.6g} Hz, {len(record.names)} channels",
+    shown = [f"{name}: {seconds:.4g} s at {record.rate_hz:.6g} Hz, "
+             f"{counted(len(record.names), 'channel')}",
              f"{result.how}{order}", ""]
     if result.modes:
         shown.append("mode   frequency Hz           damping %             shape")

@@ -1,5 +1,7 @@
 """Copy finished logs to a USB stick: checked, atomic, repeatable.
 
+  sudo ridelog export --to /media/RIDELOG
+
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
 already is read and left alone. Where the settings pair the logger with its sticks, only a copy on one of those counts
 as an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.

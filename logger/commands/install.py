@@ -1,5 +1,8 @@
 """Set up user, groups, units, rules and settings, and start the service. Settings that were changed stay.
 
+  sudo ridelog install --dry-run
+  sudo ridelog install
+
 'sudo ridelog install --dry-run' prints every step and takes none; 'ridelog uninstall' undoes it and keeps the logs.
 """
 

@@ -1,4 +1,8 @@
-"""Make one web page of segment logs: a map, curves and tables that answer to the pointer. It opens with no network."""
+"""Make one web page of segment logs: a map, curves and tables that answer to the pointer. It opens with no network.
+
+  ridelog report ridelog-demo --out drive.html
+  ridelog report /media/RIDELOG --out all.html --base roads.geojson
+"""
 
 from __future__ import annotations
 

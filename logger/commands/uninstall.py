@@ -1,5 +1,8 @@
 """Stop the service and take away the files that 'ridelog install' wrote, but for those that were changed since.
 
+  sudo ridelog uninstall --dry-run
+  sudo ridelog uninstall
+
 The logs, the user ridelog who owns them and the program itself stay; --dry-run prints every step and takes none.
 """
 

@@ -1,6 +1,9 @@
 """Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
 is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
 
+  ridelog verify /var/lib/ridelog
+  ridelog verify /media/RIDELOG --json
+
 Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong,
 nor is the silence of a sensor in a dump, which counts as a gap.
 """

@@ -187,9 +187,9 @@ def why_none(found: Learning) -> str:
     names = " and ".join(found.verdict)
     many = len(found.verdict) > 1
     if found.unexplained:
-        return (f"{names} explain{'s' * (not many)} part of what is missing, and no law of these families explains it "
-                "better; no law is learned")
-    return f"{names} explain{'s' * (not many)} it; no law is learned"
+        return (f"no law is learned: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
+                "families explains it better")
+    return f"no law is learned: {names} explain{'s' * (not many)} it"
 
 
 def _refused(one: Refusal) -> str:
