@@ -79,7 +79,7 @@ def test_another_cars_file_is_refused_but_by_identify(
     other = file_that_is_off(tmp_path, 0.5, (2.0, 1.4), 0.6)
     assert main(["compare", "--vehicle", str(other), *runs]) == 0
     words = " ".join(capsys.readouterr().out.split())
-    assert "beyond their tolerance. Measure them" in words and "front.suspension_stiffness_n_per_m by -" in words
+    assert "numbers beyond their tolerance" in words and "front.suspension_stiffness_n_per_m by -" in words
     other = file_that_is_off(tmp_path, 2.0, (0.5, 0.5), 2.2)
     with pytest.raises(BadInput, match=r"found one of another car: .* ridelog identify fits .*\(--anyway goes on\)"):
         main(["compare", "--vehicle", str(other), *runs])
