@@ -50,7 +50,9 @@ from logger.api.question import (
     Vehicle,
     VehicleName,
     Verb,
+    check_word_or_number,
     files_of,
+    word_or_number,
 )
 from logger.api.question import IRI as IRI_RANGE
 from logger.errors import BadInput
@@ -98,18 +100,6 @@ class ComfortQuestion(Question):
     resample_hz: ResampleHz = None
 
 
-def _noise(text: str) -> float | str:
-    try:
-        return text if text == AUTO else float(text)
-    except ValueError:
-        raise ValueError(f"expected {AUTO}, or a number in {NOISE.unit}") from None
-
-
-def _check_noise(noise_mps2: float | str) -> None:
-    if not isinstance(noise_mps2, str) and NOISE.fault(noise_mps2):
-        raise ValueError(f"expected {AUTO}, or {NOISE.words}")
-
-
 @dataclass(frozen=True)
 class EstimateQuestion(LongQuestion):
     """The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
@@ -146,8 +136,8 @@ class EstimateQuestion(LongQuestion):
     _: KW_ONLY
     noise_mps2: Annotated[float | Literal["auto"] | None, Option(
         f"r.m.s. noise of one reading before rounding, {NOISE.words}; auto: learnt from the drive, with a standard "
-        "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2", read=_noise,
-        check=_check_noise)] = None
+        "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
+        read=word_or_number(AUTO, NOISE), check=check_word_or_number(AUTO, NOISE))] = None
     step_mps2: Annotated[float | None, Option(
         "step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
         "MPS2")] = None

@@ -104,8 +104,8 @@ SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Rang
 """Of a simulated drive; what its sensor adds, noise or steps. An estimate's steps likewise."""
 NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
 """Of an estimate: noise of a reading, length of a window."""
-AUTO = "auto"
-"""Of a noise: learnt."""
+AUTO, UNKNOWN = "auto", "unknown"
+"""Of a noise: learnt. Of a vehicle's numbers: nothing is known of them."""
 LENGTH, SPACING = Range(11.0, 1e6, "m"), Range(0.001, 0.3, "m")
 """Of a random road; a shorter one has no IRI."""
 ROUGHNESS, IRI, ROAD_WAVINESS = Range(1e-3, 1e7, "cm3"), Range(0.01, 1000, "m/km"), Range(1.5, 3.0)
@@ -265,6 +265,26 @@ class Option:
     flag: str = ""
     bare: Any = None
     check: Callable[[Any], object] | None = None
+
+
+def word_or_number(word: str, within: Range) -> Callable[[str], float | str]:
+    """A reader of a terminal's text that is this word or a number; ValueError for another text."""
+    def read(text: str) -> float | str:
+        try:
+            return text if text == word else float(text)
+        except ValueError:
+            raise ValueError(f"expected {word}, or {within.words}") from None
+
+    return read
+
+
+def check_word_or_number(word: str, within: Range) -> Callable[[float | str], None]:
+    """A check that raises ValueError for what is neither this word nor a number within the range."""
+    def check(value: float | str) -> None:
+        if value != word and (isinstance(value, str) or within.fault(value)):
+            raise ValueError(f"expected {word}, or {within.words}")
+
+    return check
 
 
 @dataclass(frozen=True)
@@ -528,9 +548,11 @@ VehicleName = Annotated[Vehicle, Option(
 Anyway = Annotated[bool, Option("go on where a run does not seem to be of this road or this car, or in these units")]
 TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
-Tolerance = Annotated[float | None, Option(
-    "how far off the vehicle's masses, springs and dampers may well be, as a share (default: "
-    f"{USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation", TOLERANCE, "SHARE")]
+Tolerance = Annotated[float | str | None, Option(
+    "how far off those of the vehicle's masses, springs and dampers may well be of which its file does not say it, as a "
+    f"share (default: {USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation. {UNKNOWN}: "
+    "nothing is known of any number", metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
+    check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 LowPass = Annotated[float | None, Option(
     "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "

@@ -169,13 +169,14 @@ def free(
     ``read`` and ``Free``, and for a size whose start or bounds are not above 0: what fits best may be none at all then.
     """
     value = read(vehicle, name) if start is None else start
-    low, high = _bounds(name, value) if bounds is None else bounds
+    low, high = bounds_of(name, value) if bounds is None else bounds
     if not name.startswith(f"{SENSOR}.") and not (low > 0 and value > 0):
         raise ValueError(f"{name}: expected a start and bounds above 0, found {value:g} and {low:g} to {high:g}")
     return Free(name, value, low, high)
 
 
-def _bounds(name: str, value: float) -> tuple[float, float]:
+def bounds_of(name: str, value: float) -> tuple[float, float]:
+    """Bounds of a vehicle's number, the lower and the upper, where nothing else is said of it."""
     if name.startswith(f"{SENSOR}."):
         return -_FARTHEST_M, _FARTHEST_M
     factor = _LENGTH_FACTOR if name.rpartition(".")[2] in _LENGTHS else _FACTOR

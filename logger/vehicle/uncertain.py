@@ -14,7 +14,7 @@ from logger.vehicle.effect import Chosen, Effect, ForceEffect, Parameter
 from logger.vehicle.linearise import KnownCar, known_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
-from logger.vehicle.named_parameters import changed, read, slope_of
+from logger.vehicle.named_parameters import bounds_of, changed, read, slope_of
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -22,6 +22,40 @@ Array = npt.NDArray[np.float64]
 # Directions with less of the numbers' variance than this are rounding.
 _LEAST_VARIANCE = 1e-6
 _FARTHEST = 1.0  # a size that may be off by more than a factor e is not known at all
+
+
+@dataclass(frozen=True)
+class Known:
+    """How well a number of a vehicle was known before any run.
+
+    value        the number: its best guess, or of a range the middle by factors
+    deviation    standard deviation of its logarithm
+    words        as a file says it: ``875 +- 5%``, ``[700, 1000]``, ``unknown``
+    """
+
+    value: float
+    deviation: float
+    words: str
+
+    @classmethod
+    def about(cls, value: float, deviation: float, percent: bool) -> Known:
+        """A value and its standard deviation, in its unit or in ``percent`` of it."""
+        share = deviation / (100.0 if percent else value)
+        return cls(value, share, f"{value!r} +- {deviation:g}{'%' * percent}")
+
+    @classmethod
+    def within(cls, low: float, high: float) -> Known:
+        """A range within which nothing is known: uniform by factors."""
+        return cls(float(np.sqrt(low * high)), float(np.log(high / low) / np.sqrt(12)), f"[{low!r}, {high!r}]")
+
+    @classmethod
+    def unknown(cls, name: str, value: float) -> Known:
+        """Nothing is known; the value is where a search begins. A fit stays within the same factor of it either way as
+        where no bounds are said."""
+        return replace(cls.within(*bounds_of(name, value)), value=value, words=UNKNOWN)
+
+
+UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)

@@ -339,7 +339,7 @@ def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_f
                   if name.partition(".")[0] == one.effect.name and name.partition(".")[2] in one.values}
         effects.append(replace(one, standard_errors={**one.standard_errors, **errors}))
     return replace(given, vehicle=model.vehicle_with(values), effects=tuple(effects),
-                   errors=_errors(list(fit.parameters), fit.covariance))
+                   given=given.given or given.vehicle, errors=_errors(list(fit.parameters), fit.covariance))
 
 
 def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
@@ -378,7 +378,8 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     one_road = question.road == SAME
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
-    model = vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))), errors=_road_fit_errors(fit))
+    model = vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))), errors=_road_fit_errors(fit),
+                               given=given.given or given.vehicle, known=given.known)
     text = [_head(given, len(parameters), records, f"; over {where}", ","), *unmeasured_lines(fit, parameters),
             *left_out_paragraph(_beside_beginnings(records))]
     return Identification(

@@ -11,13 +11,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
 from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
 from logger.api.lab.question import LabQuestion
-from logger.api.question import TOLERANCE, Notify, Runs, WrongOption, each, silent
+from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, WrongOption, each, silent
 from logger.api.vehicles import model_of
 from logger.errors import BadInput
 from logger.lab.compare import Comparison, compare
@@ -35,7 +36,7 @@ from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import Model, Step
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
-from logger.vehicle.uncertain import sized
+from logger.vehicle.uncertain import Known, sized
 
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
@@ -161,7 +162,7 @@ class Bench:
                        Step("numbers refitted", found.error_refitted, found.noise_floor_error))
         step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
         return Model(found.vehicle, found.effects, (*history, step),
-                     self.model.given or self.model.vehicle, found.errors)
+                     self.model.given or self.model.vehicle, found.errors, self.model.known)
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -208,13 +209,17 @@ def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: 
     return found
 
 
-def tolerance_of(share: float | None) -> Tolerance:
-    """What a share either way is taken for that the user said of masses, springs and dampers; None: the usual one.
-    BadInput for one that no car's numbers have."""
-    if share is None:
-        return Tolerance()
-    TOLERANCE.check("tolerance", share)
-    return Tolerance(numbers=share / Tolerance.band)
+def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingProxyType({})) -> Tolerance:
+    """How well a car's numbers are known: as its file says (``known``), and the others to what the user said, a share
+    of masses, springs and dampers either way, or that all are unknown; None: the usual one. BadInput for a share that
+    no car's numbers have."""
+    if said == UNKNOWN:
+        return Tolerance.unknown()
+    by_name = {name: one.deviation for name, one in known.items()}
+    if said is None:
+        return Tolerance(by_name=by_name)
+    TOLERANCE.check("tolerance", float(said))
+    return Tolerance(numbers=float(said) / Tolerance.band, by_name=by_name)
 
 
 def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
@@ -315,7 +320,8 @@ def _try_own(found: Bench, files: Sequence[str]) -> None:
 def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = True) -> Bench:
     """Vehicle, runs and effects of a question, checked together."""
     given: Any = question
-    off, model = tolerance_of(question.tolerance), model_of(given.vehicle)
+    model = model_of(given.vehicle)
+    off = tolerance_of(question.tolerance, model.known)
     return bench_of(word_of(given.vehicle, model), model, checked_runs(lab_drives(given.runs), thin, model.vehicle),
                     list(map(str, getattr(question, "effect_files", ()))), off, searches, question.warn,
                     question.low_pass_hz, question.anyway)

@@ -203,7 +203,7 @@ class SameRoadDiagnosis(Diagnosis):
 
 def diagnose_same_road(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float | None = None, progress: Notify = silent,
+    effect_files: Sequence[Path | str] = (), tolerance: float | str | None = None, progress: Notify = silent,
 ) -> SameRoadDiagnosis:
     """As ``diagnose`` with ``same_road``: from two drives or more over one road that nobody measured.
 
@@ -314,7 +314,7 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 
 def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuestion) -> UnknownRoadDiagnosis:
     """Which effects the model lacks. BadInput as ``diagnose_same_road``."""
-    off, given = tolerance_of(question.tolerance), model.given or model.vehicle
+    off, given = tolerance_of(question.tolerance, model.known), model.given or model.vehicle
     word, notify = word_of(question.vehicle, model), question.progress
     for one in model.effects:
         if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:

@@ -95,7 +95,8 @@ class Plan(CommandResult):
 
 def plan_by(question: PlanQuestion) -> Plan:
     """The answer to ``PlanQuestion``, which says what is raised."""
-    model, tolerance, bench = model_of(question.vehicle), tolerance_of(question.tolerance), None
+    model, bench = model_of(question.vehicle), None
+    tolerance = tolerance_of(question.tolerance, model.known)
     road = None if question.profile is None else drive_file.track_of(
         question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile))
     if each(question.runs):

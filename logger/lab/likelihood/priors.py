@@ -8,14 +8,14 @@ numbers on their logarithms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.vehicle.named_parameters import changed, read, sized
-from logger.vehicle.uncertain import grows_with_mass
+from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +39,7 @@ class Tolerance:
     droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
                  each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
     band         in which numbers may well be, in these deviations: 20 % either way have 12.5 %
+    by_name      of numbers of which the vehicle's file says how well they are known
     """
 
     numbers: float = 0.125
@@ -46,6 +47,12 @@ class Tolerance:
     gain: float = 0.005
     droop: float = 0.4
     band: float = 1.6
+    by_name: Mapping[str, float] = field(default_factory=dict)
+
+    @staticmethod
+    def unknown() -> Tolerance:
+        """Nothing is known of any number."""
+        return Tolerance(*(Known.unknown(name, 1.0).deviation for name in ("sprung_mass_kg", "track_width_m")))
 
     @property
     def share(self) -> float:
@@ -73,8 +80,9 @@ class VehiclePrior:
         names = sized(vehicle)
         lengths = is_length(names)
         # A step of a length, by which waves come late, has to be much smaller.
-        return VehiclePrior(names, np.where(lengths, tolerance.lengths, tolerance.numbers),
-                            np.where(lengths, 1e-4, 0.002))
+        usual = np.where(lengths, tolerance.lengths, tolerance.numbers)
+        deviations = [tolerance.by_name.get(name, one) for name, one in zip(names, usual, strict=True)]
+        return VehiclePrior(names, np.array(deviations, float), np.where(lengths, 1e-4, 0.002))
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""

@@ -21,8 +21,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,8 +38,9 @@ from logger.printable import LONGEST_COMPLAINT, LONGEST_WORD, word
 from logger.shipped import shipped
 from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.vehicle.effect import Chosen
+from logger.vehicle.models import GOLDEN_CAR
 from logger.vehicle.named_parameters import changed, names, read, sized
-from logger.vehicle.uncertain import NumberErrors
+from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
 if TYPE_CHECKING:
@@ -70,7 +72,11 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 }
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
 _SHORTEST_WHEELBASE_M = 0.1
+# Where a search for an unknown number begins, of a car of the middle class.
+_USUAL = {"sprung_mass_kg": 350.0, "cg_distance_m": 1.35, "track_width_m": 1.5, "contact_patch_m": 0.15,
+          _ANTI_ROLL_KEY: 1e4}
 _ROUNDING = 1e-12
+_SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,7 @@ class Model:
 
     given    the vehicle as it was before any of its numbers was refitted; None: none was
     errors   of the numbers of vehicle and effects that were fitted; None: none are known
+    known    how well numbers were known before that, by name, where the file says it
     """
 
     vehicle: Vehicle
@@ -98,6 +105,7 @@ class Model:
     history: tuple[Step, ...] = ()
     given: Vehicle | None = None
     errors: NumberErrors | None = None
+    known: Mapping[str, Known] = field(default_factory=dict)
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
@@ -110,7 +118,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
     sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as it makes a difference to its model. Numbers that no car
     has, such as those in other units, are wrong too.
     """
-    vehicle, keys = _read(path)
+    vehicle, keys, _ = _read(path)
     if "effects" in keys and keys["effects"].items():
         raise keys["effects"].wrong("no effects: this is for a plain car only")
     return vehicle
@@ -124,21 +132,27 @@ def read_model(path: Path | str) -> Model:
     """
     from logger.store.formats.effect_file import read_effects
 
-    vehicle, keys = _read(path)
+    vehicle, keys, known = _read(path)
     effects = read_effects(keys["effects"], vehicle) if "effects" in keys else ()
+    given = _read_given(keys["given"], vehicle, known) if "given" in keys else None
     return Model(
         vehicle,
         effects,
         tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
-        _read_given(keys["given"], vehicle) if "given" in keys else None,
+        given,
         _read_errors(keys, vehicle, effects) if "standard_errors" in keys else None,
+        known,
     )
 
 
 def read_on_board(path: Path | str) -> Model:
     """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput).
     """
-    _, keys = _read(path)
+    _, keys, known = _read(path)
+    for name, one in known.items():
+        if one.words == UNKNOWN and "given" not in keys:
+            raise BadInput(f"{path}: expected a number for {name}, found unknown: nothing is fitted on board "
+                           "(ridelog identify finds it from runs)")
     for item in keys["effects"].items() if "effects" in keys else ():
         if "file" in (said := item.mapping()):
             raise said["file"].wrong("an effect that comes with ridelog: the service runs no Python of others")
@@ -157,9 +171,16 @@ def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[C
     return NumberErrors(errors, tuple(map(tuple, rows)))
 
 
-def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
-    """The vehicle with its numbers as they were given: ``front.unsprung_mass_kg: 40``."""
-    keys = node.mapping(optional=sized(vehicle))
+def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicle:
+    """The vehicle with its numbers as they were given, ``front.unsprung_mass_kg: 40 +- 5%``; how well they were known
+    is added to ``known``. Of one that was not known the number that was found stands in its place."""
+    keys = dict(node.mapping(optional=sized(vehicle)))
+    for name, one in keys.items():
+        if _is_unknown(one):
+            known[name] = Known.unknown(name, read(vehicle, name))
+            keys[name] = replace(one, content=repr(read(vehicle, name)))
+        else:
+            keys[name] = _plain_number(one, name, known)
     mass_kg = vehicle.sprung_mass_kg
     values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg)
               for name, one in keys.items()}
@@ -169,9 +190,77 @@ def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
     return changed(vehicle, values)
 
 
-def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
-    """The vehicle of a file, and the nodes of all its keys."""
-    top = load_mapping(path)
+def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
+    """The number of a node without how well it is known, which is added to ``known``. BadInput for what says neither.
+    """
+    if isinstance(node.content, tuple):
+        ends = [one.number(above=0.0) for one in node.content]
+        if len(ends) != 2 or not ends[0] < ends[1]:
+            raise node.wrong("a range, [low, high]")
+        one = Known.within(*ends)
+    elif isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
+        value, spread = (replace(node, content=text, plain=True).number(above=0.0) for text in said.groups()[:2])
+        one = Known.about(value, spread, bool(said[3]))
+        if one.deviation > 1:
+            raise node.wrong(f"a standard deviation up to the number itself, or {UNKNOWN}")
+    else:
+        return node
+    known[name] = one
+    return replace(node, content=repr(one.value), plain=True)
+
+
+def _is_unknown(node: Node) -> bool:
+    return node.content == UNKNOWN
+
+
+def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
+    """A vehicle's file with plain numbers, and how well those are known of which it says it, by name. In the place of
+    one that is unknown stands that of the Golden Car, for as much mass."""
+    known: dict[str, Known] = {}
+    unknown: list[str] = []
+
+    def plain(node: Node, part: str = "") -> Node:
+        content = dict(node.mapping())
+        for key, one in content.items():
+            if key in _LIMITS or key in _LIMITS_PER_KG:
+                content[key] = _plain_number(one, part + key, known)
+                unknown.extend([part + key] * _is_unknown(one))
+            elif key in ("front", "rear") and isinstance(one.content, Mapping):
+                content[key] = plain(one, f"{key}.")
+        return replace(node, content=content)
+
+    def filled(node: Node, part: str = "") -> Node:
+        content = dict(node.mapping())
+        for key, one in content.items():
+            if part + key in unknown:
+                value = _usual_number(key, mass_kg)
+                known[part + key] = Known.unknown(part + key, value)
+                content[key] = replace(one, content=repr(value), plain=True)
+            elif key in ("front", "rear") and isinstance(one.content, Mapping):
+                content[key] = filled(one, f"{key}.")
+        return replace(node, content=content)
+
+    found = plain(top)
+    if not unknown:
+        return found, known
+    mass_kg = _usual_number("sprung_mass_kg", 1.0)
+    if "sprung_mass_kg" in found.mapping() and "sprung_mass_kg" not in unknown:
+        mass_kg = found.mapping()["sprung_mass_kg"].number(above=0.0)
+    return filled(found), known
+
+
+def _usual_number(key: str, sprung_mass_kg: float) -> float:
+    """A number of the Golden Car with so much sprung mass; of a car of the middle class where it has none."""
+    if key in _USUAL:
+        return _USUAL[key]
+    if key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2"):  # dynamic index 1; a body as wide as its track
+        return sprung_mass_kg * (_USUAL["cg_distance_m"]**2 if key[0] == "p" else _USUAL["track_width_m"]**2 / 12)
+    return float(f"{sprung_mass_kg * getattr(GOLDEN_CAR.front, key):.6g}")
+
+
+def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Known]]:
+    """The vehicle of a file, the nodes of all its keys, and how well its numbers are known where they say it."""
+    top, known = _with_plain_numbers(load_mapping(path))
     model_node = top.mapping().get("model")
     if model_node is None:
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
@@ -198,7 +287,7 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
         track_width_m=body.get("track_width_m"),
         sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
     )
-    return vehicle, keys
+    return vehicle, keys, known
 
 
 def _name_of(node: Node) -> str:
@@ -264,19 +353,29 @@ def write_model(path: Path | str, model: Model, comments: str = "") -> None:
     from logger.store.formats.effect_file import effect_keys
 
     keys = _vehicle_keys(model.vehicle)
+    if model.given is None:
+        for name, known in model.known.items():
+            part, _, leaf = name.rpartition(".")
+            (keys[part] if part else keys)[leaf] = _known_words(known)
     keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
     if model.errors is not None and model.errors.standard_errors:
         keys["standard_errors"] = {name: float(error) for name, error in model.errors.standard_errors.items()}
         if model.errors.correlations:
             keys["correlations"] = [_OneLineList(map(float, row)) for row in model.errors.correlations]
     if model.given is not None:
-        keys["given"] = {name: float(read(model.given, name)) for name in sized(model.given)
-                         if read(model.given, name) != read(model.vehicle, name)}
+        moved = {name: float(read(model.given, name)) for name in sized(model.given)
+                 if read(model.given, name) != read(model.vehicle, name)}
+        keys["given"] = moved | {name: _known_words(one) for name, one in model.known.items()}
     if model.history:
         keys["history"] = [_OneLine(step=one.step, error=float(one.error),
                                     noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
     text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
     write_text(path, comments + text)
+
+
+def _known_words(known: Known) -> object:
+    """How well a number was known, as YAML writes it."""
+    return _OneLineList(json.loads(known.words)) if known.words.startswith("[") else known.words
 
 
 def _float_or_none(value: float | None) -> float | None:

@@ -13,7 +13,15 @@ from logger.errors import BadInput
 from logger.printable import word
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.effect_file import shipped_effects
-from logger.store.formats.vehicle_file import Model, Step, read_model, read_vehicle, write_model, write_vehicle
+from logger.store.formats.vehicle_file import (
+    Model,
+    Step,
+    read_model,
+    read_on_board,
+    read_vehicle,
+    write_model,
+    write_vehicle,
+)
 from logger.store.formats.yaml_nodes import MAX_BYTES, parse_mapping
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import MODELS, structure_of
@@ -526,3 +534,43 @@ def test_complaints_about_what_was_given_name_the_line(tmp_path: Path, line: str
         read_model(path)
     assert str(caught.value).startswith(f"{path}:{len((QUARTER + 'given:').splitlines()) + 1}: ")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(("said", "value", "deviation"), [
+    ("38 +- 10%", 38.0, 0.1), ("38 ± 10 %", 38.0, 0.1), ("38+/-3.8", 38.0, 0.1),
+    ("[20, 80]", 40.0, np.log(4) / np.sqrt(12)),  # uniform by factors: its variance is a twelfth of its width's square
+    ("unknown", 45.0, np.log(400) / np.sqrt(12)),  # the Golden Car's 0.15 of 300 kg; fits stay within a factor of 20
+])
+def test_a_number_says_how_well_it_is_known(tmp_path: Path, said: str, value: float, deviation: float) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(QUARTER.replace("unsprung_mass_kg: 40", f"unsprung_mass_kg: {said}"), "utf-8")
+    model = read_model(path)
+    assert model.vehicle.front.unsprung_mass_kg == pytest.approx(value)
+    assert {name: one.deviation for name, one in model.known.items()} == {
+        "front.unsprung_mass_kg": pytest.approx(deviation)}
+    write_model(path, model)
+    assert read_model(path) == model
+
+    found = replace(model, given=model.vehicle, vehicle=changed(model.vehicle, {"front.unsprung_mass_kg": 44.0}))
+    write_model(path, found)
+    again = read_model(path)
+    assert again.vehicle.front.unsprung_mass_kg == 44
+    assert again.known["front.unsprung_mass_kg"].words == model.known["front.unsprung_mass_kg"].words
+    assert again.known["front.unsprung_mass_kg"].deviation == pytest.approx(deviation)
+
+
+@pytest.mark.parametrize(("said", "expected"), [
+    ("[80, 20]", "a range, [low, high], found a list"), ("[20]", "a range, [low, high], found a list"),
+    ("40 +- 300%", "a standard deviation up to the number itself, or unknown"), ("40 +- 0", "greater than 0, found '0'"),
+    ("40 kg +- 2", "greater than 0, found '40 kg'"), ("unknwon", "a number of at least 0, found 'unknwon'")])
+def test_what_says_nothing_of_a_number_is_refused_with_its_line(tmp_path: Path, said: str, expected: str) -> None:
+    text = QUARTER.replace("unsprung_mass_kg: 40", f"unsprung_mass_kg: {said}")
+    message = complaint(tmp_path, text)
+    assert message.startswith(f"{line_of(text, '  unsprung_mass_kg')}: ") and expected in message
+
+
+def test_no_number_is_unknown_on_board(tmp_path: Path) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(QUARTER.replace("1.8e5", "unknown"), "utf-8")
+    with pytest.raises(BadInput, match=r"expected a number for front\.tire_stiffness_n_per_m, found unknown"):
+        read_on_board(path)
