@@ -549,7 +549,7 @@ Anyway = Annotated[bool, Option("go on where a run does not seem to be of this r
 TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
-    "how far off those of the vehicle's masses, springs and dampers may well be of which its file does not say it, as a "
+    "how far off the vehicle's masses, springs and dampers may well be, where its file does not say it of one, as a "
     f"share (default: {USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation. {UNKNOWN}: "
     "nothing is known of any number", metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]

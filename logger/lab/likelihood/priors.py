@@ -52,7 +52,8 @@ class Tolerance:
     @staticmethod
     def unknown() -> Tolerance:
         """Nothing is known of any number."""
-        return Tolerance(*(Known.unknown(name, 1.0).deviation for name in ("sprung_mass_kg", "track_width_m")))
+        numbers, lengths = (Known.unknown(name, 1.0).deviation for name in ("sprung_mass_kg", "track_width_m"))
+        return Tolerance(numbers, lengths)
 
     @property
     def share(self) -> float:

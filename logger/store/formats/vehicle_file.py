@@ -404,8 +404,8 @@ _Dumper.add_representer(
 )
 
 
-def _vehicle_keys(vehicle: Vehicle) -> dict[str, object]:
-    keys: dict[str, object] = {"name": vehicle.name, "model": vehicle.model}
+def _vehicle_keys(vehicle: Vehicle) -> dict[str, Any]:
+    keys: dict[str, Any] = {"name": vehicle.name, "model": vehicle.model}
     for key in ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m"):
         value = getattr(vehicle, key)
         if value is not None:
