@@ -72,6 +72,9 @@ _WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
 class ComfortQuestion(Question):
     """How a recorded ride feels and what it does to health: ISO 2631-1 values of an acceleration record.
 
+      ridelog comfort seat.csv
+      ridelog comfort seat.csv --daily-hours 4 --out ride.html
+
     FILE is CSV with the columns t_s and accel_z_mps2 (vertical, at the seat), evenly sampled at 80 Hz or more for 1 s
     or longer, perhaps accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is the standard's
     formula, magnitude and phase, applied to the whole record by Fourier transform.
@@ -494,6 +497,9 @@ class IriCommand(IriQuestion):
 class ClassifyQuestion(ProfileQuestion):
     """Class, degree of roughness and waviness of a profile of at least 100 m (ISO 8608).
 
+      ridelog road classify road.csv
+      ridelog road classify road.csv --psd spectrum.csv --out road.html
+
     In Python: raises BadInput for one that is too short or too odd, and as ``read_profile``.
 
     >>> found = classify(random_road(iso_class="C", length_m=500.0))
@@ -508,6 +514,9 @@ class ClassifyQuestion(ProfileQuestion):
 class RandomRoadQuestion(Question):
     """Make a random road with the spectrum of ISO 8608: Gd(n) = Gd(n0) (n / n0)^-w (Eq 4.1, 4.2 of Blum 2015). Same
     numbers, same road.
+
+      ridelog road generate --class B --length 1000 --out road.csv
+      ridelog road generate --iri 2.5 --seed 7 --out smooth.csv
 
     In Python: raises BadInput for what is none of this.
 

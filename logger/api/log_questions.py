@@ -181,6 +181,9 @@ class IngestQuestion(LogsQuestion):
     was cut off goes on where it was when it is started again. The dataset keeps a pseudonym of each car, the table
     beside it (``DATASET.cars.csv``) its name.
 
+      ridelog fleet ingest depot/ --to county --car-folders
+      ridelog fleet ingest /media/RIDELOG --to county --car "van 7" --trim-m 200
+
     In Python: raises BadInput for no log, a log without a car's name, a folder that is no dataset, and other roads or
     another ``trim_m`` than the dataset has; OSError for a disk that refuses.
 
@@ -229,6 +232,9 @@ class SummariseQuestion(FleetQuestion):
     """Mean IRI with its standard error, change and comfort by road; which car reads how much too high, from the roads
     that cars share.
 
+      ridelog fleet summarise county --by section --out sections.csv
+      ridelog fleet summarise county --since 2026-01-01 --min-cars 3
+
     In Python: raises BadInput for no dataset, another engine, no pass in that time, and routes without a map.
 
     >>> summary = fleet_summarise(folder / "fleet", by="section")
@@ -247,6 +253,9 @@ class SummariseQuestion(FleetQuestion):
 class ReportQuestion(FleetQuestion):
     """Write a folder that opens without a server: a page with a map and lists (index.html), tiles of the map, and the
     segments and sections of 0.1 mi as GeoParquet and CSV. It is there whole, in place of an older one, or not at all.
+
+      ridelog fleet report county --out map/
+      ridelog fleet report county --out map/ --min-cars 3 --pseudonyms
 
     In Python: raises BadInput as ``fleet_summarise``, for a folder with other files, and where too few cars leave no
     segment.

@@ -1,6 +1,7 @@
 """Record the raw bytes of a serial port, with the time of their arrival, as a dump.
 
   ridelog capture /dev/ttyUSB0 --out sensor.dump.gz
+  ridelog capture /dev/ttyACM0 --baud 9600 --seconds 60 --out receiver.dump.gz
 
 For an instrument whose frames nobody knows yet: what comes is kept byte by byte, and the first look that is printed
 at the end shows what kind of frames it may be. End it with Ctrl-C.

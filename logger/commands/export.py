@@ -1,6 +1,7 @@
 """Copy finished logs to a USB stick: checked, atomic, repeatable.
 
   sudo ridelog export --to /media/RIDELOG
+  sudo ridelog export --to /media/RIDELOG --dumps
 
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
 already is read and left alone. Where the settings pair the logger with its sticks, only a copy on one of those counts

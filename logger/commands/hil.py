@@ -1,6 +1,7 @@
 """Hardware in the loop: play a recorded drive into serial ports for a running service, then check what it logged.
 
   ridelog hil drive.dump.gz --nmea-port /dev/ttyUSB0 --accelerometer-port /dev/ttyUSB1
+  ridelog hil drive.dump.gz --log hil-log
 
 The bytes go out at the times at which they came. At the other end of the wires (two USB-serial adapters, or
 pseudo-terminals) a service that has just been started listens. Its log is compared with a replay of the same bytes

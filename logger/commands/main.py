@@ -21,40 +21,54 @@ from logger.errors import EXIT_BAD_INPUT, RidelogError, did_you_mean
 from logger.files import written_files
 from logger.printable import LONGEST_COMPLAINT, printable, word
 
-VERBS = {
-    "demo": "run a recorded drive through the service and show the result; needs no hardware",
-    "run": "the service that logs a drive (what systemd starts)",
-    "replay": "play a recorded dump through the same service",
-    "status": "what the running service is doing",
-    "verify": "check logs, dumps and exported sticks for damage and gaps",
-    "export": "copy finished logs to a USB stick",
-    "install": "set up the service on this machine; --dry-run shows every step",
-    "uninstall": "stop the service and remove what install wrote; logs, changed settings and the user stay",
-    "report": "make one web page of logs: map, plots, table",
-    "sections": "logs in sections of 100 m, 0.1 mi or any length: IRI with its error, condition, comfort",
-    "passes": "repeated drives combined: means by place and direction, what changed, places to visit",
-    "fleet": "many cars over years: logs into a dataset, figures of its roads and cars, a map",
-    "convert": "logs as GeoJSON, GeoPackage, GPX, KML, Parquet or CSV, for other programs",
-    "iri": "exact IRI of a measured profile",
-    "comfort": "ISO 2631 comfort and health values of an acceleration record",
-    "extract": "runs for the lab from recorded dumps or a phone's CSV, placed on a measured line",
-    "calibrate": "the roughness that a vehicle's acceleration means, per speed",
-    "road": "make a random road, or classify a measured one",
-    "simulate": "what a vehicle's accelerometer would record on a road",
-    "estimate": "IRI and profile of the road from a drive's acceleration, and the best that is possible",
-    "identify": "vehicle parameters from drives over known roads, each with its standard error",
-    "compare": "model against measurement: the error, where it is, and what kind of thing is missing",
-    "diagnose": "which physical effect a model lacks, how certain that is, and what else it could be",
-    "add-effect": "add a physical effect to a vehicle: its numbers, the error before and after, what it changed",
-    "learn": "learn a law from the data, where no known effect explains what a model lacks",
-    "plan": "before anybody drives: which effects drives could show and distinguish, and which drive adds most",
-    "lab": "compare, diagnose, add, compare again, until nothing is missing; writes all of it as a page",
-    "study": "a table or figure of the reference dissertation with its printed values",
-    "modes": "natural frequencies, damping ratios and mode shapes of a vibration record",
-    "fixed-point": "write the filters as C headers for integer arithmetic",
-    "capture": "record the raw bytes of a serial port",
-    "hil": "play a recorded dump into serial ports for the running service, and check its log",
+GROUPS = {
+    "Try it": {
+        "demo": "play a simulated drive through the service and show its map; needs no hardware",
+    },
+    "In the car": {
+        "install": "set up the logging service on this machine; --dry-run shows every step",
+        "run": "log drives in this terminal: the service itself, as systemd starts it",
+        "status": "say what the service is doing, and what to do if something is wrong",
+        "export": "copy finished logs to a USB stick",
+        "verify": "check logs, recordings and sticks: is anything damaged or missing?",
+        "replay": "play a recorded drive through the service again: what do other settings give?",
+        "uninstall": "remove the service; logs, changed settings and the user stay",
+        "capture": "record the raw bytes of a serial port: what does an unknown sensor send?",
+    },
+    "Roads, from logs": {
+        "report": "draw logs as one web page: where is the road rough?",
+        "sections": "give IRI and condition by section of 0.1 mi or any length, as agencies file them",
+        "passes": "combine repeated drives: how rough is each place, and what changed?",
+        "fleet": "combine many cars over years: which roads became worse, which cars read too high?",
+        "convert": "write logs as GeoJSON, GeoPackage, GPX, KML, Parquet or CSV for other programs",
+    },
+    "Profiles, rides and vibrations": {
+        "iri": "compute the exact IRI of a measured profile",
+        "road": "make a random road of ISO 8608, or classify a measured one",
+        "comfort": "rate the ride of an acceleration record by ISO 2631-1",
+        "estimate": "estimate IRI and profile of the road from one drive's acceleration",
+        "calibrate": "compute how strongly a vehicle shakes on roads of known IRI, per speed",
+        "modes": "find natural frequencies, damping ratios and mode shapes",
+    },
+    "Your vehicle's model": {
+        "extract": "make runs for the lab from recordings of the box or a phone",
+        "simulate": "compute what a vehicle's accelerometer records on a road",
+        "identify": "fit masses, springs and dampers to runs: how large are they, how certain?",
+        "compare": "measure how far a model is off, where, and what kind of physics it lacks",
+        "diagnose": "find which physical effect a model lacks: how certain, and what else could it be?",
+        "add-effect": "fit a physical effect, add it to a vehicle and show how much the error falls",
+        "learn": "fit a force characteristic from runs that no known effect explains",
+        "plan": "predict before you drive: which effects would drives show and distinguish?",
+        "lab": "compare, diagnose and add effects until nothing is missing; write a page of it",
+    },
+    "Proof and hardware": {
+        "study": "recompute a printed table or figure: does it agree with the print?",
+        "hil": "play a recorded drive into serial ports and check the log of the running service",
+        "fixed-point": "write the filters as C headers for integer arithmetic",
+    },
 }
+"""Verbs by what a person is about to do; each line begins with a verb and says which question it answers."""
+VERBS = {verb: meaning for group in GROUPS.values() for verb, meaning in group.items()}
 ASKED = {
     "identify": "identify.question:VERB",
     "compare": "lab.question:COMPARE",
@@ -217,11 +231,12 @@ class _Screen:
 
 def _without_verb(arguments: list[str]) -> int:
     width = max(map(len, VERBS)) + 2
-    verbs = "\n".join(f"  {verb:{width}}{meaning}" for verb, meaning in VERBS.items())
+    verbs = "\n\n".join("\n".join([f"{title}:", *(f"  {verb:{width}}{meaning}" for verb, meaning in group.items())])
+                        for title, group in GROUPS.items())
     parser = _Parser(
         prog="ridelog", usage="ridelog COMMAND [OPTIONS]", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="How rough is the road, and how does it feel to the people inside?", add_help=True,
-        epilog=f"commands:\n{verbs}\n\n'ridelog COMMAND --help' explains one of them.", allow_abbrev=False)
+        epilog=f"{verbs}\n\n'ridelog COMMAND --help' explains one command, with examples.", allow_abbrev=False)
     parser.add_argument("--version", action="store_true", help="print the version and leave")
     parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
     options, rest = parser.parse_known_args(arguments)  # of a command that nobody knows the rest is its own

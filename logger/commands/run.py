@@ -1,6 +1,7 @@
-"""The service: reads the sensors, cuts the drive into windows, writes the logs.
+"""Read the sensors, cut the drive into windows and write the logs: the service itself.
 
   ridelog run --config ridelog.yaml
+  ridelog run --config ridelog.yaml --verbose
 
 Exit status 0: stopped as asked; 1: the system failed it; 2: wrong settings (nothing will run until they are mended).
 systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.

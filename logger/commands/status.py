@@ -1,4 +1,4 @@
-"""What the running service is doing, and what to do next. Exit status 1 when it is not running, or hangs.
+"""Say what the running service is doing, and what to do next. Exit status 1 when it is not running, or hangs.
 
   ridelog status
   ridelog status --json

@@ -1,11 +1,14 @@
 """The command line: verbs, help, and faults that end in one line and a status."""
 
+import argparse
 import json
 import pkgutil
+import re
+import shlex
 import subprocess
 import sys
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -32,6 +35,27 @@ def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str
         main.main([verb, "--help"])
     assert leaving.value.code == 0
     assert f"usage: ridelog {verb}" in capsys.readouterr().out
+
+
+def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """A verb's parser, or those of the verbs below it."""
+    below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    for action in below:
+        for name in action.choices:
+            yield from parsers(action.choices[name])
+    if not below:
+        yield parser
+
+
+@pytest.mark.parametrize("verb", main.VERBS)
+def test_the_help_of_each_verb_has_two_examples_that_it_takes(verb: str) -> None:
+    whole, _ = main.command(verb)
+    for parser in parsers(whole):
+        examples = re.findall(r"^ +(?:sudo )?ridelog (.+)$", parser.description or "", re.MULTILINE)
+        assert len(examples) >= 2, parser.prog
+        for example in examples:
+            words = shlex.split(example)
+            main.command(words[0])[0].parse_args(words[1:])
 
 
 def test_help_lists_the_verbs_and_loads_nothing_heavy() -> None:
