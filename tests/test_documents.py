@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from logger.exchange.format import formats
+from logger.store.log.row_format import COLUMN_MEANINGS, COLUMNS
+
+from .support import reference
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -34,9 +37,19 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
 def test_every_document_is_linked_from_another() -> None:
     linked = {(page.parent / link.partition("#")[0]).resolve()
               for page in PAGES for link in LINK.findall(page.read_text("utf-8"))}
-    assert not set(PAGES[1:]) - linked
+    assert not {page.resolve() for page in PAGES[1:]} - linked
 
 
 def test_each_format_of_convert_has_a_row_in_the_page_about_logs() -> None:
     page = (ROOT / "docs" / "reading-a-log.md").read_text("utf-8")
     assert set(re.findall(r"^\| `\.(\w+)` \|", page, re.MULTILINE)) == set(formats())
+
+
+@pytest.mark.parametrize("name", reference.PAGES)
+def test_a_page_of_the_reference_is_what_the_program_declares(name: str) -> None:
+    written = (reference.FOLDER / f"{name}.md").read_text("utf-8")
+    assert written == reference.PAGES[name](), "run python -m tests.support.reference"
+
+
+def test_each_column_of_a_log_is_explained() -> None:
+    assert list(COLUMN_MEANINGS) == [*(one.name for one in COLUMNS), "crc32"]

@@ -1,7 +1,7 @@
 """Play a recorded dump through the same service code that runs in the car.
 
   ridelog replay drive.dump.gz --out again
-  ridelog replay drive.dump.gz --vehicle mycar.yaml --json
+  ridelog replay drive.dump.gz --out other-car --vehicle mycar.yaml
 
 The rows that come out depend on the recording and the settings alone, whatever the rate.
 """

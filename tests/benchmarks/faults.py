@@ -4,8 +4,8 @@
     python -m tests.benchmarks.faults --fuzzed FILE [--out FILE]
 
 Runs the trials of each fault (``tests/support``; the tests run a few of each), prints goals, and writes the table
-``docs/faults.md``; exit 1 when a promise was broken. ``--quick`` takes a few cases of each fault, leaves the long day
-out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py`` and ``soak.py``.
+``docs/reference/trials.md``; exit 1 when a promise was broken. ``--quick`` takes a few cases of each fault, leaves the
+long day out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py`` and ``soak.py``.
 With ``--fuzzed`` nothing is tried: the table that is there gets the counts of a long run of ``fuzz.py --record FILE``.
 """
 
@@ -34,7 +34,7 @@ from ..support.fuzz.targets import TARGETS
 from .figures import Figures, read_figures
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLE = ROOT / "docs" / "faults.md"
+TABLE = ROOT / "docs" / "reference" / "trials.md"
 MEMORY = Path("/dev/shm")
 """The models of disks and sticks need no disk, and are quicker without."""
 
@@ -50,50 +50,17 @@ ENOUGH_CRASHES = 1000
 _HOSTILE = re.compile(r"## Hostile input\n.*?(?=\n## |\Z)", re.DOTALL)
 
 HEAD = """\
-# Faults
+# Faults: what was tried
 
-A logger lives under a seat. The ignition cuts its power in the middle of a write, cables shake loose, the card fills,
-a stick is pulled too early, and nobody looks at it for months. This page says what is promised then, and what happened
-when it was tried. It is made by `python -m tests.benchmarks.faults`; the counts are those of the run that made it.
+Made by `python -m tests.benchmarks.faults`; the counts are those of the run that made it.
+[What goes wrong in a car](../faults.md) says what ridelog promises.
 
-## What is promised
-
-- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written four to
-  nine seconds after its window was driven, because the road behind still tells of it: so a power cut costs the last
-  five to ten seconds. When the fix has been lost, or was late at the start, rows wait up to `bridge_s` + 3 s more for
-  the motion in them: a power cut in or just after such a loss can cost the last `bridge_s` + 13 s (23 s as shipped).
-  Beyond that it costs the window that is being filled: 7.62 m of road, and the time that the car has stood in it.
-- **Kill.** A process that is killed loses no row that was written to the log.
-- **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32, each sidecar a checksum. After the
-  next start every file that can be read is finished, beside its sidecar, and `ridelog verify` has nothing against it:
-  the sidecar names the segments that damage has taken. What cannot be read or removed stops nothing: it is put aside
-  (`.aside`) or passed over, and `ridelog status` names it. No session number is given twice.
-- **Disk.** Full, failing or read-only: the service stays up and says so; what was written stays; rows wait in memory
-  and are written as soon as the disk takes them. Raw dumps make room for logs; an unexported log is never removed.
-  A card that does not even refuse (an fsync that never returns) stops the main loop: systemd's watchdog ends the
-  service after 30 s and starts it again, rows that were not yet synced are lost. A process that is stuck in the kernel
-  ends only when the kernel lets it go; then nothing but the next turn of the ignition key helps.
-- **Sensors.** What one does wrong, or its port, bus or driver raises, costs its own readings only. It is tried again
-  until it is back, rows are flagged, and no figure is made up. What a frozen sensor says looks like a smooth road until
-  it has lasted for half a minute: rows that were written before that keep their figures.
-- **Sticks.** Only what was read back from the stick counts as exported. Pulled at any instant nothing is lost, and the
-  next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there, and nothing on it
-  takes memory without bound. Where the logger is paired with its sticks, no other gets a file.
-- **Input.** Every file and every byte from a wire is read as it stands or refused in one line that names it: no crash,
-  no hang, no memory without bound.
-
-The card has to keep its side: what fsync returned for stays, and a rename happens or does not. ext4 does. A card that
-lies about fsync can lose what it lied about; no software can help that, but a damaged row is still seen.
-
-Power is cut in a model of the disk (what each write, fsync and rename leaves behind when all ends there), not at a
-plug: a cut at every single change of the disk can only be tried so. Sensors are bytes on simulated buses and ports, in
-simulated time. Kills, and a service that may write no more, are those of the real process. Sticks are folders behind a
-model of the system's calls, which forgets what FAT would: a FAT file system is mounted by root alone. Limits of time
-are of the processor's, so that a busy machine breaks none.
-
-The unit does not ask systemd for `CPUSchedulingPolicy=rr`: with a kernel that schedules real-time tasks in groups
-(`CONFIG_RT_GROUP_SCHED`) it would fail, and the service never start. It permits the priority (`LimitRTPRIO=10`) and the
-service asks for it by itself; where it is refused it goes on with `Nice=-15`.
+- Power is cut in a model of the disk: what each write, fsync and rename leaves behind when all ends there.
+  Only so can a cut be tried at every single change.
+- Sensors are bytes on simulated buses and ports, in simulated time.
+- Kills, and a service that may write no more, are those of the real process.
+- Sticks are folders behind a model of the system's calls, which forgets what FAT would.
+- Limits of time are of the processor's, so that a busy machine breaks none.
 """
 
 
@@ -110,7 +77,8 @@ def main() -> int:
     """Try everything; write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a minute or two")
-    parser.add_argument("--out", type=Path, help="where the table goes (default: docs/faults.md; none with --quick)")
+    parser.add_argument("--out", type=Path,
+                        help="where the table goes (default: docs/reference/trials.md; none with --quick)")
     parser.add_argument("--fuzzed", type=Path, help="only put the counts of this record into the table")
     parser.add_argument("--inputs", type=int, help="damaged inputs per reader (default: 20000, with --quick 300)")
     parser.add_argument("--huge-gb", type=float, help="size of huge inputs (default: 10, with --quick 0.02)")

@@ -51,7 +51,8 @@ def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser
 def test_the_help_of_each_verb_has_two_examples_that_it_takes(verb: str) -> None:
     whole, _ = main.command(verb)
     for parser in parsers(whole):
-        examples = re.findall(r"^ +(?:sudo )?ridelog (.+)$", parser.description or "", re.MULTILINE)
+        examples = re.findall(r"^ +(?:sudo )?ridelog (.+)$", (parser.description or "").replace("\\\n", " "),
+                              re.MULTILINE)
         assert len(examples) >= 2, parser.prog
         for example in examples:
             words = shlex.split(example)

@@ -1,4 +1,4 @@
-"""docs/faults.md: what it says is what the bench says, and no promise on it is broken."""
+"""docs/reference/trials.md: what it says is what the bench says, and no promise on it is broken."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from ..benchmarks import faults
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "faults.md"
+PAGE = ROOT / "docs" / "reference" / "trials.md"
 
 
 def test_no_promise_is_broken_and_no_goal_missed() -> None:

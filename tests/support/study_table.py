@@ -1,29 +1,28 @@
-"""The table of docs/studies.md, out of what the studies themselves declare: ``python -m tests.support.study_table``."""
+"""The table of printed items, out of what the studies themselves declare."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from logger.studies.study import SHELVES, studies
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "studies.md"
 _KINDS = ("Table", "Fig", "Eq")
 _LAST = 99
 TITLES = {"dissertation": "The dissertation, item by item", "field": "Other papers",
           "roads": "Public records of roads"}
 
 
-def tables() -> str:
-    """A table for each shelf: a row for each printed item with its word, linked to the file of its study."""
-    parts = []
+def page() -> str:
+    """A table for each shelf: a row for each printed item with its word and its study."""
+    parts = ["# Printed items and what came of them", "",
+             "Made by `python -m tests.support.reference` from the studies themselves. [Studies](../studies.md) says "
+             "what the four words mean."]
     for shelf in SHELVES:
         rows = sorted(((_place(item.name, place), item, study) for place, study in enumerate(studies(shelf).values())
                        for item in study.items), key=lambda row: row[0])
         if rows:
             parts += ["", f"## {TITLES[shelf]}", "",
                       "| printed | study | word | because |", "| --- | --- | --- | --- |",
-                      *(f"| {item.name} | [`{study.called}`](../{study.run.__module__.replace('.', '/')}.py) | "
-                        f"{item.word} | {item.because} |" for _, item, study in rows)]
+                      *(f"| {item.name} | `{study.called}` | {item.word} | {item.because} |"
+                        for _, item, study in rows)]
     return "\n".join(parts) + "\n"
 
 
@@ -36,12 +35,3 @@ def _place(item: str, study: int) -> tuple[int, int, list[int]]:
     if len(numbers) < 2:
         return _LAST, 0, [study]
     return numbers[0], _KINDS.index(kind) if kind in _KINDS else len(_KINDS), [*numbers, study]
-
-
-def written() -> str:
-    """The whole document as it has to be: its own words down to the first table, then the tables."""
-    return DOCUMENT.read_text("utf-8").partition("\n## ")[0].rstrip("\n") + "\n" + tables()
-
-
-if __name__ == "__main__":
-    DOCUMENT.write_text(written(), "utf-8")

@@ -304,24 +304,6 @@ def test_a_half_car_that_rolls_is_two_halves_with_equal_tracks() -> None:
     assert recorded(full, passage) == pytest.approx(recorded(half, passage), abs=1e-9)
 
 
-# --- the table for people ---
-
-
-def table() -> str:
-    rows = [f"| `{effect.name}` | {effect.title} | "
-            f"{', '.join(f'`{one.name}`' for one in effect.parameters) or 'none'} |" for effect in EFFECTS.values()]
-    return "\n".join(["| effect | what it is | parameters |", "| --- | --- | --- |", *rows])
-
-
-def test_the_table_in_the_documents_is_that_of_the_catalogue() -> None:
-    page = (Path(__file__).parents[2] / "docs/effects.md").read_text("utf-8")
-    rows, written = table().splitlines(), page.splitlines()
-    missing = "\n".join(row for row in rows if row not in written)
-    if missing:  # plain, to be pasted
-        pytest.fail(f"docs/effects.md lacks these rows of its table, in alphabetical order:\n{missing}", pytrace=False)
-    assert f"{table()}\n\n" in page, f"docs/effects.md: expected the table to be, with nothing else in it,\n{table()}"
-
-
 def test_what_a_full_car_carries_is_carried_by_the_whole_car() -> None:
     full = CARS["full"]
     made = compose(full, [usual(EFFECTS["payload"], mass_kg=100.0), usual(EFFECTS["occupant"], mass_kg=70.0)]).structure

@@ -188,6 +188,44 @@ COLUMNS = (
     _number("iri_common_std_m_per_km", 3),
     _number("iri_place_std_m_per_km", 3),
 )
+COLUMN_MEANINGS = {
+    "segment": "number of the window since the service started",
+    "t_utc": "start of the window, UTC from the GPS",
+    "t_s": "start of the window, seconds of the monotonic clock",
+    "distance_start_m": "travelled distance with known speed, at the window's start",
+    "distance_end_m": "the same at its end",
+    "lat_deg": "latitude of its middle",
+    "lon_deg": "longitude of its middle",
+    "speed_mps": "mean speed",
+    "iri_m_per_km": "best estimate of the IRI",
+    "iri_std_m_per_km": "its standard error",
+    "iri_rms_m_per_km": "IRI by the relation of r.m.s. acceleration and speed (Blum 2015, 6.3)",
+    "a_w_mps2": "ISO 2631-1, weighting Wk: r.m.s. of the weighted acceleration of the ride, without the sensor's noise",
+    "mtvv_mps2": "the same: maximum transient vibration value, the largest running r.m.s. over 1 s",
+    "vdv_mps175": "the same: vibration dose value",
+    "crest_factor": "largest weighted reading over a_w_raw_mps2",
+    "comfort": "words of ISO 2631-1; where its ranges overlap, the more severe one",
+    "iri_class": "ISO 8608 class with the same IRI: A below 3.05, B below 6.09, C below 12.19, D below 24.37 m/km",
+    "flags": "words joined by a bar: why something is empty or doubtful",
+    "drive": "number of the drive since the service started",
+    "duration_s": "time from the window's start to its end",
+    "accel_rms_mps2": "r.m.s. of the vertical acceleration, without its mean",
+    "samples": "how many samples the window holds",
+    "clipped_samples": "how many of them were at the end of the sensor's range",
+    "a_w_std_mps2": "standard error of a_w_mps2",
+    "mtvv_std_mps2": "standard error of mtvv_mps2",
+    "vdv_std_mps175": "standard error of vdv_mps175",
+    "a_w_raw_mps2": "as a_w_mps2, of the readings as they are: with noise and rounding",
+    "mtvv_raw_mps2": "as mtvv_mps2, of the readings as they are",
+    "vdv_raw_mps175": "as vdv_mps175, of the readings as they are",
+    "iri_level_std_m_per_km": "part of iri_std_m_per_km from the road's level, shared by neighbours: it fades along "
+                              "the road as exp(-d / 30 m)",
+    "iri_common_std_m_per_km": "part of it from the vehicle's and the sensor's parameters, shared by all windows and "
+                               "drives of a car",
+    "iri_place_std_m_per_km": "part of it from the position: what a window gains at its end, its neighbour loses",
+    "crc32": "check value of the row",
+}
+"""What people read of each; the last one ends each line, and is no field of a record."""
 _COUNTS = (len(COLUMNS), 29, 23)
 """Columns of logs: as they are now, before errors told what windows share of them, and before the ride was separated
 from the noise."""
