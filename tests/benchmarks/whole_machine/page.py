@@ -13,8 +13,8 @@ HEAD = """# ridelog on a whole machine
 
 Written by `python -m tests.benchmarks.whole_machine --out docs/reference/whole-machine.md` on {day}. It
 builds a disk with Debian 12 (systemd 252) from packages, installs ridelog by the README, boots it, and tries what is
-promised. Nothing here runs against a model of ours but for the instruments: the kernel, systemd, udev, file systems and tools are the
-real ones.
+promised. Nothing here runs against a model of ours but for the instruments: the kernel, systemd, udev, file
+systems and tools are the real ones.
 
 - **UML**: user-mode Linux 6.1. The chip is the kernel's `i2c-stub` on `/dev/i2c-0`, its registers filled 100 times a
   second from a recorded drive; the receiver is a terminal of the host that is the guest's `/dev/ttyS0`; sticks are
