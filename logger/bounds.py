@@ -53,6 +53,7 @@ ACCELERATION = Quantity("m/s2", 1e6, 1e-9)
 """A larger one is something else, and its fourth power may not be a number. A smaller one is about as much as the
 quietest ground moves (J. Peterson, USGS 93-322, 1993: 6e-10 m/s2 per root hertz and more)."""
 SPEED = Quantity("m/s", 150.0, 1e-9)
+FORCE = Quantity("N", 1e9, 1e-12)
 DISTANCE = Quantity("m", 1e9, 1e-9)
 ELEVATION = Quantity("m", 1e4, 1e-12)
 DELAY = Quantity("s", 1000.0, 1e-6)

@@ -38,10 +38,12 @@ class Signal:
     """A measured signal other than the acceleration of the sensor.
 
     name              of its column, which ends in its unit
-    measures          ``acceleration`` [m/s2], ``travel`` (extension of a suspension) [m], ``pitch_rate`` (nose up) or
-                      ``roll_rate`` (left side up) [rad/s]
+    measures          ``acceleration`` [m/s2], ``velocity`` [m/s] or ``displacement`` (height over the ground) [m] of
+                      body or wheel, ``travel`` (extension of a suspension, or height over a base) [m], ``pitch_rate``
+                      (nose up) or ``roll_rate`` (left side up) [rad/s]
     of                the part that is measured: ``body``, ``front_wheel``, ``rear_suspension`` ...
     ahead_m, left_m   where on the body, from the centre of gravity [m]
+    kind              of the sensor, as far as it matters what can be wrong with it: ``encoder``; None: it is not known
     """
 
     name: str
@@ -49,6 +51,18 @@ class Signal:
     of: str = "body"
     ahead_m: float = 0.0
     left_m: float = 0.0
+    kind: str | None = None
+
+    @property
+    def has_zero(self) -> bool:
+        """Whether what it reads at rest is known: of places it is not."""
+        return self.measures not in ("displacement", "travel")
+
+
+SENSOR = "accel_z_mps2"
+"""The column of the sensor's acceleration."""
+ACCELERATION = Signal(SENSOR, "acceleration")
+"""What a run measures first, unless it says something else."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +81,7 @@ class RecordFacts:
     vehicle                  that vehicle
     source                   the name of the file that it was made of
     signals                  what more was measured
+    main                     what the run measures first, in its own unit where it is no acceleration
     """
 
     step_mps2: float | None = None
@@ -83,6 +98,7 @@ class RecordFacts:
     vehicle: str | None = None
     source: str | None = None
     signals: tuple[Signal, ...] = ()
+    main: Signal = ACCELERATION
 
     @property
     def seen_to_hz(self) -> float | None:
@@ -125,7 +141,8 @@ class Run:
 
     name             as the user knows it
     rate_hz          samples a second
-    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]; of a run whose facts
+                     say that it measures something else first that, places without their mean
     distance_m       where the front tires stood on the track, as it was recorded [m]; on a rig 0
     speed_mps        [m/s]; on a rig 0
     track            the road, or what drives the rig

@@ -156,7 +156,7 @@ def write_run(folder: Path | str, run: Run) -> None:
     >>> write_run(folder / "again", read_run(folder))
     """
     place = Path(folder)
-    columns = {"t_s": run.time_s, "accel_z_mps2": run.accel_z_mps2, "speed_mps": run.speed_mps,
+    columns = {"t_s": run.time_s, run.facts.main.name: run.accel_z_mps2, "speed_mps": run.speed_mps,
                "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable,
                **run.more}
     away = (drive_file.SPEED, drive_file.DISTANCE) if run.excitation is not None else ()
@@ -164,8 +164,9 @@ def write_run(folder: Path | str, run: Run) -> None:
         make_folder(place)
         drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items()
                                                           if one is not None and name not in away})
-        if run.facts != UNKNOWN:
-            write_run_facts(place, run.facts)
+        forces = () if run.excitation is None else run.excitation.forces
+        if run.facts != UNKNOWN or forces:
+            write_run_facts(place, run.facts, forces)
         if run.excitation is not None:
             on_its_clock = run.excitation.begun(-float(run.time_s[0]))
             drive_file.write_excitation(place / drive_file.EXCITATION, on_its_clock)

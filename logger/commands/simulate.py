@@ -214,9 +214,10 @@ def _road(question: SimulateCommand) -> Track:
 
 
 def _rig(path: Path) -> Excitation:
+    from logger.store.formats.drive_file import read_forces
     from logger.store.formats.profile_file import read_excitation
 
-    return read_excitation(path)
+    return read_excitation(path, read_forces(path.parent))
 
 
 def _motion(question: SimulateCommand, track: Track | Excitation, wheelbase_m: float) -> FrontAxleMotion:

@@ -1,8 +1,9 @@
-"""What stands under the wheels of a rig, given over time: a shaker, a bench car.
+"""What drives a rig, given over time: the table under its wheels (a shaker, a bench car), and forces on its parts.
 
 Problem: a rig has no road. Its recorder samples how high the table stood, at a rate of its own, and between two samples
 the table moved smoothly: a straight line would take off a part of each quick motion (0.5 % at a twenty-fifth of the
-rate). Solution: cubic splines through the samples, whose means over steps of time are exact.
+rate). Solution: cubic splines through the samples, whose means over steps of time are exact. So are derivatives: what
+stands on a table feels its acceleration.
 """
 
 from __future__ import annotations
@@ -24,20 +25,37 @@ Array = npt.NDArray[np.float64]
 _CUBIC = 3
 
 
+@dataclass(frozen=True)
+class AppliedForce:
+    """A measured force on a rig.
+
+    name     of its column
+    parts    the part that it pushes up, from the ground, or the two that it pushes apart
+    """
+
+    name: str
+    parts: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """Elevations under the wheels, evenly sampled in time; before and after them they stay where they are.
+    """Elevations under the wheels and forces, evenly sampled in time; before and after them they stay where they are,
+    but before the first sample of a force there is none.
 
     rate_hz        samples a second
     elevation_m    (n,) under all wheels, or (n, 2) under the front and under the rear ones [m]
     start_s        when the first of them was, counted from the first sample of the record [s]
+    force_n        (n, f) [N]; None: there are none
+    forces         what each of them acts on
 
-    ValueError for a rate that is not above 0, elevations that are not finite or of another shape, or fewer than four.
+    ValueError for a rate that is not above 0, samples that are not finite or of another shape, or fewer than four.
     """
 
     rate_hz: float
     elevation_m: Array
     start_s: float = 0.0
+    force_n: Array | None = None
+    forces: tuple[AppliedForce, ...] = ()
 
     timed = True
     two_tracks = False
@@ -50,6 +68,9 @@ class Excitation:
                              f"{self.rate_hz} and {shape}")
         if not np.isfinite(self.elevation_m).all():
             raise ValueError("excitation: expected finite elevations")
+        if self.forces and (self.force_n is None or self.force_n.shape != (shape[0], len(self.forces))
+                            or not np.isfinite(self.force_n).all()):
+            raise ValueError(f"excitation: expected finite samples of each of {len(self.forces)} forces")
 
     @property
     def end_s(self) -> float:
@@ -57,13 +78,24 @@ class Excitation:
         return self.start_s + (len(self.elevation_m) - 1) / self.rate_hz
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
-        """As ``WheelTracks``: whatever stands behind the front wheels is a rear wheel."""
+        """As ``WheelTracks``, then the forces: whatever stands behind the front wheels is a rear wheel. What stands on
+        a base feels the base's height, velocity and acceleration."""
         end_s, inside = self.end_s, np.clip(way.time_s, self.start_s, self.end_s)
         curves = self._curves(inside)
         integral = self._integrals(inside) + curves * (way.time_s - np.clip(way.time_s, self.start_s, end_s))[:, None]
         means = np.diff(integral, axis=0) / np.diff(way.time_s)[:, None]
         column = np.where(np.asarray(stance.behind_m) > 0, curves.shape[1] - 1, 0)
-        return curves[:, column], means[:, column]
+        values, means = [curves[:, column]], [means[:, column]]
+        if stance.on_base:
+            velocity, acceleration = (self._derivative(order, way.time_s) for order in (1, 2))
+            values += [velocity, acceleration]
+            means += [np.diff(one, axis=0) / np.diff(way.time_s)[:, None] for one in (values[0], velocity)]
+        if self.forces:
+            pushes = self._pushes(inside)
+            late_s = np.maximum(way.time_s - end_s, 0.0)[:, None]
+            values.append(np.where((way.time_s >= self.start_s)[:, None], pushes, 0.0))
+            means.append(np.diff(self._impulses(inside) + late_s * pushes, axis=0) / np.diff(way.time_s)[:, None])
+        return np.hstack(values), np.hstack(means)
 
     def begun(self, later_s: float) -> Excitation:
         """The same for a record that begins so much later [s]."""
@@ -73,12 +105,34 @@ class Excitation:
         """Elevations (M,) under an axle so far behind the front one [m]."""
         return np.asarray(self._curves(np.clip(way.time_s, self.start_s, self.end_s))[:, -1 if behind_m > 0 else 0])
 
+    @property
+    def acts_on(self) -> tuple[tuple[str, ...], ...]:
+        """The parts that the forces act on."""
+        return tuple(one.parts for one in self.forces)
+
+    def _derivative(self, order: int, time_s: Array) -> Array:
+        """Of the elevation under the front wheels (M, 1), by time; 0 where it stays where it is."""
+        inside = np.clip(time_s, self.start_s, self.end_s)
+        return np.where(inside == time_s, self._curves.derivative(order)(inside)[:, 0], 0.0)[:, None]
+
     @cached_property
     def _curves(self) -> BSpline:
+        return self._spline(self.elevation_m.reshape(len(self.elevation_m), -1))
+
+    @cached_property
+    def _pushes(self) -> BSpline:
+        assert self.force_n is not None
+        return self._spline(self.force_n)
+
+    @cached_property
+    def _impulses(self) -> BSpline:
+        return self._pushes.antiderivative()
+
+    def _spline(self, samples: Array) -> BSpline:
         from scipy.interpolate import make_interp_spline
 
-        time_s = self.start_s + np.arange(len(self.elevation_m)) / self.rate_hz
-        return make_interp_spline(time_s, self.elevation_m.reshape(len(time_s), -1), _CUBIC)
+        time_s = self.start_s + np.arange(len(samples)) / self.rate_hz
+        return make_interp_spline(time_s, samples, _CUBIC)
 
     @cached_property
     def _integrals(self) -> BSpline:

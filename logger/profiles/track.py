@@ -42,7 +42,8 @@ class WheelPath(Protocol):
 
 
 class Stance(Protocol):
-    """Where the wheels (w,) of a car stand: behind the front ones, left of the middle; and their patch [m]."""
+    """Where the wheels (w,) of a car stand: behind the front ones, left of the middle; and their patch [m]. Or whether
+    it is no car but a mass on a base."""
 
     @property
     def behind_m(self) -> Array: ...
@@ -52,6 +53,9 @@ class Stance(Protocol):
 
     @property
     def contact_patch_m(self) -> float: ...
+
+    @property
+    def on_base(self) -> bool: ...
 
 
 class Resurfaced(Protocol):
@@ -90,6 +94,15 @@ class Profiled(WheelTracks, Protocol):
 
     def resurfaced(self, surface: Surface) -> WheelTracks:
         """The road itself, where it differs from its profile."""
+
+
+@runtime_checkable
+class Pushing(WheelTracks, Protocol):
+    """What pushes parts of a car besides."""
+
+    @property
+    def acts_on(self) -> tuple[tuple[str, ...], ...]:
+        """The parts that each of its forces acts on."""
 
 
 def under_surface(track: WheelTracks, surface: Surface) -> WheelTracks:

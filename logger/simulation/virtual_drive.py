@@ -14,34 +14,32 @@ import numpy.typing as npt
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.runs import Run, Signal
-from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, in_blocks, moved, recorded, respond, stepper_of
+from logger.runs import ACCELERATION, SENSOR, Run, Signal
+from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
-from logger.vehicle.stepping import force_input
-from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, wheel
+from logger.vehicle.structure import Output, Structure, body_point, corner_of, suspension_travel, wheel
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
 _MOST_TRIES = 200
 _NEARLY_M = 1e-9
-# Columns of ``Structure.body``; corners by their names, of cars with so many wheels.
 _RATES = {"pitch_rate": 1, "roll_rate": 2}
-_CORNERS = {1: {"front": 0}, 2: {"front": 0, "rear": 1},
-            4: {"front": 0, "front_left": 0, "front_right": 1, "rear": 2, "rear_left": 2, "rear_right": 3}}
+"""Columns of ``Structure.body``."""
+_ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 
 
 def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
     """Outputs (N, p) of a car on a passage, behind the recorder's filter and nothing else: the sensor's effects are not
     in them. Heights count from where the front left wheel begins."""
-    return np.stack([passage.recorded(column, np.ones_like) for column in _fine(car, passage, outputs)], axis=1)
+    return np.stack([passage.recorded(column, np.ones_like) for column in fine_outputs(car, passage, outputs)], axis=1)
 
 
-def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
-    """What the recorder keeps of the sensor's acceleration and of other signals, these without their means, one after
-    the other ((1 + s) N,).
+def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal = ACCELERATION) -> Array:
+    """What the recorder keeps of the sensor's acceleration, or what else is its main signal, and of other signals,
+    these and places without their means, one after the other ((1 + s) N,).
 
     Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a
     fit asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and
@@ -50,48 +48,35 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...]) ->
 
     ValueError for a signal that this car does not have.
     """
-    if not signals:
+    if not signals and main == ACCELERATION:
         return recorded(car, passage)
-    sensor = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
-    outputs = [sensor, *(output_of(car, one) for one in signals)]
-    found = passage.recorded_of((car.body, signals), lambda: _fine(car, passage, outputs), car.factor)
+    first = car.output if main == ACCELERATION else output_of(car, main)
+    outputs = [first, *(output_of(car, one) for one in signals)]
+    found = passage.recorded_of((car.body, main, signals), lambda: fine_outputs(car, passage, outputs), car.factor)
     found[0] = car.written(passage, found[0])
-    found[1:] -= found[1:].mean(axis=1, keepdims=True)
+    begins = 1 if main.has_zero else 0
+    found[begins:] -= found[begins:].mean(axis=1, keepdims=True)
     return found.ravel()
 
 
 def output_of(car: Car, signal: Signal) -> Output:
     """The motion that a signal measures. ValueError for one that this car does not have."""
-    structure = car.structure
-    side, _, part = signal.of.rpartition("_")
+    structure, part = car.structure, signal.of.rpartition("_")[2]
     try:
         if part in ("wheel", "suspension"):
             of = suspension_travel if part == "suspension" else wheel
-            return of(structure, _CORNERS[len(structure.wheels)][side])
+            return of(structure, corner_of(structure, signal.of), _ORDERS[signal.measures])
         if signal.measures in _RATES:
             column = structure.body[:, _RATES[signal.measures]]
             if not column.any():
                 raise ValueError(f"this body has no {signal.measures.replace('_', ' ')}")
             return Output(column, np.zeros(len(structure.wheels)), 1)
-        return body_point(structure, signal.ahead_m - car.shift_m, signal.left_m)
+        ahead_m = signal.ahead_m - car.shift_m if signal.ahead_m or car.shift_m else 0.0
+        return body_point(structure, ahead_m, signal.left_m, _ORDERS[signal.measures])
     except KeyError:
         raise ValueError(f"signal {signal.name}: this vehicle has no {signal.of.replace('_', ' ')}") from None
     except ValueError as error:
         raise ValueError(f"signal {signal.name}: {error}") from None
-
-
-def _fine(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
-    """Outputs at the fine instants (p, M)."""
-    structure = car.structure
-    n = len(structure.mass)
-    elevation, _ = passage.under_wheels(structure)
-    observe, direct = structure.output_matrices(outputs)
-    if not car.bends_laws:
-        return (in_blocks(structure, passage, observe) + elevation @ direct.T).T
-    motion = moved(car, passage)
-    onto = force_input(structure)[n:]
-    pushed = np.array([one.row @ onto if one.order == 2 else np.zeros(onto.shape[1]) for one in outputs])
-    return np.asarray((motion.states @ observe.T + elevation @ direct.T + motion.forces @ pushed.T).T)
 
 
 def recorded_distance(car: Car, distance_m: Array) -> Array:
@@ -120,7 +105,8 @@ def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
     """Steps a second in which a vehicle is simulated: as usual for one whose wheels hop as those of cars do, twice as
     many for one an octave quicker, and so on up to four octaves."""
     quickest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[-1])
-    return usual_hz * float(np.clip(2 ** np.round(np.log2(quickest_hz / _HOP_HZ)), 1, _MOST_FINER))
+    octaves = float(np.round(np.log2(max(quickest_hz, _HOP_HZ) / _HOP_HZ)))
+    return usual_hz * min(2**octaves, _MOST_FINER)
 
 
 class SimulatedRuns:
@@ -150,10 +136,11 @@ class SimulatedRuns:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._passages_of(car, distance_error_m, rough, tracks)
-            for step_s in {one.step_s for one in passages if car.bends_laws}:
-                stepper_of(car, step_s)  # made once, before both threads ask for it
+            for step_s, forces in {(one.step_s, one.forces) for one in passages if car.bends_laws}:
+                stepper_of(car, step_s, forces)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
-            partial(_recorded, car), passages, [run.signals for run in self.runs])
+            partial(_recorded, car), passages, [run.signals for run in self.runs],
+            [run.facts.main for run in self.runs])
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
     def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
@@ -179,14 +166,12 @@ class SimulatedRuns:
         return found
 
 
-def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
+def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
-        found = recorded_signals(car, passage, signals)
+        found = recorded_signals(car, passage, signals, main)
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
 
 
-SENSOR = "accel_z_mps2"
-"""The column of the sensor's acceleration."""
 AFTER_S = 1.0
 """How long a drive at one speed goes on after the last wheel has left the profile."""
 OBSTACLE_SPACING_M = 0.01
@@ -350,7 +335,7 @@ def response_with_effects(
 
     ValueError for effects under which no such car, or no such motion, is possible.
     """
-    passage = Passage(track, rate_hz, motion.distance_m)
+    passage = Passage(track, rate_hz, motion.distance_m, steps_hz(car.vehicle) if track.timed else FINE_RATE_HZ)
     columns = {SENSOR: _accelerations(car, passage)}
     if more := {name: output for name, output in outputs.items() if name != SENSOR}:
         columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
@@ -364,11 +349,11 @@ def _accelerations(car: Car, passage: Passage) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is refused below
         accel = recorded(car, passage)
         if car.bends_laws:
-            finer = recorded(car, Passage(passage.track, passage.rate_hz, passage.distance_m, 2 * FINE_RATE_HZ))
+            finer = recorded(car, Passage(passage.track, passage.rate_hz, passage.distance_m, 2 / passage.step_s))
             allowed = max(_NO_MOTION_MPS2, _STEPS_MATTER * float(np.sqrt(np.mean(finer**2))))
             if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
                 raise ValueError("its effects are too strong for its masses: they would need steps shorter than "
-                                 f"{1000 / FINE_RATE_HZ:g} ms")
+                                 f"{1000 * passage.step_s:.3g} ms")
             accel = finer if car.rubs else accel
     if not bounded([accel]):
         raise ValueError("with its effects the car's motion grows without bound")
@@ -388,7 +373,7 @@ def recorded_drive(
 
     ValueError as ``response_with_effects``.
     """
-    if has_effects:
+    if has_effects or track.timed:
         columns, motion = response_with_effects(car, outputs, track, motion, rate_hz)
     else:
         columns = response(car.structure, outputs, track, motion, rate_hz)

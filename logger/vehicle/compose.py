@@ -32,9 +32,13 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import Passage
 from logger.vehicle.stepping import Motion, Stepper, force_input
 from logger.vehicle.structure import (
+    Forces,
+    Output,
     Structure,
     body_point,
     driven_outputs,
+    over_ground,
+    pushed,
     straight_step,
 )
 from logger.vehicle.vehicle import Axle, Vehicle
@@ -76,6 +80,11 @@ class Car:
     def rubs(self) -> bool:
         """Whether there is dry friction in it."""
         return any(one.rubs for one in self.laws)
+
+    @property
+    def output(self) -> Output:
+        """The sensor's acceleration."""
+        return Output(self.row, over_ground(self.structure, 2), 2)
 
     def factor(self, s: Complex) -> Complex:
         """What lies between the body and the recorder, at s (f,) [1/s]."""
@@ -170,21 +179,17 @@ def recorded(car: Car, passage: Passage) -> Array:
 
     The passage is over where the car truly was: ``car.driven`` of what was recorded.
     """
-    def accelerations() -> Array:
-        if car.bends_laws:
-            return _accelerations(car, moved(car, passage), passage.under_wheels(car.structure)[0])
-        return _linear(car, passage)
-
-    return car.written(passage, passage.recorded_of(car.body, accelerations, car.factor))
+    return car.written(passage, passage.recorded_of(
+        car.body, lambda: fine_outputs(car, passage, [car.output])[0], car.factor))
 
 
 def respond(car: Car, passage: Passage) -> Response:
     """The record with the motions behind it."""
     structure = car.structure
     motion = moved(car, passage)
-    elevation, _ = passage.under_wheels(structure)
-    accel = _accelerations(car, motion, elevation)
-    n = len(structure.mass)
+    inputs, _ = passage.under_wheels(structure)
+    accel = _of_motion(passage.driven(structure), motion, inputs, [car.output])[0]
+    n, elevation = len(structure.mass), inputs[:, :len(structure.wheels)]
     states, elevation = passage.sampled(motion.states), passage.sampled(elevation)
     coordinates, velocities = states[:, :n], states[:, n:]
     road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
@@ -203,8 +208,9 @@ def bounded(records: Sequence[Array]) -> bool:
 def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws:
-        return stepper_of(car, passage.step_s).march(*passage.under_wheels(car.structure), passage.way)
-    states = in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
+        return stepper_of(car, passage.step_s, passage.forces).march(
+            *passage.under_wheels(car.structure), passage.way)
+    states = in_blocks(passage.driven(car.structure), passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 
 
@@ -214,44 +220,44 @@ def _axles(vehicle: Vehicle) -> list[Axle]:
     return [axle for axle in axles for _ in range(2)] if vehicle.model == "full_car" else axles
 
 
-def _accelerations(car: Car, motion: Motion, elevation: Array) -> Array:
-    """Of the sensor at the fine instants (M,) [m/s2]."""
-    structure = car.structure
-    n = len(structure.mass)
-    a, b = structure.state_space()
-    accel = motion.states @ (car.row @ a[n:]) + elevation @ (car.row @ b[n:])
-    return np.asarray(accel + motion.forces @ (car.row @ force_input(structure)[n:]))
+def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
+    """Outputs at the fine instants (p, M)."""
+    structure = passage.driven(car.structure)
+    inputs, _ = passage.under_wheels(structure)
+    if car.bends_laws:
+        return _of_motion(structure, moved(car, passage), inputs, outputs)
+    observe, direct = structure.output_matrices(outputs)
+    return (in_blocks(structure, passage, observe) + inputs @ direct.T).T
 
 
-def _linear(car: Car, passage: Passage) -> Array:
-    """The sensor's acceleration at the fine instants (M,), of a car without laws of its own."""
-    n = len(car.structure.mass)
-    a, b = car.structure.state_space()
-    seen = in_blocks(car.structure, passage, (car.row @ a[n:])[None])[:, 0]
-    return np.asarray(seen + passage.under_wheels(car.structure)[0] @ (car.row @ b[n:]))
+def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Sequence[Output]) -> Array:
+    """Outputs (p, M) of a motion, under the inputs of the structure (M, u)."""
+    observe, direct = structure.output_matrices(outputs)
+    onto = force_input(structure)[len(structure.mass):]
+    by_laws = np.array([one.row @ onto if one.order == 2 else np.zeros(onto.shape[1]) for one in outputs])
+    return np.asarray((motion.states @ observe.T + inputs @ direct.T + motion.forces @ by_laws.T).T)
 
 
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car from rest."""
-    elevation, mean = passage.under_wheels(structure)
-    around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
+    inputs, mean = passage.under_wheels(structure)
+    around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
     transition, gain = _linear_step(structure, passage.step_s)
-    rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]),
-                           np.zeros(len(structure.mass))])
-    return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]), rest)
+    return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]),
+                          structure.at_rest(inputs[0]))
 
 
 @lru_cache(maxsize=16)
 def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
-    """The transition of the state over a step, and what the road's mean and rise do to it."""
+    """The transition of the state over a step, and what the inputs' means and rises do to it."""
     transition, at_start, at_end = straight_step(*structure.state_space(), step_s)
     return transition, np.hstack([at_start + at_end, at_end - at_start])
 
 
 @lru_cache(maxsize=4)
-def stepper_of(car: Car, step_s: float) -> Stepper:
-    """What steps a car, which passes all of its runs one after the other or at once."""
-    return Stepper.of(car.structure, car.laws, step_s)
+def stepper_of(car: Car, step_s: float, forces: Forces = ()) -> Stepper:
+    """What steps a car, which passes all of its runs one after the other or at once, under forces on these parts."""
+    return Stepper.of(pushed(car.structure, forces), car.laws, step_s)
 
 
 def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:

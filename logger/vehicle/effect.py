@@ -33,7 +33,7 @@ import numpy.typing as npt
 
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.structure import Structure
-from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.vehicle import OWN_NAMES, Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -181,6 +181,7 @@ class Effect(ABC):
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     sought       whether a search tries it where nobody asked for it by name
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
+    needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
     """
@@ -196,6 +197,7 @@ class Effect(ABC):
     replaces: tuple[str, ...] = ()
     sought: Sought = Sought.ALWAYS
     needs_road: bool = False
+    needs_wheel: bool = False
     also_by: tuple[str, ...] = ()
     stage: int = 0
 
@@ -210,6 +212,8 @@ class Effect(ABC):
 
     def obstacle_on(self, vehicle: Vehicle, two_tracks: bool, timed: bool) -> str | None:
         """The same where runs may be driven by time (``timed``)."""
+        if self.needs_wheel and vehicle.model in OWN_NAMES:
+            return f"a {vehicle.model.replace('_', ' ')} has no wheel, no tire and no body that turns"
         return ON_A_RIG if timed and self.needs_road else self.obstacle(vehicle, two_tracks)
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:

@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from logger.vehicle.structure import Corner, Structure, assemble
+from logger.vehicle.structure import Corner, Structure, assemble, mass_on_base
 from logger.vehicle.vehicle import Axle, Vehicle
 
 # The reference car of the IRI (ASTM E1926; Sayers 1995; Table 4.1), all values per kilogram of sprung mass.
@@ -68,7 +68,13 @@ def full_car(vehicle: Vehicle) -> Structure:
     return replace(independent, stiffness=independent.stiffness + axle_roll.T @ bars @ axle_roll)
 
 
-MODELS = {"quarter_car": quarter_car, "half_car": half_car, "full_car": full_car}
+def single_mass(vehicle: Vehicle) -> Structure:
+    """Matrices of a mass on a spring and a damper on a base; one degree of freedom, its place over the base."""
+    front = vehicle.front
+    return mass_on_base(vehicle.sprung_mass_kg, front.suspension_stiffness_n_per_m, front.suspension_damping_n_s_per_m)
+
+
+MODELS = {"single_mass": single_mass, "quarter_car": quarter_car, "half_car": half_car, "full_car": full_car}
 
 
 def structure_of(vehicle: Vehicle) -> Structure:

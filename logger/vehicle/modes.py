@@ -129,6 +129,15 @@ def undamped_frequencies_hz(structure: Structure) -> Array:
     return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
 
 
+def body_and_wheels_hz(structure: Structure) -> tuple[Array, Array]:
+    """Undamped frequencies of the body (b,), the slow ones, and of the wheels (w,) [Hz], increasing; a mass on a base
+    has no wheels, and moves without a spring at no frequency."""
+    every = undamped_frequencies_hz(structure)
+    wheels = 0 if structure.on_base else len(structure.wheels)
+    body = every[:len(every) - wheels]
+    return body[body > 0], every[len(every) - wheels:]
+
+
 def one_at_a_time(structure: Structure) -> tuple[Array, Array]:
     """Frequency (n,) [Hz] and damping ratio (n,) of each coordinate while the others are held still.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from logger.errors import did_you_mean
 from logger.vehicle.effect import Chosen, Parameter, Scale
-from logger.vehicle.vehicle import Axle, Vehicle
+from logger.vehicle.vehicle import OWN_NAMES, Axle, Vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -116,6 +116,8 @@ def names(vehicle: Vehicle) -> list[str]:
 
 @lru_cache(maxsize=64)
 def _names(vehicle: Vehicle) -> tuple[str, ...]:
+    if vehicle.model in OWN_NAMES:
+        return tuple(OWN_NAMES[vehicle.model])
     body = [name for name in _BODY if getattr(vehicle, name) is not None]
     axle = [name for name in _AXLE if _used(vehicle, name)]
     single = [*body, *(f"front.{name}" for name in axle)]
@@ -138,8 +140,7 @@ def read(vehicle: Vehicle, name: str) -> float:
 
     ValueError, which lists the names there are, for another name.
     """
-    _check(vehicle, name)
-    part, _, leaf = name.rpartition(".")
+    part, leaf = _place(vehicle, name)
     if part == BOTH:
         return sum(float(getattr(_axle(vehicle, axle), leaf)) for axle in AXLES) / len(AXLES)
     return float(getattr(getattr(vehicle, part) if part else vehicle, leaf))
@@ -149,8 +150,7 @@ def changed(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
     """The same vehicle with other numbers. ValueError as ``read``."""
     parts: dict[str, dict[str, float]] = {}
     for name, value in values.items():
-        _check(vehicle, name)
-        part, _, leaf = name.rpartition(".")
+        part, leaf = _place(vehicle, name)
         for one in AXLES if part == BOTH else (part,):
             parts.setdefault(one, {})[leaf] = value
     whole: dict[str, Any] = {**parts.pop("", {})}
@@ -197,10 +197,13 @@ def _axle(vehicle: Vehicle, name: str) -> Axle:
     return axle
 
 
-def _check(vehicle: Vehicle, name: str) -> None:
+def _place(vehicle: Vehicle, name: str) -> tuple[str, str]:
+    """The part of a vehicle that a number is of, and what it is called there."""
     if name not in (known := _names(vehicle)):
         raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}"
                          f"{did_you_mean(name, known)}")
+    part, _, leaf = OWN_NAMES.get(vehicle.model, {}).get(name, name).rpartition(".")
+    return part, leaf
 
 
 _LOG_STEP = 0.01

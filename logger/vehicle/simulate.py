@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.low_pass import kaiser_half_length, low_pass_taps
-from logger.profiles.track import Way, WheelTracks, under_surface
-from logger.vehicle.structure import Output, Structure, driven_outputs, straight_step
+from logger.profiles.track import Pushing, Way, WheelTracks, under_surface
+from logger.vehicle.structure import Forces, Output, Structure, driven_outputs, pushed, straight_step
 
 Array = npt.NDArray[np.float64]
 
@@ -257,15 +257,25 @@ class Passage:
 
     def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
-        from where the front left wheel begins."""
-        place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface)
+        from where the front left wheel begins; then further inputs of the structure, forces last."""
+        place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface,
+                 structure.on_base)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
             elevation, mean = under_surface(self.track, structure.surface).under_wheels(self._way, structure)
-            level = elevation[0, 0]
+            level = elevation[0, 0] * (np.arange(elevation.shape[1]) < len(structure.wheels))
             known = elevation - level, mean - level
             self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}
         return known
+
+    @property
+    def forces(self) -> Forces:
+        """The parts that forces act on: on roads none."""
+        return self.track.acts_on if isinstance(self.track, Pushing) else ()
+
+    def driven(self, structure: Structure) -> Structure:
+        """The structure with the forces of this passage as its last inputs."""
+        return pushed(structure, self.forces)
 
     def recorded(self, fine: Array, factor: Callable[[Complex], Complex]) -> Array:
         """What the recorder keeps of an acceleration at the fine instants (M,): samples (N,); or of several signals

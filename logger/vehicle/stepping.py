@@ -51,7 +51,10 @@ class Motion:
 
 def static_tire_loads_n(structure: Structure) -> Array:
     """What each tire carries at rest (w,) [N]."""
-    rise = np.linalg.solve(structure.stiffness, structure.road.sum(axis=1))  # of all that rises with the road
+    if not structure.tires.any():
+        return np.zeros(len(structure.tires))
+    # Of all that rises with the road, forces apart:
+    rise = np.linalg.solve(structure.stiffness, structure.road[:, :len(structure.tires)].sum(axis=1))
     sag = np.linalg.solve(structure.stiffness, -STANDARD_GRAVITY_MPS2 * (structure.mass @ rise))
     return np.asarray(-structure.tires * (structure.wheels @ sag))
 
@@ -67,8 +70,8 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
     """The motion of a car on a road, from rest.
 
     laws         one per wheel
-    elevation    (M, w) under the wheels at the instants [m]
-    mean         (M - 1, w) over each step [m]
+    elevation    (M, u) under the wheels at the instants [m], or of what inputs the structure has
+    mean         (M - 1, u) over each step [m]
     way          None: it stands at 0, and time begins there
 
     ValueError for a law by all that moves that cannot be compiled.
@@ -101,17 +104,18 @@ class Stepper:
 
         n, w = len(structure.mass), len(structure.wheels)
         a, b = structure.state_space()
+        u = b.shape[1]
         transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
-        road = [at_start[:, :w] + at_end[:, :w], at_end[:, :w] - at_start[:, :w]]
+        inputs = [at_start[:, :u] + at_end[:, :u], at_end[:, :u] - at_start[:, :u]]
         rubbing = _rubbing(laws, 2 * n)
-        held = (at_start[:, w:] + at_end[:, w:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
+        held = (at_start[:, u:] + at_end[:, u:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
         seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
         if any(one.body_friction_n for one in laws):
             seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
         state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros(((-len(seen) - 2 * n) % LANES, 2 * n))])
         known, forces = (
             np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
-            for some in ([transition, at_start[:, w:], *road], [at_end[:, w:], held])
+            for some in ([transition, at_start[:, u:], *inputs], [at_end[:, u:], held])
         )
         rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
                 for i, one in enumerate(rubbing)]
@@ -125,7 +129,7 @@ class Stepper:
 
         structure, n = self.structure, len(self.structure.mass)
         around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
-        rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
+        rest = structure.at_rest(elevation[0])
         stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
         return Motion(*steps(
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,

@@ -460,19 +460,20 @@ def _walk(
 ) -> None:
     """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
     step needs."""
-    count, m, w = len(elevation), states.shape[1], len(numbers)
+    count, m, w, u = len(elevation), states.shape[1], len(numbers), elevation.shape[1]
     for k in range(count - 1):
         if asked is not None:
             _begin(motion, m, w, asked, road, k)
-        for i in range(w):
+        for i in range(u):
             known[m + 2 * w + i] = around[k + 1, i]
-            known[m + 3 * w + i] = 0.25 * (around[k + 2, i] - around[k, i])
+            known[m + 2 * w + u + i] = 0.25 * (around[k + 2, i] - around[k, i])
+        for i in range(w):
             road[i] = elevation[k + 1, i]
             road[w + i] = (around[k + 2, i] - around[k + 1, i]) / step_s
             mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
         for i in range(len(rubs)):
             earlier[i] = (1 / rubs[i, FRICTION_AT] - 1) * motion[rubs_at[i, RATE_ROW]]
-        _sum(before, 0, nothing, known, m + 4 * w, by_known)
+        _sum(before, 0, nothing, known, m + 2 * w + 2 * u, by_known)
         _settle(motion, m, before, forces, by_force, tables, pairs, numbers, passes, rubs, rubs_at, sweeps, road,
                 mounts, step_s, earlier, asked, k)
         for r in range(m):
@@ -502,22 +503,23 @@ def steps(
     The motion (R,) of the linear car is its state, what is seen (4 w: travels, rates, heights of the wheels, rates of
     these; where the body rubs on a guide, w rates of its ends too), and 0 up to the next number of whole ``LANES``.
 
-    by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
-                 the road's mean and how far it rises from the middle of the step to its end
+    by_known     (2 n + 2 w + 2 u, R) the motion at the end of a step by the state and the laws' forces at its
+                 beginning, and the mean of each input (the road's heights first, then forces) and how far it rises
+                 from the middle of the step to its end
     by_force     (2 w + f, R) the same by the laws' forces at the end, then by dry friction
     tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 12)
     rubs         (f, 3) numbers of what rubs; rubs_at (f, 3) its places
     asked        laws by all that moves; None: there are none, and a loop without them runs
     start        (R,) the first motion, of which m make the state
-    around       (M + 1, w) means of the road before, in and after the steps
-    elevation    (M, w) of the road at the instants
+    around       (M + 1, u) means of the inputs before, in and after the steps
+    elevation    (M, u) inputs at the instants
     """
     count, w = len(elevation), len(numbers)
     states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
     states[0] = start[:m]
-    known, before = np.zeros(m + 4 * w), np.zeros(by_known.shape[1])
+    known, before = np.zeros(len(by_known)), np.zeros(by_known.shape[1])
     known[:m] = start[:m]
-    road = np.concatenate((elevation[0], (around[1] - around[0]) / step_s))
+    road = np.concatenate((elevation[0, :w], (around[1, :w] - around[0, :w]) / step_s))
     acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or asked is not None
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
     passes = _PASSES if acts else 0

@@ -19,6 +19,9 @@ models:
 - places are counted from the centre of gravity of the body, ahead and to the left positive;
 - z holds the road's elevation under each wheel, up positive, the front wheel first, left before right;
 - tires are springs only, so R holds tire stiffnesses;
+- a mass on a bench that stands on a moving base has its place over that base for a coordinate, and z holds the base's
+  height, velocity and acceleration; a free axis is one without a spring;
+- forces from outside are more inputs beside z, with columns of R of their own (``pushed``);
 - the car drives forward: a wheel that stands ``behind_m`` behind the front wheel meets the road ``behind_m / speed``
   later (Eq 4.10 and 4.11 of Blum 2015), and each tire averages the road over the contact patch.
 """
@@ -27,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -129,7 +132,8 @@ class Output:
     """A motion that can be read off a car: a weighted sum of its coordinates, or a time derivative of that.
 
     row         (n,) weights of the coordinates q
-    road_row    (w,) weights of the elevations under the wheels, added to it; all zero unless order is 0
+    road_row    (w,) weights of the elevations under the wheels, added to it, zero unless order is 0; of a mass on a
+                base (3,) of the base's height and its two derivatives
     order       0 displacement [m], 1 velocity [m/s], 2 acceleration [m/s2]
     """
 
@@ -140,7 +144,7 @@ class Output:
     def __post_init__(self) -> None:
         if self.order not in (0, 1, 2):
             raise ValueError(f"order of an output: expected 0, 1 or 2, found {self.order}")
-        if self.order and self.road_row.any():
+        if self.order and len(self.road_row) != len(BASE_INPUTS) and self.road_row.any():
             raise ValueError("the road has no velocity or acceleration here: only an output of order 0 may contain it")
 
 
@@ -149,7 +153,8 @@ class Structure:
     """Matrices of one car. n degrees of freedom, w wheels.
 
     mass, damping, stiffness    (n, n) [kg, N s/m, N/m; with lengths where a row or column is an angle]
-    road                        (n, w) force per elevation under each wheel [N/m]
+    road                        (n, w) force per elevation under each wheel [N/m]; of a mass on a base (n, 3), and where
+                                forces act (``pushed``) as many columns more
     behind_m                    (w,) how far behind the front wheel each wheel stands [m]
     left_m                      (w,) how far left of the middle each wheel stands [m]; 0 in a car of one track
     contact_patch_m             [m]
@@ -161,6 +166,7 @@ class Structure:
     sides                       how many times the masses that a person gives are in it: twice, where a half car was
                                 made whole
     surface                     how the road that it meets differs from the profile that was written of it
+    on_base                     it is a mass on a base: the one corner's wheel is the base
     """
 
     mass: Array
@@ -178,9 +184,11 @@ class Structure:
     tires: Array
     sides: int = 1
     surface: Surface = ()
+    on_base: bool = False
 
     def state_space(self) -> tuple[Array, Array]:
-        """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""
+        """A (2n, 2n) and B (2n, u) of x' = A x + B z, with u inputs z and x = (q, q'). Row n is the body's
+        acceleration."""
         return self._state_space
 
     @cached_property
@@ -192,7 +200,7 @@ class Structure:
         return a, b
 
     def output_matrices(self, outputs: Sequence[Output]) -> tuple[Array, Array]:
-        """C (p, 2n) and D (p, w) of y = C x + D z, for p outputs and the state of ``state_space``."""
+        """C (p, 2n) and D (p, u) of y = C x + D z, for p outputs and the state of ``state_space``."""
         n = len(self.mass)
         a, b = self.state_space()
         c_rows = np.zeros((len(outputs), 2 * n))
@@ -202,8 +210,14 @@ class Structure:
                 c_rows[index], d_rows[index] = output.row @ a[n:], output.row @ b[n:]
             else:
                 c_rows[index, output.order * n:(output.order + 1) * n] = output.row
-                d_rows[index] = output.road_row
+            d_rows[index, :len(output.road_row)] += output.road_row
         return c_rows, d_rows
+
+    def at_rest(self, inputs: Array) -> Array:
+        """The state (2n,) that stays where it is under these inputs (u,); at 0 in a direction without any spring."""
+        still = np.linalg.lstsq(self.stiffness, self.road @ inputs)[0] if self.on_base else (
+            np.linalg.solve(self.stiffness, self.road @ inputs))
+        return np.concatenate([still, np.zeros(len(self.mass))])
 
 
 @dataclass(frozen=True)
@@ -253,6 +267,78 @@ def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_
     )
 
 
+BASE_INPUTS = ("height", "velocity", "acceleration")
+"""What a mass on a base is driven by, in the order of its ``Structure.road``."""
+
+
+def mass_on_base(mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: float) -> Structure:
+    """The structure of one mass on a spring and a damper on a base, in its place x over the base:
+    m x'' + c x' + k x = F - m z''."""
+    one, none = np.ones((1, 1)), np.zeros((1, 1))
+    return Structure(
+        mass=mass_kg * one, damping=damping_n_s_per_m * one, stiffness=stiffness_n_per_m * one,
+        road=np.array([[0.0, 0.0, -mass_kg]]), behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.0,
+        body=np.eye(1, 3), wheels=none, travel=one, springs=np.array([stiffness_n_per_m]),
+        dampers=np.array([damping_n_s_per_m]), tires=np.zeros(1), on_base=True)
+
+
+GROUND = "ground"
+"""What a force pushes off from where it acts on one part alone."""
+_CORNERS = {1: {"": 0, "front_": 0}, 2: {"front_": 0, "rear_": 1},
+            4: {"front_left_": 0, "front_right_": 1, "rear_left_": 2, "rear_right_": 3}}
+
+
+def corner_of(structure: Structure, part: str) -> int:
+    """The corner of a part of a car: ``front_wheel``, ``rear_suspension``; ``wheel`` where there is one alone.
+
+    KeyError for one that the car does not have.
+    """
+    side, _, kind = part.rpartition("_")
+    if structure.on_base and kind == "wheel":
+        raise KeyError(part)
+    sides = _CORNERS[len(structure.wheels)]
+    return sides[f"{side}_" if side else ""]
+
+
+def force_row(structure: Structure, parts: Sequence[str]) -> Array:
+    """What a force does (n,) that pushes the first part up and the second down, or two apart.
+
+    parts    ``body``, a wheel or, of one alone, a suspension; the second one is the ground where there is one only
+
+    ValueError for a part that the car does not have.
+    """
+    try:
+        if len(parts) == 1 and parts[0].endswith("suspension"):
+            return structure.travel[corner_of(structure, parts[0])]
+        wheels = [corner_of(structure, part) for part in parts if part.endswith("wheel")]
+        rows = {GROUND: np.zeros(len(structure.mass)), "base": np.zeros(len(structure.mass)),
+                **{part: structure.wheels[corner_of(structure, part)] for part in parts if part.endswith("wheel")}}
+        # Beside a wheel, the body's end of its suspension is meant; else its centre of gravity.
+        rows["body"] = (structure.travel + structure.wheels)[wheels[0]] if wheels else structure.body[:, 0]
+        first, second = (rows[part] for part in (*parts, GROUND)[:2])
+    except KeyError as error:
+        raise ValueError(f"this vehicle has no {str(error.args[0]).replace('_', ' ')}") from None
+    return np.asarray(first - second)
+
+
+Forces = tuple[tuple[str, ...], ...]
+"""The parts that each of some forces acts on (``force_row``)."""
+
+
+@lru_cache(maxsize=16)
+def pushed(structure: Structure, forces: Forces) -> Structure:
+    """The structure with forces on these parts as its last inputs. ValueError as ``force_row``."""
+    if not forces:
+        return structure
+    columns = np.stack([force_row(structure, parts) for parts in forces], axis=1)
+    return replace(structure, road=np.hstack([structure.road, columns]))
+
+
+def over_ground(structure: Structure, order: int) -> Array:
+    """What the height of the ground under the structure, or a derivative of it, adds to an output of its body."""
+    return np.eye(len(BASE_INPUTS))[order] if structure.on_base else np.zeros(len(structure.wheels))
+
+
 def body_point(structure: Structure, ahead_m: float = 0.0, left_m: float = 0.0, order: int = 2) -> Output:
     """Vertical motion of a point of the body, up positive; its acceleration unless ``order`` says otherwise.
 
@@ -261,7 +347,7 @@ def body_point(structure: Structure, ahead_m: float = 0.0, left_m: float = 0.0, 
     for offset, motion, column in ((ahead_m, "pitch", 1), (left_m, "roll", 2)):
         if offset and not structure.body[:, column].any():
             raise ValueError(f"this body does not {motion}: expected a point at its centre of gravity")
-    return Output(structure.body @ np.array([1.0, ahead_m, left_m]), np.zeros(len(structure.wheels)), order)
+    return Output(structure.body @ np.array([1.0, ahead_m, left_m]), over_ground(structure, order), order)
 
 
 def wheel(structure: Structure, index: int, order: int = 2) -> Output:
@@ -297,12 +383,15 @@ def hung(structure: Structure, mass: float, stiffness: float, damping: float, at
         plain = np.pad(matrix - (structure.travel.T * corners) @ structure.travel, (0, 1))
         return plain + (wider.T * corners) @ wider + own * np.outer(relative, relative)
 
+    road = np.pad(structure.road, ((0, 1), (0, 0)))
+    if structure.on_base:  # over which its place is counted
+        road[-1, BASE_INPUTS.index("acceleration")] = -mass * attached.sum()
     return replace(
         structure,
         mass=np.pad(structure.mass, (0, 1)) + np.diag(np.append(np.zeros(n), mass)),
         damping=with_newcomer(structure.damping, structure.dampers, damping),
         stiffness=with_newcomer(structure.stiffness, structure.springs, stiffness),
-        road=np.pad(structure.road, ((0, 1), (0, 0))),
+        road=road,
         body=np.pad(structure.body, ((0, 1), (0, 0))),
         wheels=np.pad(structure.wheels, ((0, 0), (0, 1))),
         travel=wider,

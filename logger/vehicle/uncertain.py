@@ -172,7 +172,7 @@ def _factors(vehicle: Vehicle) -> tuple[float, float, float]:
     mass_kg = vehicle.sprung_mass_kg / len(structure.wheels)
     bounce_hz = float(undamped_frequencies_hz(structure)[0])
     wheelbase_m = float(structure.behind_m.max()) or _WHEELBASE_M
-    return (_power_of_ten(mass_kg / _MASS_KG), _power_of_ten(_BOUNCE_HZ / bounce_hz, 2),
+    return (_power_of_ten(mass_kg / _MASS_KG), _power_of_ten(_BOUNCE_HZ / bounce_hz, 2) if bounce_hz else 1.0,
             _power_of_ten(wheelbase_m / _WHEELBASE_M))
 
 

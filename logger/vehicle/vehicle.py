@@ -37,6 +37,12 @@ class SensorPlace:
 AT_CENTRE_OF_GRAVITY = SensorPlace()
 
 
+OWN_NAMES = {"single_mass": {
+    "mass_kg": "sprung_mass_kg", "stiffness_n_per_m": "front.suspension_stiffness_n_per_m",
+    "damping_n_s_per_m": "front.suspension_damping_n_s_per_m"}}
+"""What models that are no cars call their numbers, and where these stand in a ``Vehicle``."""
+
+
 @dataclass(frozen=True)
 class Vehicle:
     """A car as the model named ``model`` sees it (Tables 4.1 and 4.2 of Blum 2015 are two of them).
@@ -44,7 +50,8 @@ class Vehicle:
     A half car carries the sprung mass of one side on two axles. A quarter car carries it on ``front`` alone and
     has neither pitch inertia nor a rear axle: both are None. A full car has the sprung mass and the inertias of the
     whole car; its axles are still those of one side, so each stands for two equal wheels. Only a full car has a roll
-    inertia and a track width.
+    inertia and a track width. A single mass on a spring and a damper is the sprung mass with the suspension of
+    ``front``, and has nothing else: no wheel, no tire.
 
     sprung_mass_kg         [kg]
     pitch_inertia_kg_m2    of the sprung mass, about its centre of gravity [kg m2]

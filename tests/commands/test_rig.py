@@ -234,7 +234,7 @@ def test_signals_come_back_from_python(tmp_path: Path) -> None:
      "run.yaml:2: expected a signal that is a column of the drive.csv beside it, found rear_mps2"),
     ("signals:\n  accel_z_mps2: {measures: acceleration, of: body}\n",
      "run.yaml:2: expected a signal beside the columns"),
-    ("signals:\n  front_travel_m: {measures: noise}\n", "run.yaml:2: expected one of acceleration, travel"),
+    ("signals:\n  front_travel_m: {measures: noise}\n", "run.yaml:2: expected one of acceleration, velocity, displ"),
     ("signals:\n  front_travel_m: {measures: travel, of: rear_suspension}\n",
      "signal front_travel_m: this vehicle has no rear suspension"),
 ])

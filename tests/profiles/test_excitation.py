@@ -8,9 +8,9 @@ import pytest
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Way
 
-QUARTER = SimpleNamespace(behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.2)
+QUARTER = SimpleNamespace(behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.2, on_base=False)
 FULL = SimpleNamespace(behind_m=np.array([0.0, 0.0, 2.5, 2.5]), left_m=np.array([1.0, -1.0, 1.0, -1.0]),
-                       contact_patch_m=0.2)
+                       contact_patch_m=0.2, on_base=False)
 OMEGA = 2 * np.pi * 10.0
 
 

@@ -151,11 +151,11 @@ class _Followed:
 
 def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
     from logger.vehicle.models import structure_of
-    from logger.vehicle.modes import undamped_frequencies_hz
+    from logger.vehicle.modes import body_and_wheels_hz
 
-    structure = structure_of(car.vehicle)
-    return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True)],
-                     undamped_frequencies_hz(structure)[: -len(structure.wheels)])
+    body_hz, _ = body_and_wheels_hz(structure_of(car.vehicle))
+    return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True) if len(body_hz)],
+                     body_hz)
 
 
 def _moves(run: Run, prediction: Array) -> bool:
@@ -165,18 +165,19 @@ def _moves(run: Run, prediction: Array) -> bool:
 
 def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
-    for k, (run, around) in enumerate(zip(runs.runs, followed.around, strict=True)):
+    for k, ((run, _), around) in enumerate(zip(followed.pairs, followed.around, strict=True)):
         if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
-            yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
-                   f"the model (correlation {around.turned:.2f})")
+            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: turned over, they go "
+                   f"with the model (correlation {around.turned:.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
     if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body moves with the
     road whatever is missing, but one run holds few such waves."""
-    clear = [(run.name, around.gain, below.gain) for run, around, below in
-             zip(runs.runs, followed.around, followed.below, strict=True) if around.is_clear]
+    clear = [(run.name, around.gain, below.gain) for (run, _), around, below in
+             zip(followed.pairs, followed.around, followed.below, strict=True)
+             if around.is_clear and run.facts.main.measures == "acceleration"]
     for name, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
         of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
@@ -191,7 +192,7 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
     from logger.lab.road_match import pool
 
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
-    if not strangers and pool(followed.around).is_refuted:
+    if not strangers and followed.around and pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
@@ -278,7 +279,7 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
             if last_m < drive.track.start_m or first_m > drive.track.end_m:
                 raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
                                f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
-        check_record(drive, file, drives[:number])
+        check_record(drive, file, drives[:number], vehicle)
         if not drive.track.timed:
             check_distances(drive, file)
     runs = [run for one in drives for run in driven_stretches(one)]
@@ -317,9 +318,13 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     parts = driven_parts(drive, drive.track.timed)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
+    def main(part: slice) -> Array:
+        samples = drive.accel_z_mps2[part]
+        return samples if drive.facts.main.has_zero else samples - samples.mean()
+
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
-                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part],
+                drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
                 drive.track.begun(part.start / drive.rate_hz), facts=drive.facts,
                 usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
             for part in parts]
@@ -416,17 +421,32 @@ def _needed_hz(vehicle: Vehicle | None) -> float:
     return max(_RATE_HZ, 2 * float(undamped_frequencies_hz(structure_of(vehicle))[-1]) / HIGHEST_OF_RATE)
 
 
-def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
-    """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
-    others, recorded nothing, or repeats samples."""
+def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
+    """The fewest samples a second that show what the lab looks at, and what that is: on a rig the vehicle's slowest
+    vibration, and on a road the wheels' hop."""
+    from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
+    from logger.store.formats.drive_file import DriveOnRoad
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.modes import undamped_frequencies_hz
+
+    if vehicle is None or not isinstance(drive, DriveOnRoad) or not drive.track.timed:
+        return _LEAST_RATE_HZ, "the wheels hop"
+    slowest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[0])
+    return slowest_hz / HIGHEST_OF_RATE, f"its vibration at {slowest_hz:.3g} Hz"
+
+
+def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
+    """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is shorter than 5 s, has
+    another rate than the others, recorded nothing, or repeats samples."""
     import numpy as np
 
     from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
     from logger.runs import READING, SKIP_S
 
-    if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
-        raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "
+    least_hz, seen = _least_hz(drive, vehicle)
+    if drive.rate_hz < (1 - _CLOCK) * least_hz:
+        raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
                        f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < LEAST_S:
@@ -435,12 +455,15 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
     counted = drive.accel_z_mps2[int(SKIP_S * drive.rate_hz):]
+    is_acceleration = drive.facts.main.measures == "acceleration"
     if np.ptp(counted) == 0:
-        found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"
-        raise BadInput(f"{file}: expected accelerations after the first {SKIP_S:g} s, found {found}")
-    if counted.std() < _RUN_CHECKS_LEAST_MPS2:
+        unit = " m/s2" if is_acceleration else ""
+        found = f"{counted[0]:g}{unit} all along" if counted[0] else "zeros only"
+        what = "accelerations" if is_acceleration else drive.facts.main.name
+        raise BadInput(f"{file}: expected {what} after the first {SKIP_S:g} s, found {found}")
+    if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
-    if abs(counted.mean()) > _MOST_MEAN_MPS2:
+    if is_acceleration and abs(counted.mean()) > _MOST_MEAN_MPS2:
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
     read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]

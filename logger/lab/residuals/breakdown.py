@@ -20,7 +20,7 @@ from logger.lab.likelihood.lag import WINDOW_S
 from logger.runs import Run
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
-from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.modes import body_and_wheels_hz
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
@@ -124,15 +124,16 @@ class ModelResiduals:
     def bands(self) -> tuple[Band, ...]:
         """Body and wheels of this car, about as wide as their damping makes them, and what lies below, between and
         above, up to where the runs' pass bands end, half the sample rate if they do not."""
-        structure = structure_of(self.car.vehicle)
-        own_hz = undamped_frequencies_hz(structure)
-        body_hz, wheels_hz = own_hz[: -len(structure.wheels)], own_hz[-len(structure.wheels):]
-        between = np.sqrt(body_hz[-1] * wheels_hz[0])
-        top, above = self.top_hz, wheels_hz[-1] * 1.3
+        body_hz, wheels_hz = body_and_wheels_hz(structure_of(self.car.vehicle))
+        top, own = self.top_hz, [] if len(body_hz) == 0 else [
+            ("below body bounce", body_hz[0] / 1.35), ("body bounce", body_hz[-1] * 1.35)]
+        if len(wheels_hz):
+            between = np.sqrt(body_hz[-1] * wheels_hz[0])
+            own = [own[0], ("body bounce", min(own[1][1], between)), ("between", max(wheels_hz[0] / 1.3, between)),
+                   ("wheel hop", wheels_hz[-1] * 1.3)]
+        last, above = own[-1] if own else ("any vibration", 0.0)
         kept = max(PASS_OF_RATE * self.rate_hz, above)
-        bands = (("below body bounce", body_hz[0] / 1.35), ("body bounce", min(body_hz[-1] * 1.35, between)),
-                 ("between", max(wheels_hz[0] / 1.3, between)), ("wheel hop", above),
-                 ("above wheel hop", np.sqrt(above * kept)), ("far above wheel hop", kept),
+        bands = (*own, (f"above {last}", np.sqrt(above * kept)), (f"far above {last}" if own else "all", kept),
                  ("beyond the recorder's filter", top))
         ends = [0.0, *(round(float(min(end, top)), 2) for _, end in bands)]
         return tuple(Band(name, low, high) for (name, _), (low, high) in zip(bands, pairwise(ends), strict=True)

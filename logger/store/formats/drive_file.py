@@ -28,9 +28,9 @@ import yaml
 from logger import bounds
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded, write_text
-from logger.profiles.excitation import Excitation
+from logger.profiles.excitation import AppliedForce, Excitation
 from logger.profiles.track import Track
-from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts, Signal
+from logger.runs import ACCELERATION, BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts, Signal
 from logger.store.formats.csv_table import find_table, parse_columns, place, taken
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import EXCITATION_COLUMNS, PROFILE_NAME, Profile, read_excitation, read_profile
@@ -42,26 +42,36 @@ RUN = "run.yaml"
 
 _SENSOR = ("step_mps2", "range_mps2", "noise_mps2", "taken_hz")
 _RECEIVER = ("delay_s", "delay_std_s", "speed_scale", "speed_scale_std")
-_KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places", "signals")
+_KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places", "signals", "forces")
 # What signals measure: the unit that their columns end in, and the parts that they are of.
 _CORNERS = ("front", "rear", "front_left", "front_right", "rear_left", "rear_right")
+_WHEELS, _SUSPENSIONS = ((kind, *(f"{one}_{kind}" for one in _CORNERS)) for kind in ("wheel", "suspension"))
 _MEASURES: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "acceleration": ("_mps2", ("body", *(f"{one}_wheel" for one in _CORNERS))),
-    "travel": ("_m", tuple(f"{one}_suspension" for one in _CORNERS)),
+    "acceleration": ("_mps2", ("body", *_WHEELS)),
+    "velocity": ("_mps", ("body", *_WHEELS, *_SUSPENSIONS)),
+    "displacement": ("_m", ("body", *_WHEELS)),
+    "travel": ("_m", _SUSPENSIONS),
     "pitch_rate": ("_rad_per_s", ("body",)),
     "roll_rate": ("_rad_per_s", ("body",)),
 }
 _PLACE = ("ahead_m", "left_m")
 _FARTHEST_M = 20.0
+_KINDS = ("accelerometer", "encoder", "potentiometer", "laser", "load_cell")
+# Columns of a rig's record that need no word in run.yaml.
+_OWN_SIGNALS = {one.name: one for one in (
+    Signal("displacement_m", "displacement"), Signal("travel_m", "travel", "suspension"),
+    Signal("velocity_mps", "velocity"))}
 
 
-def write_run_facts(folder: Path, facts: RecordFacts) -> None:
-    """Write ``run.yaml`` into a run's folder. OSError if that fails."""
+def write_run_facts(folder: Path, facts: RecordFacts, forces: Sequence[AppliedForce] = ()) -> None:
+    """Write ``run.yaml`` into a run's folder, with what ``forces`` act on. OSError if that fails."""
+    every = facts.signals if facts.main == ACCELERATION else (facts.main, *facts.signals)
     places = {"by": facts.places_by, "vehicle": facts.vehicle}
     said: dict[str, Any] = {"sensor": _some(facts, _SENSOR), "place_std_m": facts.place_std_m,
                             "pass_band_hz": list(facts.pass_band_hz or ()) or None, "source": facts.source,
                             "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None,
-                            "signals": {one.name: _signal_keys(one) for one in facts.signals}}
+                            "signals": {one.name: _signal_keys(one) for one in every},
+                            "forces": {one.name: _force_keys(one) for one in forces}}
     write_text(folder / RUN, yaml.safe_dump({key: value for key, value in said.items() if value not in (None, {})},
                                             sort_keys=False, allow_unicode=True))
 
@@ -76,9 +86,10 @@ def read_run_facts(folder: Path) -> RecordFacts:
         return UNKNOWN
     said = load_mapping(path).mapping(optional=_KEYS)
     sensor, receiver = (said[key].mapping(optional=names) if key in said else {}
-                        for key, names in (("sensor", _SENSOR), ("receiver", _RECEIVER)))
+                        for key, names in (("sensor", (*_SENSOR, "kind")), ("receiver", _RECEIVER)))
+    kind = sensor["kind"].choice(*_KINDS) if "kind" in sensor else None
     places = said["places"].mapping(("by",), ("vehicle",)) if "places" in said else {}
-    numbers = {**{name: _within(node, bounds.ACCELERATION) for name, node in sensor.items()},
+    numbers = {**{name: _within(node, bounds.ACCELERATION) for name, node in sensor.items() if name != "kind"},
                **{name: _of_receiver(name, node) for name, node in receiver.items()}}
     return replace(
         UNKNOWN, **numbers,
@@ -88,7 +99,32 @@ def read_run_facts(folder: Path) -> RecordFacts:
         vehicle=places["vehicle"].text() if "vehicle" in places else None,
         source=said["source"].text() if "source" in said else None,
         signals=tuple(_signal(name, node) for name, node in said["signals"].mapping().items()
-                      ) if "signals" in said else ())
+                      ) if "signals" in said else (),
+        main=replace(ACCELERATION, kind=kind))
+
+
+def read_forces(folder: Path) -> tuple[AppliedForce, ...]:
+    """What the forces of a rig act on, by the ``run.yaml`` of its folder; none where there is none. BadInput as
+    ``read_run_facts``."""
+    path = folder / RUN
+    said = load_mapping(path).mapping(optional=_KEYS) if path.exists() else {}
+    return tuple(_force(name, node) for name, node in said["forces"].mapping().items()) if "forces" in said else ()
+
+
+def _force(name: str, node: Node) -> AppliedForce:
+    keys = node.mapping(optional=("on", "between"))
+    if len(keys) != 1:
+        raise node.wrong("on: a part, or between: two parts")
+    if "on" in keys:
+        return AppliedForce(name, (keys["on"].choice("body", *_WHEELS, *_SUSPENSIONS),))
+    parts = tuple(one.choice("body", "ground", "base", *_WHEELS) for one in keys["between"].items())
+    if len(parts) != 2 or parts[0] == parts[1] or not {"ground", "base"}.isdisjoint(parts[:1]):
+        raise keys["between"].wrong("two parts, as [body, wheel], the ground or the base last")
+    return AppliedForce(name, parts)
+
+
+def _force_keys(one: AppliedForce) -> dict[str, object]:
+    return {"on": one.parts[0]} if len(one.parts) == 1 else {"between": list(one.parts)}
 
 
 def facts_beside(drive: Path | str) -> RecordFacts:
@@ -127,24 +163,23 @@ def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]
 
 
 def _signal(name: str, node: Node) -> Signal:
-    keys = node.mapping(("measures",), ("of", *_PLACE))
+    keys = node.mapping(("measures",), ("of", "kind", *_PLACE))
     measures = keys["measures"].choice(*_MEASURES)
     unit, parts = _MEASURES[measures]
     if not name.endswith(unit):
         raise BadInput(f"{node.file}:{node.line}: expected a column of {measures.replace('_', ' ')} whose name ends in "
                        f"{unit}, its unit, found {name}")
-    if "of" not in keys and parts[0] != "body":
-        raise BadInput(f"{node.file}:{node.line}: expected the key 'of' with one of {', '.join(parts)}")
-    of = keys["of"].choice(*parts) if "of" in keys else "body"
+    of = keys["of"].choice(*parts) if "of" in keys else parts[0]
+    kind = keys["kind"].choice(*_KINDS) if "kind" in keys else None
     place = {key: keys[key].number(-_FARTHEST_M, _FARTHEST_M) for key in _PLACE if key in keys}
     if place and (measures, of) != ("acceleration", "body"):
         raise keys[next(iter(place))].wrong("no place: only an acceleration of the body has one")
-    return Signal(name, measures, of, **place)
+    return Signal(name, measures, of, **place, kind=kind)
 
 
 def _signal_keys(one: Signal) -> dict[str, object]:
     place = {key: float(f"{getattr(one, key):.6g}") for key in _PLACE if getattr(one, key)}
-    return {"measures": one.measures, "of": one.of, **place}
+    return {"measures": one.measures, "of": one.of, **place, **({"kind": one.kind} if one.kind else {})}
 
 
 def _band(node: Node) -> tuple[float, float]:
@@ -180,7 +215,8 @@ class Drive:
     path           of the file, or of a run's folder
     rate_hz        samples a second
     time_s         evenly spaced [s]
-    accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]; on a rig whose
+                   facts say so another signal
     speed_mps      [m/s]; on a rig 0
     distance_m     where the front tires stand on the track [m]; on a rig 0
     lat_deg, lon_deg    None where they were not recorded
@@ -234,10 +270,23 @@ def drive_in(folder: Path, timed: bool) -> Drive:
     """The drive of a run's folder, on a rig (``timed``) or over a road, with what its ``run.yaml`` says. BadInput as
     ``read_run``."""
     facts = read_run_facts(folder)
+    if facts.signals or timed:
+        columns = header_of(folder / DRIVE)
+        check_columns(folder, columns, (*COLUMNS, *PLACE, USABLE))
+        facts = _measured(facts, columns) if timed else facts
     names = tuple(one.name for one in facts.signals)
-    if names:
-        check_columns(folder, header_of(folder / DRIVE), (*COLUMNS, *PLACE, USABLE))
-    return replace(read_drive(folder / DRIVE, timed, names), path=folder, facts=facts)
+    return replace(read_drive(folder / DRIVE, timed, names, facts.main.name), path=folder, facts=facts)
+
+
+def _measured(facts: RecordFacts, columns: Sequence[str]) -> RecordFacts:
+    """The facts of a rig's record with the columns whose names say what they are; the first one of all is its main
+    signal where there is no acceleration of the sensor."""
+    said = {one.name: one for one in facts.signals}
+    every = [{**_OWN_SIGNALS, **said}[name] for name in columns if name in {**_OWN_SIGNALS, **said}]
+    if VERTICAL in columns or not every:
+        return replace(facts, signals=tuple(every))
+    main = every[0] if every[0].kind or not facts.main.kind else replace(every[0], kind=facts.main.kind)
+    return replace(facts, main=main, signals=tuple(every[1:]))
 
 
 def header_of(path: Path) -> tuple[str, ...]:
@@ -259,7 +308,7 @@ def excitation_beside(drive: Drive) -> Excitation:
     """What drives a rig, out of the run's folder, on the drive's clock. BadInput as ``read_excitation``, and where it
     moves nothing while the drive lasts."""
     path = drive.path / EXCITATION
-    found = read_excitation(path)
+    found = read_excitation(path, read_forces(drive.path))
     first_s, last_s = float(drive.time_s[0]), float(drive.time_s[-1])
     if found.end_s < first_s or found.start_s > last_s:
         raise BadInput(f"{path}: expected times of the same clock as in {DRIVE}, {first_s:g} to {last_s:g} s, found "
@@ -267,10 +316,10 @@ def excitation_beside(drive: Drive) -> Excitation:
     return replace(found, start_s=found.start_s - first_s)
 
 
-def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> Drive:
-    """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns. Times
-    and errors as in ``read_run``."""
-    file, columns = read_columns(path, timed, more)
+def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = (), main: str = VERTICAL) -> Drive:
+    """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns; ``main``
+    in place of the sensor's acceleration. Times and errors as in ``read_run``."""
+    file, columns = read_columns(path, timed, more, main)
     return replace(drive_of(path, even_rate_hz(columns[TIME], file), columns), facts=facts_beside(path),
                    more={name: columns[name] for name in more})
 
@@ -283,14 +332,16 @@ def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> 
                  usable=columns.get(USABLE))
 
 
-def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> tuple[str, dict[str, Array]]:
+def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = (), main: str = VERTICAL
+                 ) -> tuple[str, dict[str, Array]]:
     """The file's name for ``place``, and the columns (n,) of a ``drive.csv`` by name, as they are written: their times
     may be uneven. Errors as in ``read_run``.
 
     timed    it is a rig's: speed and distance are 0, whatever it says of them
     more     columns that are read as well
+    main     the column that is read in place of the sensor's acceleration
     """
-    needed = (COLUMNS[:2] if timed else COLUMNS) + tuple(more)
+    needed = ((TIME, main) if timed else COLUMNS) + tuple(more)
     path = file_in(path, DRIVE)
     names, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), partial(_choose, needed=needed),
                                        _HEADER.format(",".join(needed)))
@@ -298,6 +349,7 @@ def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
     columns = {name: taken(_QUANTITIES.get(name, bounds.SIGNAL), name, column, file)
                for name, column in zip(names, table.T, strict=True)}
+    columns[VERTICAL] = columns.pop(main)
     columns |= {name: np.zeros(len(table)) for name in COLUMNS if name not in columns}
     if USABLE in columns and not (known := np.isin(columns[USABLE], (NO_READING, READING, CLIPPED))).all():
         row = int(np.argmin(known))
@@ -352,10 +404,14 @@ def write_profile(path: Path, track: Track) -> None:
 
 
 def write_excitation(path: Path, excitation: Excitation) -> None:
-    """Write what drives a rig, with its own times, to ten digits. OSError if that fails."""
-    columns = excitation.elevation_m.reshape(len(excitation.elevation_m), -1).T
-    time_s = excitation.start_s + np.arange(len(columns[0])) / excitation.rate_hz
-    write_drive(path, dict(zip(EXCITATION_COLUMNS, (time_s, *columns), strict=False)))
+    """Write what drives a rig, with its own times, to ten digits; elevations that are all 0 beside forces are not. An
+    OSError if that fails."""
+    heights = excitation.elevation_m.reshape(len(excitation.elevation_m), -1).T
+    time_s = excitation.start_s + np.arange(heights.shape[1]) / excitation.rate_hz
+    pushes = {} if excitation.force_n is None else {
+        one.name: column for one, column in zip(excitation.forces, excitation.force_n.T, strict=True)}
+    kept = (time_s, *heights) if heights.any() or not pushes else (time_s,)
+    write_drive(path, {**dict(zip(EXCITATION_COLUMNS, kept, strict=False)), **pushes})
 
 
 def write_table(path: Path, names: Sequence[str], table: Array, form: str) -> None:

@@ -17,17 +17,19 @@ Excitations as files: ``excitation.csv``, what stood under the wheels of a rig o
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.bounds import DISTANCE, ELEVATION, MOST_SAMPLES
+from logger.bounds import DISTANCE, ELEVATION, FORCE, MOST_SAMPLES
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
-from logger.profiles.excitation import Excitation
+from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.plausible import UNITS_M, unit_complaint
 from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
 from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
@@ -206,21 +208,49 @@ def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
 
 
 EXCITATION_COLUMNS = (TIME, "elevation_m", "elevation_rear_m")
+_FORCE = re.compile("force(_[a-z0-9_]+)?_n")
+_OTHER_UNIT = re.compile("(force|elevation)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)", re.IGNORECASE)
 _FEWEST = 4
 
 
-def read_excitation(path: Path | str) -> Excitation:
-    """Read CSV ``t_s,elevation_m[,elevation_rear_m]``; it begins at the file's own time.
+def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
+    """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; it
+    begins at the file's own time.
 
-    Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even and for
-    elevations that no rig has.
+    forces    what each of its forces acts on
+
+    Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even, for
+    elevations and forces that no rig has, and for forces of which is not said what they act on.
     """
+    known = {one.name: one for one in forces}
     names, table, file = parse_columns(
-        read_bounded(path, MAX_BYTES), str(path),
-        lambda names: names if names in (EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS) else None,
-        f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}]")
+        read_bounded(path, MAX_BYTES), str(path), partial(_driving, file=str(path)),
+        f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}][,force_n][,force_NAME_n], in metres "
+        "and newtons")
     if len(table) < _FEWEST:
         raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
-    columns = [taken(ELEVATION, name, column, file) for name, column in zip(names[1:], table.T[1:], strict=True)]
-    heights = np.stack(columns, axis=1) if len(columns) > 1 else columns[0]
-    return Excitation(even_rate_hz(table[:, 0], file), np.ascontiguousarray(heights), float(table[0, 0]))
+    pushes = tuple(name for name in names if _FORCE.fullmatch(name))
+    if unsaid := [name for name in pushes if name not in known]:
+        raise BadInput(f"{file}:1: expected a run.yaml beside it that says what {unsaid[0]} acts on, as forces: "
+                       f"{{{unsaid[0]}: {{on: body}}}}, found none")
+    if lost := [name for name in known if name not in pushes]:
+        raise BadInput(f"{file}:1: expected a column {lost[0]}, as the run.yaml beside it says what that acts on, "
+                       f"found {', '.join(names)}")
+    columns = {name: taken(FORCE if name in pushes else ELEVATION, name, column, file)
+               for name, column in zip(names[1:], table.T[1:], strict=True)}
+    heights = [columns[name] for name in EXCITATION_COLUMNS if name in columns] or [np.zeros(len(table))]
+    return Excitation(
+        even_rate_hz(table[:, 0], file), np.stack(heights, axis=1) if len(heights) > 1 else heights[0].copy(),
+        float(table[0, 0]), np.stack([columns[name] for name in pushes], axis=1) if pushes else None,
+        tuple(known[name] for name in pushes))
+
+
+def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
+    """All columns, where the times come first and each of the others drives a rig, once; else None. BadInput for one in
+    another unit."""
+    if other := [name for name in names[1:] if names[0] == TIME and _OTHER_UNIT.fullmatch(name)]:
+        raise BadInput(f"{file}:1: expected elevations in metres and forces in newtons (elevation_m, force_n), found "
+                       f"{other[0]}: convert its numbers")
+    heights = tuple(name for name in names if not _FORCE.fullmatch(name))
+    fits = heights in (EXCITATION_COLUMNS[:1], EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS)
+    return names if fits and len(set(names)) == len(names) > 1 else None

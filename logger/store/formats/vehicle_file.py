@@ -41,19 +41,21 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.models import GOLDEN_CAR
 from logger.vehicle.named_parameters import changed, names, read, sized
 from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
-from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, OWN_NAMES, Axle, SensorPlace, Vehicle
 
 if TYPE_CHECKING:
     from logger.vehicle.effect import Chosen
 
 
-# What each model needs beyond the keys that all have.
+_CAR_KEYS = ("sprung_mass_kg", "front", "contact_patch_m")
+# What each model needs beyond its name.
 _MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
-    "quarter_car": (),
-    "half_car": ("pitch_inertia_kg_m2", "rear"),
-    "full_car": ("pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
+    "single_mass": tuple(OWN_NAMES["single_mass"]),
+    "quarter_car": _CAR_KEYS,
+    "half_car": (*_CAR_KEYS, "pitch_inertia_kg_m2", "rear"),
+    "full_car": (*_CAR_KEYS, "pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
 }
-_COMMON_KEYS = ("name", "model", "sprung_mass_kg", "front", "contact_patch_m")
+_COMMON_KEYS = ("name", "model")
 _AXLE_KEYS = (
     "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m",
 )
@@ -62,19 +64,26 @@ _FARTHEST_M = 10.0  # no sensor is bolted farther from its car's centre of gravi
 # What a number may be. Most scale with the body, so that they are limited per kilogram of sprung mass: a car, a lorry
 # and the Golden Car, whose numbers are given for 1 kg, fit; the same numbers in g, t, mm, kN/m or kN s/m do not.
 _LIMITS: Mapping[str, tuple[float, float]] = {
-    "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.2, 5.0), "cg_distance_m": (0.0, 20.0),
+    "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.01, 5.0), "cg_distance_m": (0.0, 20.0),
     "contact_patch_m": (0.0, 1.0),
 }
+# What stands on a bench may have any size: masses from a tenth of a gram to a thousand tonnes, which swing at 0.01 Hz
+# to 5 kHz. What is as large as a car, by its tires or its wheelbase, is one.
+_ON_BENCH: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1e-4, 1e6), "mass_kg": (1e-4, 1e6)}
+_ON_BENCH_PER_KG = {"inertia": (1e-9, 1e3), "mass": (1e-6, 1e3), "stiffness": (4e-3, 1e9), "damping": (0.0, 1e6)}
+_CAR_PATCH_M, _CAR_WHEELBASE_M = 0.1, 1.0
 _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
     "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
     "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
     "tire_stiffness_n_per_m": (5.0, 50_000.0), _ANTI_ROLL_KEY: (0.01, 10_000.0),
 }
-_MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
-_SHORTEST_WHEELBASE_M = 0.1
+# 0 stands for none: without a spring a single mass moves freely.
+_MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY, "stiffness_n_per_m", "damping_n_s_per_m")
+_SHORTEST_WHEELBASE_M = 0.01
 # Where a search for an unknown number begins, of a car of the middle class.
-_USUAL = {"sprung_mass_kg": 350.0, "cg_distance_m": 1.35, "track_width_m": 1.5, "contact_patch_m": 0.15,
+_USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5, "contact_patch_m": 0.15,
           _ANTI_ROLL_KEY: 1e4}
+_NUMBERS = {*_LIMITS, *_LIMITS_PER_KG, *(name for own in OWN_NAMES.values() for name in own)}
 _ROUNDING = 1e-12
 _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40
 
@@ -112,7 +121,8 @@ def read_vehicle(path: Path | str) -> Vehicle:
     """Read the file of a plain vehicle. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown
     or wrong, and for a vehicle that has effects.
 
-    A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
+    A single mass has ``mass_kg``, ``stiffness_n_per_m`` and ``damping_n_s_per_m``. A half car needs every key of the
+    format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
     has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
     an axle that has an anti-roll bar, ``anti_roll_stiffness_n_m_per_rad``. Any car may say where its accelerometer
     sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as it makes a difference to its model. Numbers that no car
@@ -181,9 +191,8 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
             keys[name] = replace(one, content=repr(read(vehicle, name)))
         else:
             keys[name] = _plain_number(one, name, known)
-    mass_kg = vehicle.sprung_mass_kg
-    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg)
-              for name, one in keys.items()}
+    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], vehicle.sprung_mass_kg,
+                               _is_car_sized(vehicle)) for name, one in keys.items()}
     for name, value in values.items():
         if not value > 0:
             raise keys[name].wrong("a number above 0")
@@ -222,7 +231,7 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
     def plain(node: Node, part: str = "") -> Node:
         content = dict(node.mapping())
         for key, one in content.items():
-            if key in _LIMITS or key in _LIMITS_PER_KG:
+            if key in _NUMBERS:
                 content[key] = _plain_number(one, part + key, known)
                 unknown.extend([part + key] * _is_unknown(one))
             elif key in ("front", "rear") and isinstance(one.content, Mapping):
@@ -243,9 +252,10 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
     found = plain(top)
     if not unknown:
         return found, known
-    mass_kg = _usual_number("sprung_mass_kg", 1.0)
-    if "sprung_mass_kg" in found.mapping() and "sprung_mass_kg" not in unknown:
-        mass_kg = found.mapping()["sprung_mass_kg"].number(above=0.0)
+    mass = "mass_kg" if "mass_kg" in found.mapping() else "sprung_mass_kg"
+    mass_kg = _usual_number(mass, 1.0)
+    if mass in found.mapping() and mass not in unknown:
+        mass_kg = found.mapping()[mass].number(above=0.0)
     return filled(found), known
 
 
@@ -255,7 +265,8 @@ def _usual_number(key: str, sprung_mass_kg: float) -> float:
         return _USUAL[key]
     if key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2"):  # dynamic index 1; a body as wide as its track
         return sprung_mass_kg * (_USUAL["cg_distance_m"]**2 if key[0] == "p" else _USUAL["track_width_m"]**2 / 12)
-    return float(f"{sprung_mass_kg * getattr(GOLDEN_CAR.front, key):.6g}")
+    own = OWN_NAMES["single_mass"].get(key, key).rpartition(".")[2]
+    return float(f"{sprung_mass_kg * getattr(GOLDEN_CAR.front, own):.6g}")
 
 
 def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Known]]:
@@ -267,22 +278,29 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
     model = model_node.choice(*_MODEL_KEYS)
     keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=(
         "sensor", "effects", "standard_errors", "correlations", "given", "history"))
-    mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
-    front = _read_axle(keys["front"], model, mass_kg)
-    rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
+    name = _name_of(keys["name"])
+    if model in OWN_NAMES:
+        mass_kg = _number_of(keys, "mass_kg", 1.0, False)
+        rest = {key: _number_of(keys, key, mass_kg, False) for key in _MODEL_KEYS[model][1:]}
+        bench = Vehicle(name, model, mass_kg, None, Axle(0.0, 0.0, 0.0, 0.0, 0.0), None, 0.0)
+        return changed(bench, rest), keys, known
+    is_car = _looks_car_sized(keys)
+    mass_kg = _number_of(keys, "sprung_mass_kg", 1.0, is_car)
+    front = _read_axle(keys["front"], model, mass_kg, is_car)
+    rear = _read_axle(keys["rear"], model, mass_kg, is_car) if "rear" in keys else None
     if rear is not None and front.cg_distance_m + rear.cg_distance_m < _SHORTEST_WHEELBASE_M:
         distance = keys["rear"].mapping()["cg_distance_m"]
         raise distance.wrong(f"axles at least {_SHORTEST_WHEELBASE_M:g} m apart")
-    body = {key: _number_of(keys, key, mass_kg)
+    body = {key: _number_of(keys, key, mass_kg, is_car)
             for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
     vehicle = Vehicle(
-        name=_name_of(keys["name"]),
+        name=name,
         model=model,
         sprung_mass_kg=mass_kg,
         pitch_inertia_kg_m2=body.get("pitch_inertia_kg_m2"),
         front=front,
         rear=rear,
-        contact_patch_m=_number_of(keys, "contact_patch_m", mass_kg),
+        contact_patch_m=_number_of(keys, "contact_patch_m", mass_kg, is_car),
         roll_inertia_kg_m2=body.get("roll_inertia_kg_m2"),
         track_width_m=body.get("track_width_m"),
         sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
@@ -298,14 +316,29 @@ def _name_of(node: Node) -> str:
     return name
 
 
-def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> float:
-    """The number of a key, within its limits."""
+def _looks_car_sized(keys: Mapping[str, Node]) -> bool:
+    """``_is_car_sized`` of keys, none of which may be right."""
+    places = [keys[axle].mapping().get("cg_distance_m") for axle in ("front", "rear") if axle in keys]
+    wheelbase_m = sum(one.number() for one in places if one is not None)
+    return wheelbase_m >= _CAR_WHEELBASE_M or keys["contact_patch_m"].number() >= _CAR_PATCH_M
+
+
+def _is_car_sized(vehicle: Vehicle) -> bool:
+    """Whether its tires or its wheelbase are those of a car."""
+    wheelbase_m = 0.0 if vehicle.rear is None else vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
+    return wheelbase_m >= _CAR_WHEELBASE_M or vehicle.contact_patch_m >= _CAR_PATCH_M
+
+
+def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car: bool) -> float:
+    """The number of a key, within its limits: those of cars, or of anything on a bench."""
     node = keys[key]
-    if key in _LIMITS:
-        low, high = _LIMITS[key]
+    limits = _LIMITS if is_car else {**_LIMITS, **_ON_BENCH}
+    if key in limits:
+        low, high = limits[key]
         return node.number(low=low, high=high)
     value = node.number(low=0)
-    low, high = (limit * sprung_mass_kg for limit in _LIMITS_PER_KG[key])
+    per_kg = _LIMITS_PER_KG[key] if is_car else next(one for word, one in _ON_BENCH_PER_KG.items() if word in key)
+    low, high = (limit * sprung_mass_kg for limit in per_kg)
     none = key in _MAY_BE_MISSING
     if low * (1 - _ROUNDING) <= value <= high * (1 + _ROUNDING) or (none and value == 0):
         return value
@@ -313,12 +346,12 @@ def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> flo
                      "springs")
 
 
-def _read_axle(node: Node, model: str, sprung_mass_kg: float) -> Axle:
+def _read_axle(node: Node, model: str, sprung_mass_kg: float, is_car: bool) -> Axle:
     keys = node.mapping(
         required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
         optional=(_ANTI_ROLL_KEY,) if model == "full_car" else (),
     )
-    return Axle(**{"cg_distance_m": 0.0} | {key: _number_of(keys, key, sprung_mass_kg) for key in keys})
+    return Axle(**{"cg_distance_m": 0.0} | {key: _number_of(keys, key, sprung_mass_kg, is_car) for key in keys})
 
 
 def _read_sensor(node: Node, model: str) -> SensorPlace:
@@ -406,6 +439,8 @@ _Dumper.add_representer(
 
 def _vehicle_keys(vehicle: Vehicle) -> dict[str, Any]:
     keys: dict[str, Any] = {"name": vehicle.name, "model": vehicle.model}
+    if vehicle.model in OWN_NAMES:
+        return {**keys, **{name: _number(read(vehicle, name)) for name in OWN_NAMES[vehicle.model]}}
     for key in ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m"):
         value = getattr(vehicle, key)
         if value is not None:

@@ -32,6 +32,7 @@ class BodyBending(BodyEffect):
                   "whether the ends of the suspensions move with the mode (1), or the sensor alone (0)",
                   choices=(0.0, 1.0), default=0.0),
     )
+    needs_wheel = True
     source = "T. D. Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 5; modal superposition"
     signature = "a narrow peak above wheel hop that follows the forces of the suspensions, with a dip beside it"
     shown_by = "drive a rough road at two speeds: the peak keeps its frequency and grows with the road"

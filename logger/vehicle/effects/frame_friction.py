@@ -29,6 +29,7 @@ class FrameFriction(ForceEffect):
                   "speed at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
                   step=0.0003),
     )
+    needs_wheel = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
     signature = "small motions of wheel and body die away at once, also those in which the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"

@@ -21,6 +21,7 @@ class Roll(VehicleEffect):
         Parameter("roll_inertia_kg_m2", 500.0, 20.0, 20000.0, None, Scale.LOG, (500.0,),
                   "of the whole body, about its length"),
     )
+    needs_wheel = True
     source = "the full car of the models; 4.1 of Blum 2015 leaves it out"
     signature = "much of the motion has nothing to do with the left track, the more the shorter the waves are"
     shown_by = "measure both tracks, and drive with the sensor away from the middle as well"

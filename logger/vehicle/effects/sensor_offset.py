@@ -19,6 +19,7 @@ class SensorOffset(VehicleEffect):
         Parameter("offset_m", 0.3, -3.0, 3.0, 0.0, Scale.LINEAR, (-0.3, 0.3),
                   "from the centre of gravity, ahead positive, behind negative"),
     )
+    needs_wheel = True
     source = "rigid-body kinematics; the sensitivities of 4.4 of Blum 2015 are for a sensor at the centre of gravity"
     signature = "pitch is heard: more motion where front and rear move against each other"
     shown_by = "drive one bump at two speeds: the blows of the front and of the rear axle come out of proportion"

@@ -20,6 +20,7 @@ class TireDamping(ForceEffect):
         Parameter("tire_damping_n_s_per_m", 150.0, 0.0, 3000.0, 0.0, Scale.LINEAR, (60.0, 300.0),
                   "of each tire, beside its stiffness"),
     )
+    needs_wheel = True
     source = "J. Y. Wong, Theory of Ground Vehicles (2008), chapter 7: tire damping 50 to several hundred N s/m"
     signature = "wheel hop is weaker than in the model, and what lies above it stronger; nothing changes below 5 Hz"
     shown_by = "drive a rough, patched road at 15 to 25 m/s, where the wheels hop"

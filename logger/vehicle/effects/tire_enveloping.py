@@ -19,6 +19,7 @@ class TireEnveloping(VehicleEffect):
         Parameter("contact_patch_m", 0.25, 0.0, 1.0, None, Scale.LINEAR, (0.03, 0.08, 0.14, 0.2, 0.28, 0.36, 0.5),
                   "over which a tire averages the road"),
     )
+    needs_wheel = True
     source = "M. W. Sayers, S. M. Karamihas, The Little Book of Profiling (1998): a moving average of 0.25 m"
     signature = "at slow speed short waves are weaker, or stronger, than the model says; at high speed nothing changes"
     shown_by = "drive a rough road slowly, at 4 to 8 m/s"

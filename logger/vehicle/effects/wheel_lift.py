@@ -15,6 +15,7 @@ from logger.vehicle.laws import CornerLaws
 class WheelLift(ForceEffect):
     name = "wheel_lift"
     title = "a tire cannot pull: contact is lost when its force reaches zero"
+    needs_wheel = True
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on wheel loads"
     signature = "after hard edges the wheel comes down late; the body falls freely meanwhile"
     shown_by = "drive over a sharp bump or a rough road so fast that a wheel leaves the ground"

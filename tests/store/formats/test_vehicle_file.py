@@ -125,6 +125,10 @@ def cars(draw: st.DrawFn) -> Vehicle:
 
 def as_its_model_knows_it(car: Vehicle) -> Vehicle:
     """Leave out what a quarter or a half car cannot have, and give the axles what only the others have."""
+    if car.model == "single_mass":
+        front = replace(car.front, unsprung_mass_kg=0.0, tire_stiffness_n_per_m=0.0)
+        return replace(car, front=front, pitch_inertia_kg_m2=None, rear=None, roll_inertia_kg_m2=None,
+                       track_width_m=None, contact_patch_m=0.0, sensor=SensorPlace())
     if car.model == "quarter_car":
         return replace(car, pitch_inertia_kg_m2=None, rear=None, roll_inertia_kg_m2=None, track_width_m=None,
                        sensor=SensorPlace())
@@ -177,7 +181,7 @@ def test_a_shipped_vehicle_names_itself_its_sources_and_its_frequencies(name: st
     ("sprung_mass_kg: 875", "sprung_mass_kg: [875]", "sprung_mass_kg", "found a list"),
     ("sprung_mass_kg: 875", "sprung_mas_kg: 875", "sprung_mas_kg", "expected one of the keys"),
     ("sprung_mass_kg: 875", "name: again", "name: again", "each key once"),
-    ("model: half_car", "model: tank", "model", "expected one of quarter_car, half_car, full_car, found 'tank'"),
+    ("model: half_car", "model: tank", "model", "expected one of single_mass, quarter_car, half_car, full_car, found"),
     ("model: half_car", "model: {a: 1}", "model", "found a mapping"),
     ("contact_patch_m: 0.25", "contact_patch_m: 25", "contact_patch_m", "from 0 to 1"),
     ("effects: []", "track_width_m: 1.5", "track_width_m", "expected one of the keys"),
@@ -245,7 +249,7 @@ def test_numbers_that_no_car_has(tmp_path: Path, key: str, values: tuple[str, ..
 def test_both_axles_at_the_centre_of_gravity_are_no_car(tmp_path: Path) -> None:
     text = TEXT.replace("cg_distance_m: 1.47", "cg_distance_m: 0")
     at = max(number for number, line in enumerate(text.splitlines(), 1) if "cg_distance_m" in line)
-    assert complaint(tmp_path, text) == f"{at}: expected axles at least 0.1 m apart, found '0' for 'cg_distance_m'"
+    assert complaint(tmp_path, text) == f"{at}: expected axles at least 0.01 m apart, found '0' for 'cg_distance_m'"
 
 
 def test_missing_keys_are_named_with_the_place_they_belong(tmp_path: Path) -> None:
