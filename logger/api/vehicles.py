@@ -15,7 +15,9 @@ from logger.shipped import vehicle_names, vehicle_path
 from logger.store.formats import effect_file, vehicle_file
 from logger.vehicle.compose import Car, compose, with_effect
 from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, names, read
+from logger.vehicle.structure import force_row
 from logger.vehicle.vehicle import Vehicle
 
 
@@ -170,6 +172,15 @@ def effects() -> Effects:
     """
     return Effects({name: EffectInfo(name, one.title, {p.name: p.meaning for p in one.parameters}, one.signature,
                                      one.shown_by, one.source) for name, one in effect_file.shipped_effects().items()})
+
+
+def check_forces(vehicle: Vehicle, track: Track | Excitation, said: str) -> None:
+    """BadInput where a force, ``said`` in this file, acts on a part that the vehicle does not have."""
+    for one in track.forces if isinstance(track, Excitation) else ():
+        try:
+            force_row(structure_of(vehicle), one.parts)
+        except ValueError as error:
+            raise BadInput(f"{said}: {one.name}: {error}") from None
 
 
 def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str],

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __doc__ = options.help_of(SimulateQuestion)
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
-OUTPUTS = ("wheels", "travel", "tires", "body")
+OUTPUTS = ("wheels", "travel", "tires", "displacement", "velocity", "body")
 
 
 USAGE = """ridelog simulate --vehicle NAME|FILE (--profile FILE | --flat M | --excitation FILE)
@@ -57,16 +57,18 @@ def _simulate(question: SimulateCommand, args: argparse.Namespace) -> None:
     import numpy as np
 
     from logger.api.drives import Run
-    from logger.api.vehicles import car_on
+    from logger.api.vehicles import car_on, check_forces
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
-    from logger.store.formats.drive_file import COLUMNS, TIME, write_drive, write_profile
+    from logger.store.formats.drive_file import COLUMNS, RUN, TIME, write_drive, write_profile
 
     pictures, drives = parted(args.out or [])
     _check_given(question, drives)
     _check_files(question, args)
     vehicle, effects, said = _model(str(question.vehicle), question.effects)
     track = _road(question) if question.excitation is None else _rig(question.excitation)
+    if question.excitation is not None:
+        check_forces(vehicle, track, str(question.excitation.parent / RUN))
     car = car_on(vehicle, effects, said, track)
     outputs = _outputs(question.outputs, car.vehicle, car.structure)
     motion = _motion(question, track, float(car.structure.behind_m.max()))
@@ -170,7 +172,15 @@ def _outputs(wanted: Sequence[str], vehicle: Vehicle, structure: Structure) -> d
             "tires": ("tire_{}_m", tire_deflection)}
     for text in wanted:
         name, place = named_numbers(text, "--output")
-        if name in each and not place:
+        if name in ("displacement", "velocity") and not place:
+            order = ("displacement", "velocity").index(name)
+            found[("displacement_m", "velocity_mps")[order]] = body_point(
+                structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m, order)
+        elif structure.on_base and text == "travel":
+            found["travel_m"] = suspension_travel(structure, 0)
+        elif structure.on_base and name in each:
+            raise BadInput(f"--output {text}: expected displacement, velocity or travel of a single mass")
+        elif name in each and not place:
             column, output = each[name]
             found |= {column.format(side): output(structure, index)
                       for index, side in enumerate(WHEELS[len(structure.wheels)])}

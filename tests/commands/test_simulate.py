@@ -153,7 +153,7 @@ def refusal(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> str:
     (("--speed", "20", "--noise", "-1"), "--noise -1: expected 0 to 100 m/s2"),
     (("--speed", "20", "--step", "inf"), "--step inf: expected 0 to 100 m/s2"),
     (("--speed", "20", "--seed", "-1"), "--seed -1: expected 0 or more"),
-    (("--speed", "20", "--output", "wheel"), "--output wheel: expected one of wheels, travel, tires, body:ahead_m=X"),
+    (("--speed", "20", "--output", "wheel"), "--output wheel: expected one of wheels, travel, tires, displacement"),
     (("--speed", "20", "--output", "body:up_m=1"), "--output body:up_m=1: expected one of"),
     (("--speed", "20", "--output", "body:left_m=1"), "--output body:left_m=1: this body does not roll"),
     (("--speed", "20", "--output", "body:ahead_m=x"), "--output body:ahead_m=x: expected PARAM=NUMBER, found 'ahead"),

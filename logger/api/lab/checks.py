@@ -167,8 +167,8 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
     for k, ((run, _), around) in enumerate(zip(followed.pairs, followed.around, strict=True)):
         if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
-            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: turned over, they go "
-                   f"with the model (correlation {around.turned:.2f})")
+            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: turned over, they "
+                   f"go with the model (correlation {around.turned:.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
@@ -268,9 +268,10 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
 
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
+    from logger.api.vehicles import check_forces
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
-    from logger.store.formats.drive_file import DRIVE
+    from logger.store.formats.drive_file import DRIVE, RUN
 
     for number, drive in enumerate(drives):
         file = drive.path / DRIVE if drive.path.is_dir() else drive.path
@@ -282,6 +283,8 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
         check_record(drive, file, drives[:number], vehicle)
         if not drive.track.timed:
             check_distances(drive, file)
+        if vehicle is not None:
+            check_forces(vehicle, drive.track, str(drive.path / RUN))
     runs = [run for one in drives for run in driven_stretches(one)]
     kept = thinned_runs(runs, vehicle) if thin else runs
     return SimulatedRuns(kept) if vehicle is None else SimulatedRuns(kept, steps_hz(vehicle))

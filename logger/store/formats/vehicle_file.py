@@ -81,8 +81,8 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY, "stiffness_n_per_m", "damping_n_s_per_m")
 _SHORTEST_WHEELBASE_M = 0.01
 # Where a search for an unknown number begins, of a car of the middle class.
-_USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5, "contact_patch_m": 0.15,
-          _ANTI_ROLL_KEY: 1e4}
+_USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5,
+          "contact_patch_m": 0.15, _ANTI_ROLL_KEY: 1e4}
 _NUMBERS = {*_LIMITS, *_LIMITS_PER_KG, *(name for own in OWN_NAMES.values() for name in own)}
 _ROUNDING = 1e-12
 _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40

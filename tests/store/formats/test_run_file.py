@@ -54,9 +54,6 @@ def test_a_folder_without_it_says_nothing(tmp_path: Path) -> None:
     ("signals:\n  a_mps2: {of: body}\n", ":2: expected the key 'measures' here, it is missing"),
     ("signals:\n  a_mm: {measures: travel, of: front_suspension}\n", ":2: expected .* whose name ends in _m, its unit"),
     ("signals:\n  a_m: {measures: travel, of: front_wheel}\n", ":2: expected one of suspension, front_suspension"),
-    ("forces:\n  force_n: {}\n", ":2: expected on: a part, or between: two parts"),
-    ("forces:\n  force_n: {on: base}\n", ":2: expected one of body, wheel, front_wheel"),
-    ("forces:\n  force_n: {between: [ground, body]}\n", ":2: expected two parts, as .body, wheel., the ground or"),
     ("sensor: {kind: watch}\n", ":1: expected one of accelerometer, encoder"),
     ("signals:\n  w_mps2: {measures: acceleration, of: front_wheel, ahead_m: 1}\n", ":2: expected no place"),
 ])

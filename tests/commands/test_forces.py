@@ -1,0 +1,184 @@
+"""Rigs that forces drive, and single masses, through the commands: the motion is that of an integrator of scipy's,
+which shares nothing with ridelog."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+import ridelog
+from logger.commands.main import main
+from logger.errors import BadInput
+
+Array = npt.NDArray[np.float64]
+RATE_HZ = 250.0
+TIME_S = np.arange(0, 12, 1 / RATE_HZ)
+
+
+def noise(highest_hz: float, size: float, seed: int) -> CubicSpline:
+    """Low-passed noise of an r.m.s. ``size``, which begins and ends at rest."""
+    drawn = np.random.default_rng(seed).standard_normal(len(TIME_S))
+    slow = sosfiltfilt(butter(4, highest_hz, fs=RATE_HZ, output="sos"), drawn)
+    return CubicSpline(TIME_S, size * slow / slow.std() * np.minimum(1.0, np.minimum(TIME_S, TIME_S[::-1])) ** 2)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further force by its travel."""
+
+    mass: float = 0.3
+    spring: float = 30.0
+    damper: float = 0.4
+    cubic: float = 0.0
+    wheel: float = 0.0
+    tire: float = 0.0
+
+    @property
+    def yaml(self) -> str:
+        if not self.wheel:
+            return (f"name: bench\nmodel: single_mass\nmass_kg: {self.mass}\nstiffness_n_per_m: {self.spring}\n"
+                    f"damping_n_s_per_m: {self.damper}\n")
+        return (f"name: bench\nmodel: quarter_car\nsprung_mass_kg: {self.mass}\nfront:\n"
+                f"  unsprung_mass_kg: {self.wheel}\n  suspension_stiffness_n_per_m: {self.spring}\n"
+                f"  suspension_damping_n_s_per_m: {self.damper}\n"
+                f"  tire_stiffness_n_per_m: {self.tire}\ncontact_patch_m: 0\n")
+
+    def moved(self, base: CubicSpline, on_body: Callable[[Array], Array], on_wheel: Callable[[Array], Array]
+              ) -> Mapping[str, Array]:
+        """What its sensors measure when forces push its parts up."""
+        def accelerations(t: Array, y: Array) -> Array:
+            body_m, wheel_m, body_mps, wheel_mps = y
+            if not self.wheel:
+                wheel_m, wheel_mps = base(t), base(t, 1)
+            travel_m, rate_mps = body_m - wheel_m, body_mps - wheel_mps
+            force = self.spring * travel_m + self.damper * rate_mps + self.cubic * travel_m**3
+            wheel = (force - self.tire * (wheel_m - base(t)) + on_wheel(t)) / (self.wheel or 1.0)
+            return np.stack([(on_body(t) - force) / self.mass, wheel * (self.wheel > 0)])
+
+        y = solve_ivp(lambda t, y: np.concatenate([y[2:], accelerations(t, y)]), (0, TIME_S[-1]), [0.0] * 4,
+                      t_eval=TIME_S, rtol=1e-8, atol=1e-11, max_step=0.004).y
+        wheel_m, wheel_mps = (y[1], y[3]) if self.wheel else (base(TIME_S), base(TIME_S, 1))
+        return {"accel_z_mps2": accelerations(TIME_S, y)[0], "displacement_m": y[0], "velocity_mps": y[2],
+                "travel_m": y[0] - wheel_m, "wheel_m": wheel_m, "rate_mps": y[2] - wheel_mps}
+
+
+def written(folder: Path, columns: Mapping[str, Array], driving: Mapping[str, Array], said: str) -> Path:
+    folder.mkdir()
+    for name, table in (("drive.csv", columns), ("excitation.csv", driving)):
+        np.savetxt(folder / name, np.stack([TIME_S, *table.values()], axis=1), "%.12g", ",",
+                   header=",".join(["t_s", *table]), comments="")
+    (folder / "run.yaml").write_text(said)
+    return folder
+
+
+NOTHING = CubicSpline(TIME_S, np.zeros(len(TIME_S)))
+BODY = "forces: {force_n: {on: body}}\n"
+
+
+@pytest.mark.parametrize("bench", [Bench(), Bench(60e3, 6e6, 5e4), Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0)])
+def test_every_signal_of_a_rig_on_a_shaken_base_under_forces_is_exact(
+        bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    base, push = noise(15.0, 0.003, 1), noise(20.0, bench.spring / 100, 2)
+    apart = noise(20.0, bench.spring / 200, 3) if bench.wheel else NOTHING
+    seen = bench.moved(base, lambda t: push(t) + apart(t), lambda t: -apart(t))
+    driving = {"elevation_m": base(TIME_S), "force_n": push(TIME_S)}
+    said = "forces:\n  force_n: {on: body}\n"
+    if bench.wheel:
+        driving["force_damper_n"] = apart(TIME_S)
+        said += "  force_damper_n: {between: [body, wheel]}\n"
+    said += "signals: {rate_mps: {measures: velocity, of: suspension}}\n"
+    names = ("accel_z_mps2", "displacement_m", "velocity_mps", "travel_m", "rate_mps")
+    run = written(tmp_path / "run", {name: seen[name] for name in names}, driving, said)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["error"] < 1e-3
+    assert set(found["signals"]) == {*names[1:]}
+    assert max(found["signals"].values()) < 1e-3
+    for name in names[1:]:  # any of them may be all that was measured
+        alone = written(tmp_path / name, {name: seen[name]}, driving,
+                        said if name == "rate_mps" else said.partition("signals")[0])
+        assert ridelog.compare(tmp_path / "bench.yaml", [alone]).error < 1e-3, name
+
+
+def test_a_step_of_force_on_a_free_axis_is_what_the_textbook_says(tmp_path: Path) -> None:
+    """From rest at 0: v = F / c (1 - exp(-c t / m))."""
+    (tmp_path / "axis.yaml").write_text(Bench(95.0, 0.0, 200.0).yaml)
+    run = written(tmp_path / "run", {"velocity_mps": TIME_S}, {"force_n": np.full(len(TIME_S), 30.0)}, BODY)
+    assert main(["simulate", "--vehicle", str(tmp_path / "axis.yaml"), "--excitation", str(run / "excitation.csv"),
+                 "--rate", "250", "--output", "velocity", "--output", "displacement", "--out",
+                 str(run / "drive.csv")]) == 0
+    drive = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
+    speed_mps = 30.0 / 200.0 * (1 - np.exp(-200.0 / 95.0 * TIME_S))
+    inside = slice(100, -100)
+    assert drive["velocity_mps"][inside] == pytest.approx(speed_mps[inside], rel=1e-6)
+    way_m = 30.0 / 200.0 * TIME_S - 95.0 / 200.0 * speed_mps
+    assert drive["displacement_m"][inside] == pytest.approx(way_m[inside], rel=1e-5)
+
+
+def test_a_hardening_spring_under_a_force_is_what_the_integrator_says(tmp_path: Path) -> None:
+    bench = Bench(0.3, 2000.0, 4.0, 2e6)
+    push = noise(15.0, 8.0, 4)
+    seen = bench.moved(NOTHING, push, NOTHING)
+    text = bench.yaml + "effects:\n- {name: progressive_spring, cubic_stiffness_n_per_m3: 2e6}\n"
+    (tmp_path / "bench.yaml").write_text(text)
+    run = written(tmp_path / "run", {"displacement_m": seen["displacement_m"]}, {"force_n": push(TIME_S)}, BODY)
+    assert ridelog.compare(tmp_path / "bench.yaml", [run]).error < 0.01
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
+
+
+def test_a_run_with_forces_is_written_as_it_was_read(tmp_path: Path) -> None:
+    said = "forces: {force_n: {on: body}}\nsignals: {place_m: {measures: displacement, kind: encoder}}\n"
+    run = written(tmp_path / "run", {"place_m": np.sin(TIME_S)}, {"force_n": np.cos(TIME_S)}, said)
+    ridelog.write_run(tmp_path / "again", first := ridelog.read_run(run))
+    again = ridelog.read_run(tmp_path / "again")
+    assert first.facts == again.facts
+    assert (again.facts.main.name, again.facts.main.kind) == ("place_m", "encoder")
+    assert again.excitation is not None
+    assert again.excitation.forces == first.excitation.forces
+    assert again.excitation.force_n == pytest.approx(np.cos(TIME_S)[:, None], abs=1e-9)
+    assert (tmp_path / "again" / "excitation.csv").read_text().startswith("t_s,force_n\n")
+
+
+@pytest.mark.parametrize(("header", "said", "complaint"), [
+    ("t_s,force_n", None, "excitation.csv:1: expected a run.yaml beside it that says what force_n acts on"),
+    ("t_s,force_n", "source: me\n", "excitation.csv:1: expected a run.yaml .* what force_n acts on"),
+    ("t_s,elevation_m", BODY, "excitation.csv:1: expected a column force_n, as the run.yaml beside it says"),
+    ("t_s,force_kN", BODY, "excitation.csv:1: expected .* forces in newtons .* found force_kN"),
+    ("t_s,force_front_lbf", BODY, "excitation.csv:1: expected .* forces in newtons .* found force_front_lbf"),
+    ("t_s,elevation_mm", BODY, "excitation.csv:1: expected elevations in metres"),
+    ("t_s,force", BODY, "excitation.csv:1: expected the header t_s,elevation_m"),
+    ("t_s,force_n", "forces: {force_n: {on: front_wheel}}\n", "run.yaml: force_n: this vehicle has no front wheel"),
+    ("t_s,force_n", "forces: {force_n: {on: base}}\n", "run.yaml:1: expected one of body, wheel"),
+    ("t_s,force_n", "forces: {force_n: body}\n", "run.yaml:1: expected a mapping"),
+    ("t_s,force_n", "forces: {force_n: {}}\n", "run.yaml:1: expected on: a part, or between: two parts"),
+    ("t_s,force_n", "forces: {force_n: {between: [ground, body]}}\n", "run.yaml:1: expected two parts, as .body, wh"),
+])
+def test_forces_that_cannot_be_are_refused_in_one_line(tmp_path: Path, header: str, said: str | None, complaint: str
+                                                       ) -> None:
+    run = written(tmp_path / "run", {"accel_z_mps2": np.sin(TIME_S)}, {"force_n": np.sin(TIME_S)}, said or "")
+    if said is None:
+        (run / "run.yaml").unlink()
+    text = (run / "excitation.csv").read_text()
+    (run / "excitation.csv").write_text(text.replace("t_s,force_n", header))
+    (tmp_path / "bench.yaml").write_text(Bench().yaml)
+    with pytest.raises(BadInput, match=complaint):
+        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
+def test_columns_of_different_length_are_refused(tmp_path: Path) -> None:
+    run = written(tmp_path / "run", {"accel_z_mps2": np.sin(TIME_S)}, {"elevation_m": np.sin(TIME_S),
+                                                                      "force_n": np.sin(TIME_S)}, BODY)
+    lines = (run / "excitation.csv").read_text().splitlines()
+    (run / "excitation.csv").write_text("\n".join([*lines[:-1], lines[-1].rpartition(",")[0]]) + "\n")
+    (tmp_path / "bench.yaml").write_text(Bench().yaml)
+    with pytest.raises(BadInput, match=f"excitation.csv:{len(lines)}: expected"):
+        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
