@@ -5,8 +5,9 @@
 
 Runs the trials of each fault (``tests/support``; the tests run a few of each), prints goals, and writes the table
 ``docs/reference/trials.md``; exit 1 when a promise was broken. ``--quick`` takes a few cases of each fault, leaves the
-long day out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py``
-and ``soak.py``. With ``--fuzzed`` nothing is tried: the table that is there gets the counts of a long run of ``fuzz.py --record FILE``.
+long day out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py`` and
+``soak.py``. With ``--fuzzed`` nothing is tried: the table that is there gets the counts of a long run of ``fuzz.py
+--record FILE``.
 """
 
 from __future__ import annotations
