@@ -11,6 +11,7 @@ from logger.exchange.format import formats
 from logger.store.log.row_format import COLUMN_MEANINGS, COLUMNS
 
 from .support import reference
+from .support.words import LONGEST_SENTENCE, MOST_OF_A_PAGE, MOST_WORDS, is_made, pages, sentences, words
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -53,3 +54,15 @@ def test_a_page_of_the_reference_is_what_the_program_declares(name: str) -> None
 
 def test_each_column_of_a_log_is_explained() -> None:
     assert list(COLUMN_MEANINGS) == [*(one.name for one in COLUMNS), "crc32"]
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_a_page_and_its_sentences_are_short(page: Path) -> None:
+    text = page.read_text("utf-8")
+    assert words(text) <= MOST_OF_A_PAGE
+    assert [one for one in sentences(text) if words(one) > LONGEST_SENTENCE] == []
+
+
+def test_all_pages_together_are_short() -> None:
+    texts = [page.read_text("utf-8") for page in pages()]
+    assert sum(words(text) for text in texts if not is_made(text)) < MOST_WORDS

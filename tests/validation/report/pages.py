@@ -90,9 +90,9 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("Wrong numbers", ["Verdicts that hold all effects, with an error or a number that is not as near as it "
                                "should be."], _wrong_numbers(records)),
         Part("What nobody could see", [
-            "In these cases the car's own numbers and the distance, each within what it may be off by, can do all that "
-            "the weakest effect does but for less than 1 % of the error, as the examiner's own simulator has it. They "
-            "count in all figures above as they came out. Distances that wander may hide more."], _unseen(records)),
+            "In these cases the car's own numbers and the distance can do what the weakest effect does, each within "
+            "what it may be off by. By the examiner's simulator, less than 1 % of the error remains. They count in all "
+            "figures above as they came out. Distances that wander may hide more."], _unseen(records)),
     ]
 
 
@@ -103,13 +103,13 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
     seeds = [record["seed"] for record in records]
     release = all(seed in RELEASE_SEEDS for seed in seeds)
     which = "no run of the lab's development has used them" if release else "the lab may have been tuned to them"
-    lines = [f"{len(records)} random cases ({counts}; {'release' if release else 'development'} seeds {min(seeds)} to "
-             f"{max(seeds)}: {which}) made by a simulator that shares nothing with ridelog: other equations, another "
-             "integrator, roads, cars, speeds and noise of its own, the car's file off by up to 4 %, "
-             "distances right to two centimetres but where they wander: there "
-             f"they are integrals of a speed that is wrong by {WRONG_MPS[0]:g} to {WRONG_MPS[1]:g} m/s for "
-             f"{WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s on end. Each was put before `ridelog diagnose`, and what "
-             f"that named was added by `ridelog add-effect`. Made by `{COMMAND}{' --release' if release else ''}`."]
+    lines = [f"{len(records)} random cases: {counts}. They have {'release' if release else 'development'} seeds "
+             f"{min(seeds)} to {max(seeds)}: {which}. A simulator made them that shares nothing with ridelog: other "
+             "equations and another integrator, with roads, cars, speeds and noise of its own. The car's file is off "
+             "by up to 4 %, distances by two centimetres. Where distances wander, they are integrals of a speed that "
+             f"is wrong by {WRONG_MPS[0]:g} to {WRONG_MPS[1]:g} m/s for {WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s. "
+             "Each was put before `ridelog diagnose`, and what that named was added by `ridelog add-effect`. "
+             f"Made by `{COMMAND}{' --release' if release else ''}`."]
     if len(records) < asked:
         lines.append(f"The examination is not over: {len(records)} of {asked} cases sat.")
     if (programs := len({record["source"] for record in records})) > 1:
@@ -175,10 +175,10 @@ def _cost(records: Sequence[Record]) -> list[str]:
     if not costs:
         return ["No case had four runs of 60 s."]
     wall, cpu = ([cost[key] for cost in costs] for key in ("wall_s", "cpu_s"))
-    lines = [f"A diagnosis of four runs of 60 s ({len(costs)} cases, with whatever else the machine was doing; the "
-             f"examination itself runs several at a time): median {median(wall):.0f} s, longest {max(wall):.0f} s by "
-             f"the clock; median {median(cpu):.0f} s, most {max(cpu):.0f} s of processor time. Goal: below "
-             f"{_LONGEST_S:.0f} s on two cores; {sum(one < _LONGEST_S for one in wall)} of {len(wall)} were."]
+    lines = [f"A diagnosis of four runs of 60 s ({len(costs)} cases, on a machine that did other work): "
+             f"median {median(wall):.0f} s, longest {max(wall):.0f} s by the clock; median {median(cpu):.0f} s, most "
+             f"{max(cpu):.0f} s of processor time. Goal: below {_LONGEST_S:.0f} s on two cores; "
+             f"{sum(one < _LONGEST_S for one in wall)} of {len(wall)} were."]
     memory = [cost["peak_mb"] for cost in costs if "peak_mb" in cost]
     if memory:
         lines.append(f"Memory: at most {max(memory):.0f} MB. Goal: below {_MOST_MB:.0f} MB.")
@@ -272,7 +272,7 @@ class Matrix:
 
 _MATRIX_LINES = (
     "Cases that hid one thing, or nothing, and whose distance is right: what was hidden (rows) and what was said "
-    "first (columns; a case off the list counts as unexplained where that was said, whatever else was). *Confused*: "
+    "first (columns). A case off the list counts as unexplained where that was said, whatever else was. *Confused*: "
     "so many of the row named another first and the right one as not distinguishable from it, which counts as right.",)
 
 
