@@ -66,3 +66,14 @@ def test_a_page_and_its_sentences_are_short(page: Path) -> None:
 def test_all_pages_together_are_short() -> None:
     texts = [page.read_text("utf-8") for page in pages()]
     assert sum(words(text) for text in texts if not is_made(text)) < MOST_WORDS
+
+
+def test_words_that_the_glossary_replaces_are_in_no_document_and_no_help() -> None:
+    """The reference holds all helps, effects and advice."""
+    glossary = ROOT / "docs" / "glossary.md"
+    rows = glossary.read_text("utf-8").partition("## Words that ridelog does not use")[2]
+    replaced = re.findall(r"^\| [^|]+ \| ([a-z' ]+) \|$", rows, re.MULTILINE)[1:]
+    assert len(replaced) >= 6
+    for page in PAGES:
+        text = " ".join(page.read_text("utf-8").lower().split())
+        assert page == glossary or [word for word in replaced if word in text] == [], page.name

@@ -453,7 +453,7 @@ class IriQuestion(ProfileQuestion):
       ridelog iri road.csv --localized 2.5 --out iri.html
 
     PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]) or ERD, evenly spaced by 300 mm or less and at least
-    11 m long. With two wheel tracks: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
+    11 m long. With two wheelpaths: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
 
     In Python: raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
 
@@ -526,7 +526,7 @@ class RandomRoadQuestion(Question):
       begins at                             0  m
       spacing                            0.05  m
       samples                             401
-      wheel tracks                          1
+      wheelpaths                            1
       elevation, standard deviation  0.005887  m
     """
 

@@ -470,7 +470,7 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
         return [*shown, f"No IRI: {_unanswered(summary) or 'not one whole window was driven'}"]
     limit = summary["limit"]
     shown += [
-        "", f"IRI {summary['iri_m_per_km']:.2f} m/km on the mean, {summary['iri_min_m_per_km']:.2f} to "
+        "", f"IRI {summary['iri_m_per_km']:.2f} m/km on average, {summary['iri_min_m_per_km']:.2f} to "
         f"{summary['iri_max_m_per_km']:.2f}; {summary['answered_count']} of {summary['window_count']} windows"
         + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".",
         f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
@@ -506,10 +506,10 @@ def _unit_hint(found: Assessment) -> str:
         return ""
     mean, rms = float(drive.accel_z_mps2[moving].mean()), float(drive.accel_z_mps2[moving].std())
     if abs(abs(mean) - 1) < _G_NEAR and rms < _G_CALM_MPS2:
-        return f"Acceleration in g? On the way it is {mean:.2f} on the mean and {rms:.3g} r.m.s. about it."
+        return f"Acceleration in g? While driving it is {mean:.2f} on average and {rms:.3g} r.m.s. about it."
     noise_mps2 = NOISE_MPS2 if found.learns_noise else found.sensor.noise_rms_mps2
     if rms < noise_mps2:
-        return (f"Acceleration in g? On the way it is {rms:.3g} r.m.s., less than the noise of "
+        return (f"Acceleration in g? While driving it is {rms:.3g} r.m.s., less than the noise of "
                 f"{noise_mps2:g} {'that sensors have' if found.learns_noise else '(--noise)'}.")
     return ""
 

@@ -118,7 +118,7 @@ class PassesQuestion(LogsQuestion):
     """
 
     length: Annotated[str | float, Option(
-        "of a cell of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
+        "of a piece of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
         check=length_of)] = 25.0
     since: Annotated[str | None, Option(
         "rows from this day on (UTC), such as 2026-04-30; those without a date then do not count", metavar="DAY",
@@ -127,8 +127,8 @@ class PassesQuestion(LogsQuestion):
     split: Annotated[str | None, Option(
         "what changed between the drives before this day and those from it on", metavar="DAY", check=check_day)] = None
     above_m_per_km: Annotated[float | None, Option(
-        "from which IRI [m/km, or at a terminal as 160in/mi] a place is to be visited (default: 2.68, poor by 23 CFR "
-        "490.313)", LIMIT, "IRI", read=limit_of)] = None
+        "the IRI [m/km, or at a terminal as 160in/mi] from which a place goes on the work list (default: 2.68, poor by "
+        "23 CFR 490.313)", LIMIT, "IRI", read=limit_of)] = None
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
 PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
     Out(f"write the means as {_TABLES}, or a page with map and curves (.html) or picture (.png .svg .pdf); may repeat",
         metavar="FILE", others=FORMATS),
-    Out("write the places to visit: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", FORMATS,
+    Out("write the work list: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", FORMATS,
         many=False, is_drawn=False)))
 CONVERT = Verb(ConvertQuestion, "logger.api.conversion:converted")
 

@@ -273,7 +273,7 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
     yield (f"Passed by more than one drive: {several / cells:.0%} of the cells; median {np.median(drives):g}, "
            f"{drives.max()} at most")
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
-    yield f"IRI of the cells {mean:.2f} m/km on the mean, standard error of one cell {std:.2f}"
+    yield f"IRI of the cells {mean:.2f} m/km on average, standard error of one cell {std:.2f}"
     if isfinite(found.scatter.drive):
         yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
                f"passes by {found.scatter.passes:.1%}: both are in the standard errors")

@@ -29,7 +29,7 @@ from logger.units import WINDOW_M
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Profile(profile_file.Profile, Shown):
-    """The elevations of a road under one or two wheel tracks.
+    """The elevations of a road under one or two wheelpaths.
 
     start_m              distance of the first sample [m]
     spacing_m            between samples [m]
@@ -47,7 +47,7 @@ class Profile(profile_file.Profile, Shown):
         return table("Profile", [
             ("length", self.spacing_m * (len(self.elevation_m) - 1), "m"), ("begins at", self.start_m, "m"),
             ("spacing", self.spacing_m, "m"), ("samples", len(self.elevation_m), ""),
-            ("wheel tracks", 1 if self.elevation_right_m is None else 2, ""),
+            ("wheelpaths", 1 if self.elevation_right_m is None else 2, ""),
             ("elevation, standard deviation", float(self.elevation_m.std()), "m"),
             ("resampled across", self.widest_step_m, "m")])
 

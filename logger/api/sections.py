@@ -244,7 +244,7 @@ def lines(drives: Sequence[DriveSections], length_m: float, system: str, localiz
             said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km, units)]
     return [*said, "",
             "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313.",
-            "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
+            "One sensor in the middle of the car: the IRI is that of a half car on both wheelpaths (HRI)."]
 
 
 def _title(one: DriveSections) -> str:

@@ -266,7 +266,7 @@ def test_the_screen_says_what_was_assumed_and_what_is_possible(
                   tmp_path / "p.csv")
     assert (done.returncode, done.stderr) == (0, f"Wrote {tmp_path / 'p.csv'}\n")
     assert "noise of 0.05 m/s2 in a reading (--noise), not rounded (--step)" in done.stdout
-    assert f"IRI {result['iri_m_per_km']:.2f} m/km on the mean" in done.stdout
+    assert f"IRI {result['iri_m_per_km']:.2f} m/km on average" in done.stdout
     assert f"would reach R2 {result['limit']['r2_iri_1_to_10']:.3f} over roads of IRI 1 to 10" in done.stdout
     assert f"standard error {result['limit']['std_m_per_km']:.2f} m/km at 16 m/s" in done.stdout
     assert f"{result['comparison']['r2']:.3f}" in done.stdout
@@ -374,7 +374,7 @@ def test_readings_that_may_be_in_g_are_said_to_be(
         assert main(["estimate", str(drive), "--vehicle", CAR, "--noise", f"{noise:.4f}"]) == 0
         hints[name] = [line for line in capsys.readouterr().out.splitlines() if "in g?" in line]
     assert hints["m/s2"] == hints["enough"] == []
-    assert hints["nearly gravity"][0].startswith("Acceleration in g? On the way it is 1.06 on the mean and ")
+    assert hints["nearly gravity"][0].startswith("Acceleration in g? While driving it is 1.06 on average and ")
     assert hints["little"][0].endswith(f"less than the noise of {1.05 * rms:.4f} (--noise).")
     drive = write(tmp_path, columns | {"accel_z_mps2": 0.04 / rms * in_g})
     assert main(["estimate", str(drive), "--vehicle", CAR]) == 0

@@ -47,7 +47,7 @@ def test_words_for_people_in_both_systems(logs: Path, capsys: pytest.CaptureFixt
     assert said.splitlines()[0] == "1 drive, 0.14 mi in 2 sections of 0.1 mi"
     assert "Mean IRI 111 in/mi" in said
     assert "34" in said.splitlines()[6].split()  # 15.24 m/s in miles an hour
-    assert "half car on both wheel tracks (HRI)" in said
+    assert "half car on both wheelpaths (HRI)" in said
     assert main(["sections", str(logs), "--length", "1km"]) == 0
     assert "1 section of 1 km" in capsys.readouterr().out
 

@@ -37,7 +37,7 @@ def run(folder: Path, effort: Workload) -> Result:
         Column("from [m]", ".0f"), Column("to [m]", ".0f"), Column("latitude [deg]", ".6f"),
         Column("longitude [deg]", ".6f"), Column("speed [m/s]", ".1f"), Column("class"), Column("IRI [m/km]", ".2f"),
         Column("std. error [m/km]", ".2f")), rows)]
-    words = (f"{len(known)} of {len(rows)} rows of {_WINDOW_M:g} m have an IRI, {known.mean():.2f} m/km on the mean, "
+    words = (f"{len(known)} of {len(rows)} rows of {_WINDOW_M:g} m have an IRI, {known.mean():.2f} m/km on average, "
              f"{known.min():.2f} to {known.max():.2f}. Nobody measured this road with a profiler here, so that is not "
              "shown to be right.")
     speed = _speeds(log, recording)

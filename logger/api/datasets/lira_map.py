@@ -79,7 +79,7 @@ def run(folder: Path, effort: Workload) -> Result:
                "is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per 100 m "
                "that are quoted of these files are another thing: the squared correlation, which a pass that reads 4 "
                "% more does not spoil, and after each stretch of road has been moved along by up to 4 m to where it "
-               f"fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on the mean of the three "
+               f"fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on average over the three "
                "pairs; moving so many pieces fits some of the noise as well.")
     return Result((*tables, length), verdict, (Picture(_picture(passes)),))
 

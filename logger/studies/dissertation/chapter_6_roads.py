@@ -270,7 +270,7 @@ F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed an
                           "The drift with speed is there as printed and comes from the road's waviness; ridelog's "
                           "estimate does not have it."),
                      *alike([f"Fig 6.{number}" for number in range(12, 16)], Word.BETTER,
-                            "At 40 mph the relation is right on the mean; ridelog's windows err by half as much.")))
+                            "At 40 mph the relation is right on average; ridelog's windows err by half as much.")))
 
 
 _ROADS_F6_16 = 60

@@ -133,7 +133,7 @@ def _iso_2631_factors(effort: Workload) -> Result:
     off = [abs(one.difference) for one in values if one is not wrong]
     table = Table("The misprint", (Column("frequency [Hz]"), Column("printed", ".0f"), Column("ours", ".1f"),
                                    Column("neighbours, printed")), (("10", wrong.printed, wrong.ours, "253 and 161"),))
-    verdict = (f"Of {len(values)} factors all but one agree to the printed digit, {np.mean(off):.2f} off on the mean; "
+    verdict = (f"Of {len(values)} factors all but one agree to the printed digit, {np.mean(off):.2f} off on average; "
                "they are those of the formula at the nominal frequencies. Wd at 10 Hz is printed 212; the formula "
                "has 202, and so has a smooth curve through its neighbours.")
     at_hz = np.array(HZ, dtype=float)

@@ -15,7 +15,7 @@ from logger.vehicle.laws import CornerLaws
 
 class BumpStop(ForceEffect):
     name = "bump_stop"
-    title = "a stiff stop at the end of the suspension's way in compression"
+    title = "a stiff stop at the end of the suspension's travel in compression"
     parameters = (
         Parameter("clearance_m", 0.04, 0.001, 0.3, None, Scale.LINEAR, (0.01, 0.02, 0.03, 0.045, 0.06),
                   "compression from rest at which the stop is met"),
