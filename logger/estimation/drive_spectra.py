@@ -1,0 +1,165 @@
+"""What a drive tells of its car, kept small: spectra of short blocks of nearly steady speed.
+
+Problem: what a car's springs and dampers are shows in how it answers waves of the road at many speeds, over hours of
+driving whose readings nobody keeps. Solution: the readings are cut into blocks of a few seconds, half over each other,
+and of each that was driven at nearly one speed only the power in some forty bands is kept. A car answers a road within
+a second or two, so that a block's spectrum is the road's mean level in it times the car's gain; what was changes from
+block to block.
+
+The expected power of a band is linear in the spectrum of the readings: ``expected`` has its weights, those of the Hann
+window included, so that a resonance which is narrower than the window biases nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+BLOCK_S = 4.0
+"""Bodies bounce at 1 to 2 Hz with 0.2 of critical damping and more: half a hertz of resolution (1.5 / BLOCK_S) shows
+it; and a road of 20 to 40 m in town, 100 m outside, has about one level."""
+LOWEST_HZ, HIGHEST_HZ = 0.75, 30.0
+"""Below it a driver brakes and turns; above it a car with wheels at 10 to 15 Hz passes next to nothing."""
+PASSED = 0.38
+"""Share of the rate up to which recorders are flat."""
+SLOWEST_MPS = 3.0
+STEADY = 0.1
+"""Standard deviation of the speed in a block as a share of it: the wheelbase's interference fades by what is known of
+it (``spread``), the level is a mean."""
+IMPULSIVE = 5.0
+"""Kurtosis of the readings of a block in which a pothole or a step outweighs the road: 3 is that of a Gaussian road of
+one level, 0.6 its standard deviation in a block, 12 that of a block that a pothole of a quarter second doubles."""
+_WIDENING = 0.06  # of a band above 4 Hz, as a share: a tenth of the width of a wheel's resonance
+_FINE = 2  # points of the model's spectrum for each bin: the window's autocorrelation is as long as two blocks
+_AT_ONCE = 256
+
+INDEPENDENT = 1 / (1 + 2 * ((2 / 3) ** 2 + (1 / 6) ** 2)) / (1 + 2 * (1 / 6) ** 2)
+"""Independent values in a bin of a block: neighbours under a Hann window are correlated by 2/3 and 1/6, blocks half
+over each other by 1/6 (F. Harris, Proceedings of the IEEE 66, 1978)."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSpectra:
+    """Blocks (b,) of one drive or several.
+
+    speed_mps    mean of each
+    spread       standard deviation of the speed in each, as a share
+    power        (b, k) mean one-sided spectrum in each of ``bands`` [m2/s4 per Hz]; NaN: the recorder does not pass it
+    noise        (b,) known part of the readings' noise, as a spectrum: its sensor's and its steps' [m2/s4 per Hz]; NaN:
+                 not known
+    stretch      (b,) number of the stretch of road that each is from; a stretch has one waviness
+    """
+
+    speed_mps: Array
+    spread: Array
+    power: Array
+    noise: Array
+    stretch: npt.NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.speed_mps)
+
+    def part(self, which: npt.NDArray[np.bool_]) -> DriveSpectra:
+        """Some of the blocks."""
+        return DriveSpectra(self.speed_mps[which], self.spread[which], self.power[which], self.noise[which],
+                            self.stretch[which])
+
+
+def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
+    """Several drives as one; their stretches stay apart."""
+    begins = np.cumsum([0, *(int(one.stretch.max(initial=-1)) + 1 for one in drives[:-1])])
+    stretch = [one.stretch + begin for one, begin in zip(drives, begins, strict=True)]
+    return DriveSpectra(*(np.concatenate([getattr(one, name) for one in drives])
+                          for name in ("speed_mps", "spread", "power", "noise")), np.concatenate(stretch))
+
+
+@cache
+def bands() -> tuple[tuple[int, int], ...]:
+    """First bin and the one behind the last of each band; bins are 1 / BLOCK_S apart."""
+    found, first = [], round(LOWEST_HZ * BLOCK_S)
+    while first <= HIGHEST_HZ * BLOCK_S:
+        end = first + max(1, round(_WIDENING * first - 0.06 * 4.0 * BLOCK_S + 0.5))
+        found.append((first, end))
+        first = end
+    return tuple(found)
+
+
+@cache
+def middles_hz() -> Array:
+    """Middle of each band (k,) [Hz]."""
+    return np.array([(first + end - 1) / 2 for first, end in bands()]) / BLOCK_S
+
+
+@cache
+def counts() -> Array:
+    """Bins in each band (k,)."""
+    return np.array([float(end - first) for first, end in bands()])
+
+
+@cache
+def grid_hz() -> Array:
+    """Frequencies (f,) at which a model's spectrum is asked for, even."""
+    last = (bands()[-1][1] + 3) * _FINE
+    return np.arange(1, last + 1) / (_FINE * BLOCK_S)
+
+
+@cache
+def expected() -> Array:
+    """Weights (k, f) of a spectrum at ``grid_hz`` in the expected power of each band."""
+    at = grid_hz() * BLOCK_S  # in bins
+    weights = np.zeros((len(bands()), len(at)))
+    for row, (first, end) in zip(weights, bands(), strict=True):
+        for one in range(first, end):
+            row += _hann_kernel(at - one) / _FINE
+    return weights / counts()[:, None]
+
+
+def _hann_kernel(bins: Array) -> Array:
+    """Squared gain of a Hann window so many bins beside its middle; its integral is 1."""
+    amplitude = 0.5 * np.sinc(bins) + 0.25 * (np.sinc(bins - 1) + np.sinc(bins + 1))
+    return np.asarray(amplitude**2 / 0.375)
+
+
+def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, noise: float = np.nan,
+                  passed_hz: float = np.inf, stretch_s: float = 300.0) -> DriveSpectra:
+    """The blocks of a drive: samples (n,), evenly spaced, of the acceleration, the speed, and whether there is a
+    reading.
+
+    noise        spectrum of the part of the readings' noise that is known [m2/s4 per Hz]
+    passed_hz    the recorder passes what is below
+    stretch_s    a road is of one waviness for so long
+    """
+    length = round(BLOCK_S * rate_hz)
+    begins = np.arange(0, len(accel_mps2) - length + 1, length // 2)
+    taper = np.hanning(length + 1)[:-1]
+    scale = 2 / (rate_hz * float(taper @ taper))
+    firsts = np.array([first for first, _ in bands()])
+    last = bands()[-1][1]
+    passes = middles_hz() + counts() / (2 * BLOCK_S) <= min(PASSED * rate_hz, passed_hz)
+    kept: list[tuple[Array, ...]] = []
+    for some in np.split(begins, range(_AT_ONCE, len(begins), _AT_ONCE)):
+        rows = some[:, None] + np.arange(length)
+        speeds = speed_mps[rows]
+        mean, spread = speeds.mean(axis=1), speeds.std(axis=1)
+        good = usable[rows].all(axis=1) & (mean > SLOWEST_MPS) & (spread < STEADY * mean)
+        readings = accel_mps2[rows[good]]
+        powers = scale * np.abs(np.fft.rfft((readings - readings.mean(axis=1, keepdims=True)) * taper)) ** 2
+        padded = np.zeros((len(powers), last + 1))
+        padded[:, :min(powers.shape[1], last)] = powers[:, :last]
+        power = np.add.reduceat(padded[:, :last], firsts, axis=1) / counts()
+        own = readings - readings.mean(axis=1, keepdims=True)
+        square = (own**2).mean(axis=1)
+        shakes = (square > 0) & ((own**4).mean(axis=1) < IMPULSIVE * square**2)
+        power[:, ~passes] = np.nan
+        kept.append(tuple(one[shakes] for one in (mean[good], spread[good] / mean[good], power, some[good] / rate_hz)))
+    mean, spread, power, begin_s = (np.concatenate(parts) for parts in zip(*kept, strict=True)) if kept else (
+        np.empty(0), np.empty(0), np.empty((0, len(bands()))), np.empty(0))
+    stretch = np.unique((begin_s // stretch_s).astype(int), return_inverse=True)[1]
+    return DriveSpectra(mean, spread, power, np.full(len(mean), noise), stretch)

@@ -1,0 +1,405 @@
+"""A car's numbers out of drives over roads that nobody measured.
+
+Problem: the road is not known, its level changes from block to block and its waviness from road to road; what the
+sensor reads is their product with the car's gain. But the road's spectrum is a power of the wave number, the car's gain
+is a function of the frequency, and the wheelbase writes its interference over both: at several speeds they come apart.
+
+Solution: the power of each band of each block (``estimation.drive_spectra``) is exponential about what car, road and
+noise let expect (P. Whittle, Journal of the Royal Statistical Society B 15, 1953). The car's coordinates have the prior
+of published cars; each block has a level and a waviness of its own, about that of its stretch, which has a prior too.
+All are found together by Fisher scoring; blocks and stretches are eliminated one by one (Schur complements), so that an
+hour of driving is a hundred thousand numbers and a system of fourteen.
+
+The response is the half car's (``vehicle.linear_car``); the speed's spread within a block and the receiver's error fade
+the interference between the axles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.car_response import (
+    HIGHEST_HZ,
+    WAVE_NUMBER_STEPS_CPM,
+    WAVE_NUMBERS_CPM,
+    golden_car_slope,
+)
+from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
+from logger.estimation.road_spectrum import PIVOT_CPM
+from logger.vehicle.linear_car import body_acceleration_response, frequency_response
+from logger.vehicle.models import half_car
+from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior
+from logger.vehicle.structure import body_point
+from logger.vehicle.vehicle import SensorPlace, Vehicle
+
+Array = npt.NDArray[np.float64]
+
+WAVINESS, WAVINESS_APART, WAVINESS_WITHIN = 2.0, 0.3, 0.2
+"""Of roads: mean, deviation from stretch to stretch, and from block to block within one. ISO 8608 has 2 for all;
+measured ones lie from 1.5 to 2.6, mostly (P. Mucka, Shock and Vibration 2017, 7279014, reviews them)."""
+_LEVEL, _LEVEL_APART = np.log(8e-7), 30.0  # of Gd(0.2 cycle/m) [m3]: as good as flat, as a car's gain must not depend on it
+_NOISE_APART = 1.0  # of the logarithm of what the readings hold besides: half to four times the power that is known
+_LEAST_NOISE = 2 * 0.02**2 / 100  # m2/s4 per Hz: of a sensor of which nothing is known, 0.02 m/s2 at 100 Hz
+_RECEIVER_MPS = 0.05  # standard error of its mean speed over a block (0.1 m/s a fix, by the Doppler shift)
+_SPEED_STEP = 0.02  # of speeds that count as one, as a share
+_STEP = 1e-4  # of differences that derivatives are taken by
+_MOST_ROUNDS, _MOST_HALVINGS, _MOST_INNER, _SMALL_GAIN, _SMALL_MOVE = 60, 8, 12, 1e-3, 1e-4
+_HOPS_APART = 0.15  # of the logarithm
+_LONGEST_STEP = 0.3  # of a coordinate in a round
+_PRECISION = np.array([_LEVEL_APART**-2, WAVINESS_WITHIN**-2])
+_AT_ONCE = 4096
+
+EXTRA = ("wheelbase_m", "sensor.ahead_m", "noise")
+"""Coordinates behind those of ``NUMBERS``: logarithm, length [m], logarithm of the noise over what is known of it."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a car, its sensor and how well.
+
+    wheelbase_m, wheelbase_std    and its standard error, as a share
+    ahead_m, ahead_std_m          of the sensor before the centre of gravity
+    prior                         of the rest
+    """
+
+    wheelbase_m: float
+    wheelbase_std: float = 0.01
+    ahead_m: float = 0.0
+    ahead_std_m: float = 0.2
+    prior: CarPrior = field(default_factory=published_prior)
+
+    @cached_property
+    def mean(self) -> Array:
+        """Of all coordinates (p,)."""
+        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), self.ahead_m, 0.0]])
+
+    @cached_property
+    def precision(self) -> Array:
+        """Of all coordinates (p, p)."""
+        own, whole = len(NUMBERS), np.zeros((len(NUMBERS) + len(EXTRA),) * 2)
+        whole[:own, :own] = np.linalg.inv(self.prior.covariance)
+        whole[own:, own:] = np.diag([self.wheelbase_std**-2, self.ahead_std_m**-2, _NOISE_APART**-2])
+        return whole
+
+    def car(self, x: Array, sprung_mass_kg: float, name: str) -> Vehicle:
+        """The half car with these coordinates (p,), its sensor where it sits."""
+        own = len(NUMBERS)
+        return car_of(x[:own], float(np.exp(x[own])), sprung_mass_kg, SensorPlace(float(x[own + 1])), name)
+
+
+def band_gains(known: Known, x: Array, speed_mps: Array, spread: Array) -> Array:
+    """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at speeds (s,) that have a
+    standard deviation of a share ``spread`` (s,)."""
+    vehicle = known.car(x, 1.0, "")
+    structure = half_car(vehicle)
+    f_hz = grid_hz()
+    by_axle = frequency_response(structure, [body_point(structure, vehicle.sensor.ahead_m)], f_hz)[:, 0, :]
+    n = f_hz / speed_mps[:, None]
+    turn = 2 * np.pi * n * structure.behind_m.max()
+    both = by_axle[:, 0] * by_axle[:, 1].conj()
+    power = (np.abs(by_axle) ** 2).sum(axis=1) + 2 * np.exp(-0.5 * (turn * spread[:, None]) ** 2) * (
+        both.real * np.cos(turn) - both.imag * np.sin(turn))
+    power *= np.sinc(n * structure.contact_patch_m) ** 2 * (n / PIVOT_CPM) ** -WAVINESS / speed_mps[:, None]
+    return np.asarray(power @ expected().T)
+
+
+@dataclass(eq=False)
+class Roads:
+    """What the drives' roads are: logarithm of the level and the waviness's difference of each block (b,), and of each
+    stretch (t,)."""
+
+    level: Array
+    own: Array
+    stretch: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedCar:
+    """Coordinates (p,) with their covariance (p, p); the roads; and the logarithm of the posterior density there with
+    the roads integrated out (Laplace)."""
+
+    known: Known
+    x: Array
+    covariance: Array
+    roads: Roads
+    log_evidence: float
+    is_converged: bool
+
+    @property
+    def std(self) -> Array:
+        """Standard errors (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+class UnknownCar:
+    """The problem: blocks of drives, and what is known before."""
+
+    def __init__(self, spectra: DriveSpectra, known: Known) -> None:
+        self.spectra, self.known = spectra, known
+        key = np.round(np.log(spectra.speed_mps) / _SPEED_STEP).astype(int)
+        _, self.speed = np.unique(key, return_inverse=True)
+        each = np.bincount(self.speed)
+        self.speed_mps = np.bincount(self.speed, spectra.speed_mps) / each
+        within = np.bincount(self.speed, (spectra.speed_mps / self.speed_mps[self.speed] - 1) ** 2) / each
+        self.spread = np.sqrt(np.bincount(self.speed, spectra.spread**2) / each + within
+                              + (_RECEIVER_MPS / self.speed_mps) ** 2)
+        self.slope = -np.log(middles_hz() / spectra.speed_mps[:, None] / PIVOT_CPM)
+        seen = np.isfinite(spectra.power)
+        self.weight = np.where(seen, INDEPENDENT * counts(), 0.0)
+        self.power = np.where(seen, spectra.power, 1.0)
+        self.noise = np.where(np.isfinite(spectra.noise), np.maximum(spectra.noise, _LEAST_NOISE), _LEAST_NOISE)
+        self.stretches = int(spectra.stretch.max(initial=-1)) + 1
+
+    def gains(self, x: Array) -> Array:
+        """As ``band_gains`` at the speeds of the drives (s, k)."""
+        return band_gains(self.known, x, self.speed_mps, self.spread)
+
+    def expected_power(self, x: Array, roads: Roads, gains: Array | None = None) -> tuple[Array, Array]:
+        """Of the road and of the noise, (b, k) and (b, 1)."""
+        gains = self.gains(x) if gains is None else gains
+        waviness = roads.own + roads.stretch[self.spectra.stretch]
+        road = gains[self.speed] * np.exp(roads.level[:, None] + waviness[:, None] * self.slope)
+        return road, self.noise[:, None] * np.exp(x[-1])
+
+    def with_blocks(self, x: Array, roads: Roads) -> tuple[Roads, float]:
+        """The same stretches with the most probable level and waviness of each block; and the logarithm of the
+        posterior density there, the blocks integrated out (Laplace), up to a constant."""
+        gains = self.gains(x)[self.speed]
+        noise = self.noise[:, None] * np.exp(x[-1])
+        level, own = roads.level, roads.own
+        own_slope = self.slope
+        for _ in range(_MOST_INNER):
+            road = gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
+            whole = road + noise
+            share, ratio = road / whole, self.power / whole
+            residual = self.weight * (ratio - 1) * share
+            bent = self.weight * share**2
+            move = _solved(_moments(bent, own_slope, _PRECISION), np.stack([
+                residual.sum(axis=1) - (level - _LEVEL) * _PRECISION[0],
+                (residual * own_slope).sum(axis=1) - own * _PRECISION[1]], axis=1))
+            move = np.clip(move, -1.5, 1.5)
+            level, own = level + move[:, 0], own + move[:, 1]
+            if np.abs(move).max(initial=0.0) < _SMALL_MOVE:
+                break
+        found = Roads(level, own, roads.stretch)
+        road = gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
+        whole = road + noise
+        ratio = self.power / whole
+        observed = _moments(self.weight * (road / whole) ** 2 * ratio, own_slope, _PRECISION)
+        off = x - self.known.mean
+        value = (-(self.weight * (np.log(whole) + ratio)).sum() - 0.5 * np.log(_determinant(observed)).sum() - 0.5 * (
+            off @ self.known.precision @ off + _PRECISION[0] * ((level - _LEVEL) ** 2).sum()
+            + _PRECISION[1] * (own**2).sum() + (roads.stretch**2).sum() / WAVINESS_APART**2))
+        return found, float(value)
+
+    def start(self, x: Array) -> Roads:
+        """Roads that are about right for a car: their levels by the mean power."""
+        gains = self.gains(x)[self.speed]
+        ratio = (self.weight * self.power / gains).sum(axis=1) / self.weight.sum(axis=1)
+        return Roads(np.log(np.maximum(ratio, 1e-12)), np.zeros(len(self.spectra)), np.zeros(self.stretches))
+
+    def fit(self) -> LearnedCar:
+        """The most probable car and stretches, blocks integrated out: the best of searches that begin with equal
+        wheels, and with front or rear ones that hop faster."""
+        turned = np.zeros(len(self.known.mean))
+        turned[[NUMBERS.index(f"{end}.hop_hz") for end in ("front", "rear")]] = 0.5 * _HOPS_APART, -0.5 * _HOPS_APART
+        return max((self.fit_from(self.known.mean + sign * turned) for sign in (0, 1, -1)),
+                   key=lambda one: one.log_evidence)
+
+    def fit_from(self, start: Array, held: Sequence[int] = ()) -> LearnedCar:
+        """The same from one start. ``held``: coordinates that stay there."""
+        x = start.copy()
+        roads, value = self.with_blocks(x, self.start(x))
+        damping, converged = 1e-3, False
+        step = _Step(self, x, roads, held)
+        for _ in range(_MOST_ROUNDS):
+            for _ in range(_MOST_HALVINGS):
+                tried, moved = step.taken(damping)
+                tried_roads, new = self.with_blocks(tried, moved)
+                if new >= value:
+                    break
+                damping = max(6 * damping, 1e-3)
+            else:
+                converged = True
+                break
+            gain, value, x, roads, damping = new - value, new, tried, tried_roads, damping / 6
+            step = _Step(self, x, roads, held)
+            if gain < _SMALL_GAIN:
+                converged = True
+                break
+        return LearnedCar(self.known, x, step.covariance, roads, value + step.log_volume, converged)
+
+
+def _moments(weight: Array, slope: Array, precision: Array) -> Array:
+    """Sums of 1, slope and its square under weights (b, k), with what is known before: (3, b)."""
+    first = weight * slope
+    return np.stack([weight.sum(axis=1) + precision[0], first.sum(axis=1), (first * slope).sum(axis=1) + precision[1]])
+
+
+def _determinant(moments: Array) -> Array:
+    return np.asarray(moments[0] * moments[2] - moments[1] ** 2)
+
+
+def _solved(moments: Array, right: Array) -> Array:
+    """Solutions (b, 2, ...) of symmetric systems of two, right sides (b, 2, ...)."""
+    shape = (-1, *[1] * (right.ndim - 2))
+    one, both, two = (moment.reshape(shape) for moment in moments)
+    determinant = one * two - both**2
+    return np.stack([(two * right[:, 0] - both * right[:, 1]) / determinant,
+                     (one * right[:, 1] - both * right[:, 0]) / determinant], axis=1)
+
+
+class _Step:
+    """Score and information of car and stretches where the blocks are at their most probable."""
+
+    def __init__(self, problem: UnknownCar, x: Array, roads: Roads, held: Sequence[int] = ()) -> None:
+        self._x, self._roads, self._problem = x, roads, problem
+        self._free = np.array([one for one in range(len(x)) if one not in set(held)], dtype=int)
+        gains = problem.gains(x)
+        slopes = np.zeros((*gains.shape, len(x)))
+        for one in self._free:
+            if one < len(x) - 1:
+                moved = x.copy()
+                moved[one] += _STEP
+                slopes[..., one] = np.log(problem.gains(moved) / gains) / _STEP
+        count, stretches = len(problem.spectra), problem.stretches
+        self._outer = np.zeros((stretches, len(x) + 1, len(x) + 1))
+        self._score = np.zeros((stretches, len(x) + 1))
+        self._eliminated = np.empty((count, 2, len(x) + 1))
+        self.block_scores = np.empty((count, len(x) + 1))
+        for low in range(0, count, _AT_ONCE):
+            self._take(slice(low, low + _AT_ONCE), gains, slopes)
+
+    def _take(self, part: slice, gains: Array, slopes: Array) -> None:
+        """Blocks are eliminated: of each the score and the information of its stretch's waviness and the car."""
+        problem, roads, x = self._problem, self._roads, self._x
+        speed, stretch = problem.speed[part], problem.spectra.stretch[part]
+        weight, slope = problem.weight[part], problem.slope[part]
+        waviness = (roads.own + roads.stretch[problem.spectra.stretch])[part]
+        road = gains[speed] * np.exp(roads.level[part, None] + waviness[:, None] * slope)
+        noise = problem.noise[part, None] * np.exp(x[-1])
+        share, ratio = road / (road + noise), problem.power[part] / (road + noise)
+        outer = np.empty((*share.shape, len(x) + 1))       # derivatives of the logarithm of what is expected
+        outer[..., 0] = share * slope
+        outer[..., 1:-1] = share[..., None] * slopes[speed][..., :-1]
+        outer[..., -1] = (1 - share) * (len(x) - 1 in self._free)
+        weighted = outer * (weight * share)[..., None]
+        moments = _moments(weight * share**2, slope, _PRECISION)
+        coupling = np.stack([weighted.sum(axis=1), np.einsum("bkj,bk->bj", weighted, slope)], axis=1)
+        eliminated = _solved(moments, coupling)
+        # what is lost by eliminating: half the logarithm of the observed information's determinant
+        observed = weight * share**2 * ratio
+        first = _solved(_moments(observed, slope, _PRECISION),
+                        np.stack([np.ones_like(slope), slope], axis=1))
+        leverage = first[:, 0] + slope * first[:, 1]
+        lost = -0.5 * leverage * observed
+        by_road, by_noise = lost * (2 - 3 * share), lost * -3 * (1 - share)
+        residual = weight * (ratio - 1)
+        gradient = np.einsum("bkj,bk->bj", outer, residual)
+        own = by_road.sum(axis=1), (by_road * slope).sum(axis=1)
+        gradient[:, 0] += own[1]
+        gradient[:, 1:-1] += np.einsum("bk,bkj->bj", by_road, slopes[speed][..., :-1])
+        gradient[:, -1] += by_noise.sum(axis=1) * (len(x) - 1 in self._free)
+        gradient -= eliminated[:, 0] * own[0][:, None] + eliminated[:, 1] * own[1][:, None]
+        # the blocks' own scores are zero but for what is known before of them
+        known = np.stack([(roads.level[part] - _LEVEL), roads.own[part]], axis=1) * _PRECISION
+        at_mode = np.stack([(residual * share).sum(axis=1), (residual * share * slope).sum(axis=1)], axis=1) - known
+        gradient -= np.einsum("bij,bi->bj", eliminated, at_mode)
+        self.block_scores[part], self._eliminated[part] = gradient, eliminated
+        unshared = outer * np.sqrt(weight)[..., None]
+        for one in np.unique(stretch):
+            rows = stretch == one
+            columns = unshared[rows].reshape(-1, outer.shape[-1])
+            self._outer[one] += columns.T @ columns - np.einsum("bij,bik->jk", coupling[rows], eliminated[rows])
+            self._score[one] += gradient[rows].sum(axis=0)
+
+    @cached_property
+    def _of_stretches(self) -> tuple[Array, Array]:
+        """Information and score of the waviness of each stretch (t,)."""
+        return (self._outer[:, 0, 0] + WAVINESS_APART**-2,
+                self._score[:, 0] - self._roads.stretch * WAVINESS_APART**-2)
+
+    @cached_property
+    def system(self) -> tuple[Array, Array]:
+        """Information (p, p) and score (p,) of the car, its prior in them."""
+        own, own_score = self._of_stretches
+        across = self._outer[:, 0, 1:]
+        known = self._problem.known
+        information = self._outer[:, 1:, 1:].sum(axis=0) - across.T @ (across / own[:, None]) + known.precision
+        score = self._score[:, 1:].sum(axis=0) - across.T @ (own_score / own) - known.precision @ (self._x - known.mean)
+        return information, score
+
+    @property
+    def covariance(self) -> Array:
+        """Of the car's coordinates (p, p); 0 of those that are held."""
+        found = np.zeros((len(self._x),) * 2)
+        if len(self._free):
+            at = np.ix_(self._free, self._free)
+            found[at] = np.linalg.inv(self.system[0][at])
+        return found
+
+    @property
+    def log_volume(self) -> float:
+        """Half the logarithm of the determinant of the covariance of stretches and car."""
+        inner = self.system[0][np.ix_(self._free, self._free)]
+        return float(-0.5 * (np.log(self._of_stretches[0]).sum() + np.linalg.slogdet(inner)[1]))
+
+    def taken(self, damping: float) -> tuple[Array, Roads]:
+        """Car and roads after a step."""
+        information, score = self.system
+        move = np.zeros(len(self._x))
+        if len(self._free):
+            at = np.ix_(self._free, self._free)
+            inner = information[at]
+            move[self._free] = np.linalg.solve(inner + damping * np.diag(np.diag(inner)), score[self._free])
+        move *= min(1.0, _LONGEST_STEP / max(float(np.abs(move).max()), 1e-12))
+        own, own_score = self._of_stretches
+        stretch = (own_score - self._outer[:, 0, 1:] @ move) / own
+        stretch *= min(1.0, 1.0 / max(float(np.abs(stretch).max(initial=0.0)), 1e-12))
+        roads = self._roads
+        both = np.concatenate([stretch[self._problem.spectra.stretch][:, None],
+                               np.broadcast_to(move, (len(roads.level), len(move)))], axis=1)
+        blocks = -np.einsum("bij,bj->bi", self._eliminated, both)
+        return self._x + move, Roads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
+
+
+def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, level: float) -> float:
+    """IRI that an estimator with one car's gains finds on a road, over what is right, where the readings come from
+    another.
+
+    Problem: what a wrong gain does to an IRI is not its mean error, as waves that a car does not feel are filled in by
+    the road's spectrum, whose level is learnt with the same wrong gain. Solution: the estimator's filter (N. Wiener's,
+    with the level that fits the readings' power best) is applied to the spectrum that the other car reads; the IRI is
+    proportional to the root of the power of the slope that comes out, the posterior variance included.
+
+    estimating, actual    squared gains (n,) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4]; of waves that pass
+    noise                 spectrum of the readings' noise [m2/s4 per Hz]
+    level                 of the road, Gd(0.2 cycle/m) [m3]
+    """
+    n, steps = WAVE_NUMBERS_CPM, WAVE_NUMBER_STEPS_CPM
+    slope = np.abs(golden_car_slope(n)) ** 2 * n**-WAVINESS * steps
+    road = level * (n / PIVOT_CPM) ** -WAVINESS
+    within = n * speed_mps < HIGHEST_HZ
+    noise = noise * speed_mps
+    read = np.where(within, actual, 0.0) * road + noise
+    factor = 1.0
+    for _ in range(30):
+        known = np.where(within, estimating, 0.0) * road * factor
+        weight = (known / (known + noise)) ** 2 * steps
+        factor *= float((weight * read / (known + noise)).sum() / weight.sum())
+    known = np.where(within, estimating, 0.0) * road * factor
+    share = known / (known + noise)
+    found = factor * (share * read / (known + noise) + 1 - share)
+    return float(np.sqrt((slope * found).sum() / slope.sum()))
+
+
+def reading_power(known: Known, x: Array, speed_mps: float) -> Array:
+    """Squared gain (n,) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4], where recorders pass it."""
+    vehicle = known.car(x, 1.0, "")
+    return np.abs(body_acceleration_response(half_car(vehicle), WAVE_NUMBERS_CPM * speed_mps, speed_mps,
+                                             vehicle.sensor)) ** 2
