@@ -111,13 +111,14 @@ def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | Non
     """
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out}: expected a folder")
-    recorded = _recorded(source, asked, given or Config(), tell)
+    recorded = recorded_csv(source, asked, given or Config(), tell)
     if measured is not None and not recorded.fixes.have_places:
         raise BadInput(f"{source}: expected latitude and longitude, which --profile needs, found a speed alone")
     return write_runs(recorded, source, run_name(source), out, measured, tell)
 
 
-def _recorded(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
+def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
+    """All of a recording. BadInput as ``extract_csv``."""
     from logger.extraction.even_samples import SEEN, even_samples
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model

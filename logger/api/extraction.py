@@ -65,18 +65,11 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
     """
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out}: expected a folder")
-    recorded, heard = _recorded(dump, given, vehicle, tell)
-    fixes = recorded.fixes
-    if not len(recorded.readings.time_s) or not recorded.readings.present.any():
-        raise BadInput(f"{dump}: expected readings of the accelerometer, found none")
-    if len(fixes.time_s) < 2:
-        raise BadInput(f"{dump}: expected fixes with a speed and a place, found {heard} fixes, of which "
-                       f"{len(fixes.time_s)} have both")
-    return write_runs(recorded, dump, name_of(dump), out, measured, tell)
+    return write_runs(recorded_dump(dump, given, vehicle, tell), dump, name_of(dump), out, measured, tell)
 
 
-def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell) -> tuple[Recorded, int]:
-    """All of a dump, and how many fixes it holds."""
+def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: Tell) -> Recorded:
+    """All of a dump. BadInput and DumpError as ``extract_dump``."""
     from logger.estimation.drive_alignment import DriveAlignment
     from logger.estimation.receiver_delay import combined
     from logger.service import wiring
@@ -102,7 +95,12 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
     fixes = _fixes(kept, receiver.delay_s - known.delay_s)
     recorded = Recorded(kept.readings(), fixes, config, read_model(config.vehicle), _facts(sensor, config), receiver,
                         reader.torn_tail)
-    return recorded, len(kept.fixes)
+    if not len(recorded.readings.time_s) or not recorded.readings.present.any():
+        raise BadInput(f"{dump}: expected readings of the accelerometer, found none")
+    if len(fixes.time_s) < 2:
+        raise BadInput(f"{dump}: expected fixes with a speed and a place, found {len(kept.fixes)} fixes, of which "
+                       f"{len(fixes.time_s)} have both")
+    return recorded
 
 
 def _facts(sensor: Instrument, config: Config) -> RecordFacts:
@@ -350,6 +348,13 @@ class _Drive:
     lat_deg: Array
     lon_deg: Array
     registered: Registered | None
+
+
+def even_drives(recorded: Recorded, source: Path) -> list[drive_file.Drive]:
+    """The runs of a recording as records, without a profile."""
+    facts = replace(recorded.facts, source=source.name)
+    return [drive_file.Drive(source, RATE_HZ, one.time_s, one.accel_mps2, one.speed_mps, one.distance_m, one.lat_deg,
+                             one.lon_deg, usable=one.usable, facts=facts) for one in _drives(recorded, None)[0]]
 
 
 def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:

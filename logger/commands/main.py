@@ -33,6 +33,7 @@ GROUPS = {
         "verify": "check logs, recordings and sticks: is anything damaged or missing?",
         "replay": "play a recorded drive through the service again: what do other settings give?",
         "uninstall": "remove the service; logs, changed settings and the user stay",
+        "learn-car": "find a car's springs and dampers from ordinary drives: what car is this?",
         "capture": "record the raw bytes of a serial port: what does an unknown sensor send?",
     },
     "Roads, from logs": {
@@ -70,6 +71,7 @@ GROUPS = {
 """Verbs by what a person is about to do; each line begins with a verb and says which question it answers."""
 VERBS = {verb: meaning for group in GROUPS.values() for verb, meaning in group.items()}
 ASKED = {
+    "learn-car": "learn_car:VERB",
     "identify": "identify.question:VERB",
     "compare": "lab.question:COMPARE",
     "diagnose": "lab.question:DIAGNOSE",

@@ -17,7 +17,7 @@ the interference between the axles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -42,7 +42,8 @@ Array = npt.NDArray[np.float64]
 WAVINESS, WAVINESS_APART, WAVINESS_WITHIN = 2.0, 0.3, 0.2
 """Of roads: mean, deviation from stretch to stretch, and from block to block within one. ISO 8608 has 2 for all;
 measured ones lie from 1.5 to 2.6, mostly (P. Mucka, Shock and Vibration 2017, 7279014, reviews them)."""
-_LEVEL, _LEVEL_APART = np.log(8e-7), 30.0  # of Gd(0.2 cycle/m) [m3]: as good as flat, as a car's gain must not depend on it
+# Of the logarithm of Gd(0.2 cycle/m) [m3]: as good as flat, for hundreds of blocks would make of it a car's gain.
+_LEVEL, _LEVEL_APART = np.log(8e-7), 30.0
 _NOISE_APART = 1.0  # of the logarithm of what the readings hold besides: half to four times the power that is known
 _LEAST_NOISE = 2 * 0.02**2 / 100  # m2/s4 per Hz: of a sensor of which nothing is known, 0.02 m/s2 at 100 Hz
 _RECEIVER_MPS = 0.05  # standard error of its mean speed over a block (0.1 m/s a fix, by the Doppler shift)
@@ -56,11 +57,12 @@ _AT_ONCE = 4096
 
 EXTRA = ("wheelbase_m", "sensor.ahead_m", "noise")
 """Coordinates behind those of ``NUMBERS``: logarithm, length [m], logarithm of the noise over what is known of it."""
+COORDINATES = (*NUMBERS, *EXTRA)
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known of a car, its sensor and how well.
+class CarKnowledge:
+    """What is known of a car and its sensor, and how well.
 
     wheelbase_m, wheelbase_std    and its standard error, as a share
     ahead_m, ahead_std_m          of the sensor before the centre of gravity
@@ -92,10 +94,10 @@ class Known:
         return car_of(x[:own], float(np.exp(x[own])), sprung_mass_kg, SensorPlace(float(x[own + 1])), name)
 
 
-def band_gains(known: Known, x: Array, speed_mps: Array, spread: Array) -> Array:
+def band_gains(knowledge: CarKnowledge, x: Array, speed_mps: Array, spread: Array) -> Array:
     """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at speeds (s,) that have a
     standard deviation of a share ``spread`` (s,)."""
-    vehicle = known.car(x, 1.0, "")
+    vehicle = knowledge.car(x, 1.0, "")
     structure = half_car(vehicle)
     f_hz = grid_hz()
     by_axle = frequency_response(structure, [body_point(structure, vehicle.sensor.ahead_m)], f_hz)[:, 0, :]
@@ -123,7 +125,7 @@ class LearnedCar:
     """Coordinates (p,) with their covariance (p, p); the roads; and the logarithm of the posterior density there with
     the roads integrated out (Laplace)."""
 
-    known: Known
+    knowledge: CarKnowledge
     x: Array
     covariance: Array
     roads: Roads
@@ -139,8 +141,8 @@ class LearnedCar:
 class UnknownCar:
     """The problem: blocks of drives, and what is known before."""
 
-    def __init__(self, spectra: DriveSpectra, known: Known) -> None:
-        self.spectra, self.known = spectra, known
+    def __init__(self, spectra: DriveSpectra, knowledge: CarKnowledge) -> None:
+        self.spectra, self.knowledge = spectra, knowledge
         key = np.round(np.log(spectra.speed_mps) / _SPEED_STEP).astype(int)
         _, self.speed = np.unique(key, return_inverse=True)
         each = np.bincount(self.speed)
@@ -157,7 +159,7 @@ class UnknownCar:
 
     def gains(self, x: Array) -> Array:
         """As ``band_gains`` at the speeds of the drives (s, k)."""
-        return band_gains(self.known, x, self.speed_mps, self.spread)
+        return band_gains(self.knowledge, x, self.speed_mps, self.spread)
 
     def expected_power(self, x: Array, roads: Roads, gains: Array | None = None) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
@@ -191,9 +193,9 @@ class UnknownCar:
         whole = road + noise
         ratio = self.power / whole
         observed = _moments(self.weight * (road / whole) ** 2 * ratio, own_slope, _PRECISION)
-        off = x - self.known.mean
+        off = x - self.knowledge.mean
         value = (-(self.weight * (np.log(whole) + ratio)).sum() - 0.5 * np.log(_determinant(observed)).sum() - 0.5 * (
-            off @ self.known.precision @ off + _PRECISION[0] * ((level - _LEVEL) ** 2).sum()
+            off @ self.knowledge.precision @ off + _PRECISION[0] * ((level - _LEVEL) ** 2).sum()
             + _PRECISION[1] * (own**2).sum() + (roads.stretch**2).sum() / WAVINESS_APART**2))
         return found, float(value)
 
@@ -206,9 +208,9 @@ class UnknownCar:
     def fit(self) -> LearnedCar:
         """The most probable car and stretches, blocks integrated out: the best of searches that begin with equal
         wheels, and with front or rear ones that hop faster."""
-        turned = np.zeros(len(self.known.mean))
+        turned = np.zeros(len(self.knowledge.mean))
         turned[[NUMBERS.index(f"{end}.hop_hz") for end in ("front", "rear")]] = 0.5 * _HOPS_APART, -0.5 * _HOPS_APART
-        return max((self.fit_from(self.known.mean + sign * turned) for sign in (0, 1, -1)),
+        return max((self.fit_from(self.knowledge.mean + sign * turned) for sign in (0, 1, -1)),
                    key=lambda one: one.log_evidence)
 
     def fit_from(self, start: Array, held: Sequence[int] = ()) -> LearnedCar:
@@ -232,7 +234,7 @@ class UnknownCar:
             if gain < _SMALL_GAIN:
                 converged = True
                 break
-        return LearnedCar(self.known, x, step.covariance, roads, value + step.log_volume, converged)
+        return LearnedCar(self.knowledge, x, step.covariance, roads, value + step.log_volume, converged)
 
 
 def _moments(weight: Array, slope: Array, precision: Array) -> Array:
@@ -329,7 +331,7 @@ class _Step:
         """Information (p, p) and score (p,) of the car, its prior in them."""
         own, own_score = self._of_stretches
         across = self._outer[:, 0, 1:]
-        known = self._problem.known
+        known = self._problem.knowledge
         information = self._outer[:, 1:, 1:].sum(axis=0) - across.T @ (across / own[:, None]) + known.precision
         score = self._score[:, 1:].sum(axis=0) - across.T @ (own_score / own) - known.precision @ (self._x - known.mean)
         return information, score
@@ -368,6 +370,55 @@ class _Step:
         return self._x + move, Roads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
 
 
+def misfit(problem: UnknownCar, learned: LearnedCar) -> Array:
+    """Mean power over what is expected, less 1, in units of its standard deviation: (s, k) by thirds of the drives'
+    speeds and bands; 0 where there are no readings."""
+    road, noise = problem.expected_power(learned.x, learned.roads)
+    speeds = problem.spectra.speed_mps
+    group = np.searchsorted(np.quantile(speeds, (1 / 3, 2 / 3)), speeds)
+    off = problem.weight * (problem.power / (road + noise) - 1)
+    sums, weights = (np.array([one[group == each].sum(axis=0) for each in range(3)]) for one in (off, problem.weight))
+    return np.where(weights > 0, sums / np.sqrt(np.maximum(weights, 1e-12)), 0.0)
+
+
+def log_error(problem: UnknownCar, x: Array) -> float:
+    """Root mean square of the logarithm of the mean power of each band and third of the speeds over what a car lets
+    expect, each block at its most probable level and waviness: how far the shape of the spectra is off."""
+    roads, _ = problem.with_blocks(x, problem.start(x))
+    road, noise = problem.expected_power(x, roads)
+    speeds = problem.spectra.speed_mps
+    group = np.searchsorted(np.quantile(speeds, (1 / 3, 2 / 3)), speeds)
+    ratio = problem.power / (road + noise)
+    seen = problem.weight > 0
+    means = [np.where(seen, ratio, 0.0)[group == each].sum(axis=0) / np.maximum(seen[group == each].sum(axis=0), 1)
+             for each in range(3)]
+    means = [one[one > 0] for one in means]
+    return float(np.sqrt(np.mean(np.log(np.concatenate(means)) ** 2)))
+
+
+def apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> tuple[float, Array]:
+    """How far apart two cars are in some of their numbers: squared distance in standard errors over the number of
+    numbers, and each difference in standard errors (n,). Both contain what is known of cars in general, which makes
+    them more alike than they are."""
+    at = [COORDINATES.index(name) for name in names]
+    off = one.x[at] - other.x[at]
+    covariance = (one.covariance + other.covariance)[np.ix_(at, at)]
+    return float(off @ np.linalg.solve(covariance, off)) / len(at), off / np.sqrt(np.diag(covariance))
+
+
+def iri_errors(knowledge: CarKnowledge, x: Array, covariance: Array, speeds_mps: Sequence[float], noise: float,
+               level: float, draws: int = 40) -> Array:
+    """Standard error of an IRI, as a share of it, at speeds (v,) where a car is estimated with coordinates (p,) that
+    have this covariance (p, p)."""
+    cars = np.random.default_rng(0).multivariate_normal(x, covariance, draws, method="eigh")
+    found = []
+    for speed in speeds_mps:
+        own = reading_power(knowledge, x, speed)
+        ratios = [iri_ratio(own, reading_power(knowledge, one, speed), speed, noise, level) for one in cars]
+        found.append(np.sqrt(np.mean(np.log(ratios) ** 2)))
+    return np.array(found)
+
+
 def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, level: float) -> float:
     """IRI that an estimator with one car's gains finds on a road, over what is right, where the readings come from
     another.
@@ -398,8 +449,8 @@ def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, 
     return float(np.sqrt((slope * found).sum() / slope.sum()))
 
 
-def reading_power(known: Known, x: Array, speed_mps: float) -> Array:
+def reading_power(knowledge: CarKnowledge, x: Array, speed_mps: float) -> Array:
     """Squared gain (n,) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4], where recorders pass it."""
-    vehicle = known.car(x, 1.0, "")
+    vehicle = knowledge.car(x, 1.0, "")
     return np.abs(body_acceleration_response(half_car(vehicle), WAVE_NUMBERS_CPM * speed_mps, speed_mps,
                                              vehicle.sensor)) ** 2

@@ -1,0 +1,575 @@
+"""A car that nobody measured, learnt from ordinary drives: question, answer, words and page."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from logger.api.question import Argument, LongQuestion, Option, Out, Range, Runs, Verb, each, function
+from logger.api.shown import CommandResult
+from logger.chart_data import Chart, Curves, Line
+from logger.errors import BadInput, CheckFailed
+from logger.units import MPH_MPS
+
+if TYPE_CHECKING:
+    from logger.estimation.drive_spectra import DriveSpectra
+    from logger.identification.unknown_car import Array, CarKnowledge, LearnedCar, UnknownCar
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.vehicle_file import Model
+
+WHEELBASE = Range(1.5, 5.0, "m")
+CAR_MASS = Range(300.0, 10_000.0, "kg")
+_FARTHEST_AHEAD_M = 4.0
+_TOLD_STD_M, _UNTOLD_STD_M = 0.1, 0.2
+"""Standard error of where the sensor sits before the centre of gravity, which nobody knows exactly; and where nothing
+is said, within the front of the cabin."""
+_FEWEST_BLOCKS = 60
+"""Two minutes of steady driving: damping is then known to some 20 %."""
+_WRONG_WHEELBASE, _SIGMA = 0.03, 4.0
+"""As a share: a wheelbase is on the car's data sheet to a millimetre, its load moves it by a per cent."""
+_UNLIKE = 6.0
+"""Squared distance of two cars over the number of numbers: 6 numbers exceed it by chance once in 100,000 (chi2)."""
+_NO_CAR = 6.0
+"""Root mean square of the misfit in standard deviations: cars of the bench leave 1 to 2."""
+_MOST_GROUPS, _LOOSE = 8, 0.1
+"""Of many drives, groups that are compared; and how well the wheelbase is known there, as a share."""
+_LIMP, _ONE_SPEED = 0.1, 1.5
+"""A damping ratio below it is that of a worn damper (new ones have 0.2 to 0.4); a ratio of speeds that is too small to
+tell the car's frequencies from the road's waves."""
+_SPEEDS_MPH = (10, 20, 30, 40, 50, 60, 70)
+_COMPARED = (*(f"{end}.{name}" for end in ("front", "rear") for name in ("bounce_hz", "damping_ratio", "hop_hz")),
+             "wheelbase_m")
+
+
+def _ahead(text: str) -> float:
+    name, _, value = text.partition("=")
+    try:
+        ahead_m = float(value)
+    except ValueError:
+        ahead_m = float("nan")
+    if name.strip() != "ahead_m" or not abs(ahead_m) <= _FARTHEST_AHEAD_M:
+        raise ValueError(f"expected ahead_m=METRES, from -{_FARTHEST_AHEAD_M:g} to {_FARTHEST_AHEAD_M:g}")
+    return ahead_m
+
+
+@dataclass(frozen=True)
+class LearnCarQuestion(LongQuestion):
+    """Learn a car that nobody has measured, from ordinary drives over roads that nobody has measured.
+
+    Each DRIVE is a dump of the box (.dump, .dump.gz), a run's folder or its drive.csv (t_s,accel_z_mps2,speed_mps), or
+    a phone's recording as ridelog extract reads it. Twenty minutes are enough, with some at 30, 60 and 90 km/h; town
+    helps. Measure the wheelbase, or read it off the car's data sheet.
+
+      ridelog learn-car drives/*.dump.gz --wheelbase 2.66 --out mycar.yaml
+      ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
+
+    It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
+    wheels; the roads' levels and waviness are found with them. The last drive is kept back first, to show the error on
+    a drive that no fit saw; what is written comes from all drives. Masses, springs and dampers share a scale that the
+    IRI does not need: without --mass it is a convention. What does not fit is refused in words (exit status 1): a
+    wrong wheelbase, drives of two cars, readings of another axis.
+
+    In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
+    """
+
+    drives: Annotated[Runs, Argument("dump, run's folder, drive.csv or recording of a phone", metavar="DRIVE",
+                                     read=Path, many=list)]
+    wheelbase_m: Annotated[float, Option("distance between the axles [m]", WHEELBASE, "M")]
+    _: KW_ONLY
+    mass_kg: Annotated[float | None, Option(
+        "of the whole car as it is driven [kg] (default: a convention)", CAR_MASS, "KG")] = None
+    sensor: Annotated[float | None, Option(
+        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: about the "
+        "middle)", metavar="ahead_m=M", read=_ahead)] = None
+    compare: Annotated[Path | None, Option(
+        "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LearnedVehicle(CommandResult):
+    """A car out of its drives.
+
+    model              the vehicle, with standard errors
+    parameters         ``NUMBERS`` by name, with ``standard_errors``
+    iri_std            what is left unknown of an IRI by speed, as a share; ``iri_std_before`` of any car of this
+                       wheelbase
+    """
+
+    model: "Model"
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    iri_std: Mapping[float, float]
+    iri_std_before: Mapping[float, float]
+    spectra: tuple[Chart, ...]
+    comments: str
+
+    title = "A car learnt from its drives"
+
+    def charts(self) -> Sequence[Chart]:
+        """Measured and modelled spectra by speed, before and after."""
+        return self.spectra
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the vehicle's file."""
+        from logger.store.formats.vehicle_file import write_model
+
+        write_model(path, self.model, self.comments)
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """What to do with it."""
+        files = [path for path in written.get("--out", ()) if path.suffix in (".yaml", ".yml")]
+        return (f"Next: set vehicle: {files[0]} in the box's settings." if files else
+                "Next: --out mycar.yaml writes the vehicle's file.")
+
+
+# --- drives ---
+
+
+def read_drives(source: "Drive | Path | str", tell: Any) -> "list[Drive]":
+    """The drives of a dump, a run or a phone's recording. BadInput for one that cannot be read."""
+    from logger.api.csv_extraction import CsvSettings, recorded_csv
+    from logger.api.extraction import even_drives, recorded_dump
+    from logger.service.config import Config
+    from logger.store.formats.drive_file import DRIVE
+
+    if not isinstance(source, str | Path):
+        return [source]
+    path = Path(source)
+    if not path.exists():
+        raise BadInput(f"{path}: expected a dump, a run's folder or a recording of a phone, found no such file")
+    if path.name.endswith((".dump", ".dump.gz")):
+        return even_drives(recorded_dump(path, None, "rav4-2009", tell), path)
+    if path.name == DRIVE or (path / DRIVE).exists() or _is_drive(path):
+        return [_read_run(path)]
+    return even_drives(recorded_csv(path, CsvSettings(), Config(), tell), path)
+
+
+def _is_drive(path: Path) -> bool:
+    """Whether a table has the columns of a drive."""
+    from logger.store.formats.drive_file import SPEED, header_of
+    from logger.store.formats.record_file import VERTICAL
+
+    if not path.is_file():
+        return False
+    try:
+        return {SPEED, VERTICAL} <= set(header_of(path))
+    except BadInput:
+        return False
+
+
+def _read_run(path: Path) -> "Drive":
+    """A run whose distance may be missing."""
+    from logger.store.formats.drive_file import DISTANCE, DRIVE, SPEED, drive_of, facts_beside, read_columns
+    from logger.store.formats.record_file import TIME, even_rate_hz
+
+    table = path / DRIVE if path.is_dir() else path
+    file, columns = read_columns(table, timed=True, more=(SPEED,))
+    drive = drive_of(path, even_rate_hz(columns[TIME], file), {DISTANCE: columns[SPEED], **columns})
+    return replace(drive, facts=facts_beside(table))
+
+
+def spectra_of(drive: "Drive") -> "DriveSpectra":
+    """The blocks of a drive, with what is known of its sensor."""
+    import numpy as np
+
+    from logger.estimation.drive_spectra import drive_spectra
+    from logger.runs import READING
+
+    facts = drive.facts
+    known = [one for one in (facts.noise_mps2, facts.step_mps2 and facts.step_mps2 / 12**0.5) if one]
+    noise = 2 * sum(one**2 for one in known) / drive.rate_hz if known else np.nan
+    usable = np.isfinite(drive.accel_z_mps2) if drive.usable is None else drive.usable == READING
+    return drive_spectra(drive.accel_z_mps2, drive.speed_mps, usable, drive.rate_hz, noise,
+                         (facts.pass_band_hz or (0.0, np.inf))[1])
+
+
+# --- the answer ---
+
+
+@dataclass(frozen=True, eq=False)
+class _Used:
+    """A drive that has blocks."""
+
+    name: str
+    seconds: float
+    spectra: "DriveSpectra"
+
+
+def _used(question: LearnCarQuestion) -> "list[_Used]":
+    given = each(question.drives)
+    if not given:
+        raise BadInput("learn-car: expected a drive, found none")
+    paths = [Path(one).resolve() for one in given if isinstance(one, str | Path)]
+    if again := next((one for one in paths if paths.count(one) > 1), None):
+        raise BadInput(f"{again}: expected every drive once, found it twice")
+    found = []
+    for source in given:
+        drives = read_drives(source, question.progress)
+        for number, drive in enumerate(drives, 1):
+            name = Path(drive.path).name + (f" ({number})" if len(drives) > 1 else "")
+            found.append(_Used(name, len(drive.accel_z_mps2) / drive.rate_hz, spectra_of(drive)))
+        question.progress(f"read {source if isinstance(source, str | Path) else 'a drive'}")
+    blocks = sum(len(one.spectra) for one in found)
+    if blocks < _FEWEST_BLOCKS:
+        driven_s = sum(one.seconds for one in found)
+        raise BadInput(f"learn-car: expected two minutes of steady driving at least, found {2 * blocks} s in "
+                       f"{driven_s:.0f} s of drives: drive for twenty minutes, some of it at 30, 60 and 90 km/h")
+    return [one for one in found if len(one.spectra)]
+
+
+def learned(question: LearnCarQuestion) -> LearnedVehicle:
+    """The answer to ``LearnCarQuestion``, which says what is raised."""
+    from logger.estimation.drive_spectra import joined
+    from logger.identification.unknown_car import CarKnowledge, UnknownCar
+
+    used = _used(question)
+    knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor or 0.0,
+                             ahead_std_m=_UNTOLD_STD_M if question.sensor is None else _TOLD_STD_M)
+    problem = UnknownCar(joined([one.spectra for one in used]), knowledge)
+    question.progress("finding the car")
+    car = problem.fit()
+    question.progress("checking it")
+    _check_drives(used, knowledge, car.x, question.progress)
+    _check_wheelbase(problem, car)
+    _check_fit(problem, car)
+    return _answer(question, used, problem, car)
+
+
+def _check_wheelbase(problem: "UnknownCar", car: "LearnedCar") -> None:
+    """CheckFailed where the interference between the axles is that of another wheelbase."""
+    import numpy as np
+
+    from logger.identification.unknown_car import UnknownCar
+
+    at = _place("wheelbase_m")
+    free = UnknownCar(problem.spectra, replace(problem.knowledge, wheelbase_std=0.2))
+    fits = [free.fit_from(start) for start in (car.x, *(_moved(car.x, at, step) for step in (-0.1, 0.1)))]
+    found = max(fits, key=lambda one: one.log_evidence)
+    off, std = float(found.x[at] - np.log(problem.knowledge.wheelbase_m)), float(found.std[at])
+    if abs(off) > max(_SIGMA * std, _WRONG_WHEELBASE):
+        metres = float(np.exp(found.x[at]))
+        raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: the drives show axles {metres:.2f} +- "
+                          f"{max(metres * std, 0.005):.2f} m apart: measure it again, between the hubs of one side "
+                          "(with a trailer, or of two cars, drives show none)")
+
+
+def _moved(x: "Array", at: int, step: float) -> "Array":
+    moved = x.copy()
+    moved[at] += step
+    return moved
+
+
+def _check_drives(used: "Sequence[_Used]", knowledge: "CarKnowledge", start: "Array", tell: Any) -> None:
+    """CheckFailed where one drive, or one group of many, is of another car than the rest."""
+    from logger.estimation.drive_spectra import joined
+    from logger.identification.unknown_car import UnknownCar, apart
+
+    groups: list[list[_Used]] = []
+    most = -(-sum(len(one.spectra) for one in used) // _MOST_GROUPS)
+    for one in used:
+        if groups and sum(len(each.spectra) for each in groups[-1]) < max(
+                _FEWEST_BLOCKS, most if len(used) > _MOST_GROUPS else 0):
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    if len(groups) < 2:
+        return
+    loose = replace(knowledge, wheelbase_std=_LOOSE)
+    for number, group in enumerate(groups):
+        others = [one for other in groups[:number] + groups[number + 1:] for one in other]
+        tell(f"checking {group[0].name}")
+        own, rest = (UnknownCar(joined([one.spectra for one in some]), loose).fit_from(start)
+                     for some in (group, others))
+        distance, differences = apart(own, rest, _COMPARED)
+        if distance > _UNLIKE:
+            name = _COMPARED[max(range(len(_COMPARED)), key=lambda at: abs(differences[at]))]
+            those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
+            as_what = "the others" if len(others) > 1 else others[0].name
+            raise CheckFailed(
+                f"{group[0].name}: {those} not of the same car as {as_what}: {_words_of(name)} {_value(own, name)}, not "
+                f"{_value(rest, name)}: learn each car from its own drives (a trailer, a full boot or other tires make "
+                "another car)")
+
+
+def _value(car: "LearnedCar", name: str) -> str:
+    import numpy as np
+
+    at = _place(name)
+    value = float(np.exp(car.x[at]))
+    unit = " Hz" if name.endswith("_hz") else " m" if name.endswith("_m") else ""
+    return f"{value:.3g} +- {value * float(car.std[at]):.1g}{unit}"
+
+
+def _place(name: str) -> int:
+    """Of a number among the coordinates."""
+    from logger.identification.unknown_car import COORDINATES
+
+    return COORDINATES.index(name)
+
+
+def _words_of(name: str) -> str:
+    if name == "wheelbase_m":
+        return "wheelbase"
+    end, _, number = name.partition(".")
+    said = {"bounce_hz": "body bounce", "damping_ratio": "damping ratio", "hop_hz": "wheel hop"}
+    return f"{end} {said[number]}"
+
+
+def _check_fit(problem: "UnknownCar", car: "LearnedCar") -> None:
+    """CheckFailed where no car answers a road like that."""
+    import numpy as np
+
+    from logger.identification.unknown_car import misfit
+
+    off = float(np.sqrt(np.mean(misfit(problem, car) ** 2)))
+    if off > _NO_CAR:
+        raise CheckFailed(f"learn-car: no car of this wheelbase answers roads like these drives (misfit {off:.1f} "
+                          "standard deviations): is vertical_axis the one that points up, is the sensor bolted to the "
+                          "body, were they driven without a trailer?")
+
+
+def _answer(question: LearnCarQuestion, used: "Sequence[_Used]", problem: "UnknownCar", car: "LearnedCar"
+            ) -> LearnedVehicle:
+    import numpy as np
+
+    from logger.api.vehicles import Model
+    from logger.estimation.drive_spectra import joined
+    from logger.identification.unknown_car import UnknownCar, iri_errors, log_error
+    from logger.store.formats.vehicle_file import Step
+    from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG
+
+    knowledge, own = problem.knowledge, len(NUMBERS)
+    long = [one for one in used if len(one.spectra) >= _FEWEST_BLOCKS] or used
+    kept = long[-1] if len(used) > 1 else None
+    errors: dict[str, Any] = {"drive": None, "error_before": None, "error_after": None, "log_evidence_gain": None}
+    if kept is not None:
+        without = UnknownCar(joined([one.spectra for one in used if one is not kept]), knowledge).fit_from(car.x)
+        unseen = UnknownCar(kept.spectra, knowledge)
+        before, after = (log_error(unseen, x) for x in (knowledge.mean, without.x))
+        gain = unseen.with_blocks(without.x, unseen.start(without.x))[1] - unseen.with_blocks(
+            knowledge.mean, unseen.start(knowledge.mean))[1]
+        off = without.x - knowledge.mean
+        errors = {"drive": kept.name, "error_before": before, "error_after": after,
+                  "log_evidence_gain": float(gain + 0.5 * off @ knowledge.precision @ off)}
+    speeds = [mph * MPH_MPS for mph in _SPEEDS_MPH]
+    noise = float(np.nanmedian(problem.noise) * np.exp(car.x[-1]))
+    level = float(np.exp(np.median(car.roads.level)))
+    prior = np.linalg.inv(knowledge.precision)
+    now = dict(zip(speeds, map(float, iri_errors(knowledge, car.x, car.covariance, speeds, noise, level)), strict=True))
+    ever = dict(zip(speeds, map(float, iri_errors(knowledge, knowledge.mean, prior, speeds, noise, level)),
+                    strict=True))
+    mass = USUAL_MASS_KG if question.mass_kg is None else _sprung_side_kg(question.mass_kg, car.x)
+    vehicle = knowledge.car(car.x, mass, "learned-car")
+    history = () if kept is None else (Step("learn-car", errors["error_after"]),)
+    model = Model(vehicle, history=history, errors=_number_errors(knowledge, car, mass))
+    shown = [*NUMBERS, "wheelbase_m"]
+    values = {name: _shown(name, float(car.x[at])) for at, name in enumerate(shown)}
+    deviations = {name: _slope(name, values[name]) * float(car.std[at]) for at, name in enumerate(shown)}
+    untold = list(_untold(problem, car, question))
+    moved = list(_changes(question, car)) if question.compare else []
+    seconds = sum(one.seconds for one in used)
+    as_json = {
+        "parameters": values, "standard_errors": deviations, "sensor_ahead_m": float(car.x[own + 1]),
+        "drives": len(used), "seconds": seconds, "blocks": len(problem.spectra),
+        "speed_low_mps": float(problem.spectra.speed_mps.min()),
+        "speed_high_mps": float(problem.spectra.speed_mps.max()),
+        "iri": [{"speed_mps": speed, "std_share": now[speed], "std_share_before": ever[speed]} for speed in speeds],
+        "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
+        "converged": car.is_converged, "not_told": untold, "changes": moved}
+    lines = [*_head(used, problem, seconds), "", *_table(values, deviations), "", *_iri_lines(now, ever), "",
+             *_kept_lines(errors), _mass_line(question, mass), *_warnings(values, deviations, car), *untold, *moved]
+    comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in
+                       [f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *lines])
+    return LearnedVehicle("\n".join(lines), as_json, model, values, deviations, now, ever,
+                          tuple(_charts(problem, car)), comments)
+
+
+def _shown(name: str, coordinate: float) -> float:
+    import numpy as np
+
+    return float(1 / (1 + np.exp(-coordinate)) if name == "rear_share" else np.exp(coordinate))
+
+
+def _slope(name: str, value: float) -> float:
+    return value * (1 - value) if name == "rear_share" else value
+
+
+def _sprung_side_kg(mass_kg: float, x: "Array") -> float:
+    """Sprung mass of one side of a car that weighs so much with its wheels."""
+    import numpy as np
+
+    from logger.vehicle.published_cars import NUMBERS
+
+    share = _shown("rear_share", float(x[NUMBERS.index("rear_share")]))
+    ratios = [float(np.exp(x[NUMBERS.index(f"{end}.unsprung_to_sprung")])) for end in ("front", "rear")]
+    return mass_kg / 2 / (1 + ratios[0] * (1 - share) + ratios[1] * share)
+
+
+def _number_errors(knowledge: "CarKnowledge", car: "LearnedCar", mass: float) -> Any:
+    """Errors of the numbers of the vehicle's file, that of the common scale left out."""
+    import numpy as np
+
+    from logger.vehicle.named_parameters import read, sized
+    from logger.vehicle.uncertain import NumberErrors
+
+    vehicle = knowledge.car(car.x, mass, "")
+    names = [one for one in sized(vehicle) if one != "sprung_mass_kg"]
+    if vehicle.sensor.ahead_m:
+        names.append("sensor.ahead_m")
+    slopes = np.zeros((len(names), len(car.x)))
+    for at in range(len(car.x) - 1):
+        low, high = (knowledge.car(_moved(car.x, at, step), mass, "") for step in (-1e-4, 1e-4))
+        slopes[:, at] = [(read(high, name) - read(low, name)) / 2e-4 for name in names]
+    return NumberErrors.of_covariance(names, slopes @ car.covariance @ slopes.T)
+
+
+# --- words ---
+
+
+def _head(used: "Sequence[_Used]", problem: "UnknownCar", seconds: float) -> Iterator[str]:
+    speeds = problem.spectra.speed_mps
+    many = f"{len(used)} drives" if len(used) > 1 else "1 drive"
+    yield (f"{many}, {seconds / 60:.0f} min; {2 * len(speeds) / 60:.0f} min of them at nearly steady speed, "
+           f"{3.6 * speeds.min():.0f} to {3.6 * speeds.max():.0f} km/h")
+
+
+def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Iterator[str]:
+    yield f"{'':26}{'front':>18}{'rear':>18}"
+    for name, words in (("bounce_hz", "body bounce [Hz]"), ("damping_ratio", "damping ratio"),
+                        ("hop_hz", "wheel hop [Hz]"), ("unsprung_to_sprung", "unsprung / sprung mass")):
+        cells = [f"{values[f'{end}.{name}']:.3f} +- {deviations[f'{end}.{name}']:.3f}" for end in ("front", "rear")]
+        yield f"  {words:24}{cells[0]:>18}{cells[1]:>18}"
+    for name, words in (("rear_share", "share of weight on the rear axle"), ("dynamic_index", "dynamic index of pitch"),
+                        ("wheelbase_m", "wheelbase [m]"), ("contact_patch_m", "contact patch [m]")):
+        yield f"  {words:42}{f'{values[name]:.3f} +- {deviations[name]:.3f}':>18}"
+
+
+def _iri_lines(now: Mapping[float, float], ever: Mapping[float, float]) -> Iterator[str]:
+    yield "What is left unknown of the IRI by the car, as a standard error [%]:"
+    yield f"  {'km/h':24}" + "".join(f"{3.6 * speed:7.0f}" for speed in now)
+    yield f"  {'any car so long':24}" + "".join(f"{100 * value:7.0f}" for value in ever.values())
+    yield f"  {'this car':24}" + "".join(f"{100 * value:7.1f}" for value in now.values())
+
+
+def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
+    if errors["drive"] is None:
+        yield "One drive: none could be kept back to check the car on."
+        return
+    yield (f"Kept back: {errors['drive']}: its spectra are off by {100 * errors['error_before']:.0f} % with any car so "
+           f"long, by {100 * errors['error_after']:.0f} % with a car learnt from the others (log evidence "
+           f"{errors['log_evidence_gain']:+.0f}).")
+
+
+def _mass_line(question: LearnCarQuestion, mass: float) -> str:
+    if question.mass_kg is None:
+        return (f"Masses, springs and dampers share a scale that no drive tells and no IRI needs: {mass:.0f} kg on the "
+                "springs of one side, a convention; --mass sets it.")
+    return (f"Masses, springs and dampers are those of a car of {question.mass_kg:g} kg: {mass:.0f} kg on the springs "
+            "of one side.")
+
+
+def _warnings(values: Mapping[str, float], deviations: Mapping[str, float], car: "LearnedCar") -> Iterator[str]:
+    for end in ("front", "rear"):
+        name = f"{end}.damping_ratio"
+        if values[name] + deviations[name] < _LIMP:
+            yield (f"The {end} damping ratio of {values[name]:.2f} is that of a worn damper (new ones: 0.2 to 0.4): "
+                   "have it looked at.")
+    if not car.is_converged:
+        yield "The search did not come to an end: the numbers may be off by more than their errors; give more drives."
+
+
+def _untold(problem: "UnknownCar", car: "LearnedCar", question: LearnCarQuestion) -> Iterator[str]:
+    """What the drives cannot tell, a line each."""
+    import numpy as np
+
+    from logger.vehicle.published_cars import NUMBERS
+
+    low, high = np.quantile(problem.spectra.speed_mps, (0.05, 0.95))
+    if high < _ONE_SPEED * low:
+        yield (f"All drives at one speed ({3.6 * low:.0f} to {3.6 * high:.0f} km/h): springs and the road's waviness "
+               "cannot be told apart; add one at 30 and one at 90 km/h.")
+    elif 3.6 * high < 60:
+        yield "No drive was faster than 60 km/h: add one at 90 km/h, where springs and dampers show best."
+    prior = np.sqrt(np.diag(np.linalg.inv(problem.knowledge.precision)))
+    unknown = [name for at, name in enumerate(NUMBERS) if car.std[at] > 0.8 * prior[at]]
+    said = {"bounce_hz": "body bounce", "damping_ratio": "damping", "hop_hz": "wheel hop",
+            "unsprung_to_sprung": "unsprung mass", "dynamic_index": "dynamic index of pitch",
+            "rear_share": "share of weight on the rear axle", "contact_patch_m": "contact patch"}
+    if unknown:
+        words = [" ".join(filter(None, [name.rpartition(".")[0], said[name.rpartition(".")[2]]])) for name in unknown]
+        yield f"Not told by these drives, and as of published cars: {', '.join(words)}."
+
+
+def _changes(question: LearnCarQuestion, car: "LearnedCar") -> Iterator[str]:
+    """What has changed since another file was learnt."""
+    import numpy as np
+
+    from logger.api.vehicles import read_vehicle
+    from logger.vehicle.published_cars import NUMBERS, coordinates_of
+
+    assert question.compare is not None
+    before = read_vehicle(question.compare)
+    try:
+        x = coordinates_of(before.vehicle)
+    except ValueError as error:
+        raise BadInput(f"{question.compare}: {error}") from None
+    spread = _coordinate_errors(before)
+    found = []
+    for name in _COMPARED[:-1]:
+        at = NUMBERS.index(name)
+        change, std = float(car.x[at] - x[at]), float(np.hypot(car.std[at], spread[at]))
+        if abs(change) > 2 * std:
+            found.append(f"{_words_of(name)} {100 * np.expm1(change):+.0f} % (+- {100 * std:.0f})")
+    yield (f"Changed since {question.compare}: {', '.join(found)}." if found else
+           f"Nothing has changed since {question.compare} by more than two standard errors.")
+
+
+def _coordinate_errors(model: "Model") -> "Array":
+    """Standard errors of a model's coordinates, out of those of its numbers; 0 where it says none."""
+    import numpy as np
+
+    from logger.vehicle.named_parameters import changed, read
+    from logger.vehicle.published_cars import NUMBERS, coordinates_of
+
+    if model.errors is None:
+        return np.zeros(len(NUMBERS))
+    names = [name for name in model.errors.standard_errors if not name.startswith("sensor.")]
+    kept = [at for at, name in enumerate(model.errors.standard_errors) if name in names]
+    deviations = np.array([model.errors.standard_errors[name] for name in names])
+    covariance = model.errors.matrix()[np.ix_(kept, kept)] * np.outer(deviations, deviations)
+    slopes = np.zeros((len(NUMBERS), len(names)))
+    for at, name in enumerate(names):
+        value = read(model.vehicle, name)
+        low, high = (coordinates_of(changed(model.vehicle, {name: value * (1 + step)})) for step in (-1e-5, 1e-5))
+        slopes[:, at] = (high - low) / (2e-5 * value)
+    return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+
+
+def _charts(problem: "UnknownCar", car: "LearnedCar") -> "Iterator[Chart]":
+    """Measured and expected spectra of thirds of the speeds."""
+    import numpy as np
+
+    from logger.estimation.drive_spectra import middles_hz
+
+    f_hz, speeds = middles_hz(), problem.spectra.speed_mps
+    edges = np.quantile(speeds, (0.0, 1 / 3, 2 / 3, 1.0))
+    start = problem.knowledge.mean
+    before, _ = problem.with_blocks(start, problem.start(start))
+    cars = {"any car so long": (start, before), "this car": (car.x, car.roads)}
+    for low, high in pairwise(edges):
+        group = (speeds >= low) & (speeds <= high)
+        seen = (problem.weight[group] > 0).all(axis=0)
+        lines = [Line("measured", f_hz[seen], problem.power[group].mean(axis=0)[seen], dots=True)]
+        for name, (x, roads) in cars.items():
+            road, noise = problem.expected_power(x, roads)
+            lines.append(Line(name, f_hz[seen], (road + noise)[group].mean(axis=0)[seen]))
+        yield Curves(f"Spectra at {3.6 * low:.0f} to {3.6 * high:.0f} km/h", "frequency [Hz]",
+                     "acceleration [m2/s4 per Hz]", tuple(lines), log_x=True, log_y=True)
+
+
+learn_car = function("learn_car", LearnCarQuestion, learned)
+
+VERB = Verb(LearnCarQuestion, "logger.api.learn_car:learned", (
+    Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, before and "
+        "after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))

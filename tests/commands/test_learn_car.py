@@ -1,0 +1,95 @@
+"""``ridelog learn-car`` over drives of a car by equations of their own (``support.drives.unmeasured_car``)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logger.store.formats.vehicle_file import read_model
+from logger.vehicle.uncertain import cars_off
+
+from ..support.command import called
+from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, mixed, written
+
+CAR = UnmeasuredCar()
+SECONDS = 120.0
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return written(tmp_path_factory.mktemp("drives"), mixed(CAR, 3, SECONDS))
+
+
+@pytest.fixture(scope="module")
+def learned(runs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path, Path]:
+    folder = tmp_path_factory.mktemp("learned")
+    found = called("learn-car", *runs, "--wheelbase", 2.68, "--mass", 1400, "--json", "--out", folder / "car.yaml",
+                   "--out", folder / "car.html")
+    assert found.returncode == 0, found.stderr
+    return json.loads(found.stdout), folder / "car.yaml", folder / "car.html"
+
+
+def test_frequencies_and_damping_are_those_of_the_car(learned: tuple[dict[str, Any], Path, Path]) -> None:
+    found = learned[0]
+    for end in ("front", "rear"):
+        for name, true in zip(("bounce_hz", "damping_ratio", "hop_hz"), getattr(CAR, end), strict=False):
+            value, error = (found[key][f"{end}.{name}"] for key in ("parameters", "standard_errors"))
+            assert abs(value - true) < 3.5 * error < 0.6 * true
+    assert abs(found["parameters"]["wheelbase_m"] - CAR.wheelbase_m) < 0.02
+    assert all(one["std_share"] < 0.5 * one["std_share_before"] for one in found["iri"])
+
+
+def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[str, Any], Path, Path]) -> None:
+    _, path, page = learned
+    model = read_model(path)
+    assert len(cars_off(model.vehicle, model.effects, model.errors)) >= 10
+    assert "sprung_mass_kg" not in model.errors.standard_errors  # type: ignore[union-attr]
+    whole_kg = 2 * sum((model.vehicle.sprung_mass_kg, model.vehicle.front.unsprung_mass_kg,
+                        model.vehicle.rear.unsprung_mass_kg))  # type: ignore[union-attr]
+    assert whole_kg == pytest.approx(1400)
+    assert path.read_text().startswith("# Learnt by ridelog learn-car from 4 drives")
+    assert "Spectra at" in page.read_text() and "<svg" in page.read_text()
+
+
+@pytest.mark.parametrize("wrong_m", [2.66 * 1.1, 2.66 * 0.9])
+def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
+    found = called("learn-car", *runs, "--wheelbase", wrong_m)
+    assert found.returncode == 1 and found.stdout == ""
+    assert "the drives show axles 2.6" in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+def test_drives_of_two_cars_are_refused(runs: list[Path], tmp_path: Path) -> None:
+    other = UnmeasuredCar(2.66, 0.4, (1.5, 0.4, 12.8, 0.1), (1.6, 0.35, 12.6, 0.12))
+    strange = written(tmp_path, mixed(other, 5, 2 * SECONDS, speeds_mps=(45 * MPH,)))
+    found = called("learn-car", *runs[:3], *strange, "--wheelbase", 2.66)
+    assert found.returncode == 1 and "not of the same car" in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+def test_one_speed_says_what_to_add(tmp_path: Path) -> None:
+    runs = written(tmp_path, mixed(CAR, 4, 2 * SECONDS, speeds_mps=(30 * MPH,)))
+    found = called("learn-car", *runs, "--wheelbase", 2.66)
+    assert found.returncode == 0 and "add one at 30 and one at 90 km/h" in found.stdout
+    assert "none could be kept back" in found.stdout
+
+
+def test_what_is_no_drive_is_refused_in_one_line(tmp_path: Path, runs: list[Path]) -> None:
+    for words, said in (((tmp_path / "none", "--wheelbase", 2.66), "found no such file"),
+                        ((*runs, "--wheelbase", 266), "--wheelbase 266: expected 1.5 to 5 m"),
+                        ((*runs, "--wheelbase", 2.66, "--sensor", "left_m=1"), "expected ahead_m=METRES"),
+                        ((runs[0], runs[0], "--wheelbase", 2.66), "expected every drive once"),
+                        ((runs[3], "--wheelbase", 2.66), "expected two minutes of steady driving")):
+        found = called("learn-car", *words)
+        assert found.returncode == 2 and said in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+def test_last_year_s_file_says_what_changed(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
+    worn = UnmeasuredCar(front=(1.25, 0.28, 11.6, 0.12), rear=(1.42, 0.13, 11.1, 0.14))
+    found = called("learn-car", *written(tmp_path, mixed(worn, 6, 2 * SECONDS)), "--wheelbase", 2.66, "--compare",
+                   learned[1], "--json")
+    changes = json.loads(found.stdout)["changes"][0]
+    assert "rear damping ratio -" in changes and "wheel hop" not in changes
+    assert np.isfinite(json.loads(found.stdout)["kept_back"]["log_evidence_gain"])
