@@ -28,8 +28,10 @@ _FEWEST_BLOCKS = 60
 """Two minutes of steady driving: damping is then known to some 20 %."""
 _WRONG_WHEELBASE, _SIGMA = 0.03, 4.0
 """As a share: a wheelbase is on the car's data sheet to a millimetre, its load moves it by a per cent."""
-_UNLIKE = 6.0
-"""Squared distance of two cars over the number of numbers: 6 numbers exceed it by chance once in 100,000 (chi2)."""
+_UNLIKE = 5.0
+"""Squared distance of two cars over the number of numbers: 7 numbers exceed it by chance once in 50,000 (chi2)."""
+_CHANGED = 2.64
+"""Standard errors: one of six numbers is so far off by chance in one case of 20."""
 _NO_CAR = 6.0
 """Root mean square of the misfit in standard deviations: cars of the bench leave 1 to 2."""
 _MOST_GROUPS, _LOOSE = 8, 0.1
@@ -269,7 +271,7 @@ def _check_drives(used: "Sequence[_Used]", knowledge: "CarKnowledge", start: "Ar
     most = -(-sum(len(one.spectra) for one in used) // _MOST_GROUPS)
     for one in used:
         if groups and sum(len(each.spectra) for each in groups[-1]) < max(
-                _FEWEST_BLOCKS, most if len(used) > _MOST_GROUPS else 0):
+                _FEWEST_BLOCKS // 2, most if len(used) > _MOST_GROUPS else 0):
             groups[-1].append(one)
         else:
             groups.append([one])
@@ -287,9 +289,9 @@ def _check_drives(used: "Sequence[_Used]", knowledge: "CarKnowledge", start: "Ar
             those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
             as_what = "the others" if len(others) > 1 else others[0].name
             raise CheckFailed(
-                f"{group[0].name}: {those} not of the same car as {as_what}: {_words_of(name)} {_value(own, name)}, not "
-                f"{_value(rest, name)}: learn each car from its own drives (a trailer, a full boot or other tires make "
-                "another car)")
+                f"{group[0].name}: {those} not of the same car as {as_what}: {_words_of(name)} {_value(own, name)}, "
+                f"not {_value(rest, name)}: learn each car from its own drives (a trailer, a full boot or other tires "
+                "make another car)")
 
 
 def _value(car: "LearnedCar", name: str) -> str:
@@ -355,7 +357,7 @@ def _answer(question: LearnCarQuestion, used: "Sequence[_Used]", problem: "Unkno
     speeds = [mph * MPH_MPS for mph in _SPEEDS_MPH]
     noise = float(np.nanmedian(problem.noise) * np.exp(car.x[-1]))
     level = float(np.exp(np.median(car.roads.level)))
-    prior = np.linalg.inv(knowledge.precision)
+    prior = np.asarray(np.linalg.inv(knowledge.precision), dtype=np.float64)
     now = dict(zip(speeds, map(float, iri_errors(knowledge, car.x, car.covariance, speeds, noise, level)), strict=True))
     ever = dict(zip(speeds, map(float, iri_errors(knowledge, knowledge.mean, prior, speeds, noise, level)),
                     strict=True))
@@ -519,10 +521,10 @@ def _changes(question: LearnCarQuestion, car: "LearnedCar") -> Iterator[str]:
     for name in _COMPARED[:-1]:
         at = NUMBERS.index(name)
         change, std = float(car.x[at] - x[at]), float(np.hypot(car.std[at], spread[at]))
-        if abs(change) > 2 * std:
+        if abs(change) > _CHANGED * std:
             found.append(f"{_words_of(name)} {100 * np.expm1(change):+.0f} % (+- {100 * std:.0f})")
     yield (f"Changed since {question.compare}: {', '.join(found)}." if found else
-           f"Nothing has changed since {question.compare} by more than two standard errors.")
+           f"Nothing has changed since {question.compare} by more than chance.")
 
 
 def _coordinate_errors(model: "Model") -> "Array":

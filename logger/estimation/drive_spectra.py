@@ -76,8 +76,9 @@ def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
     """Several drives as one; their stretches stay apart."""
     begins = np.cumsum([0, *(int(one.stretch.max(initial=-1)) + 1 for one in drives[:-1])])
     stretch = [one.stretch + begin for one, begin in zip(drives, begins, strict=True)]
-    return DriveSpectra(*(np.concatenate([getattr(one, name) for one in drives])
-                          for name in ("speed_mps", "spread", "power", "noise")), np.concatenate(stretch))
+    speed, spread, power, noise = (np.concatenate([getattr(one, name) for one in drives])
+                                   for name in ("speed_mps", "spread", "power", "noise"))
+    return DriveSpectra(speed, spread, power, noise, np.concatenate(stretch))
 
 
 @cache
