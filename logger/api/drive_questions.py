@@ -3,6 +3,8 @@
 What ``ridelog simulate`` is asked.
 
 What the verbs about measured profiles and random ones are asked: iri, road classify, road generate.
+
+What ``ridelog learn-car`` is asked.
 """
 
 import re
@@ -46,6 +48,7 @@ from logger.api.question import (
     Range,
     ResampleHz,
     ResampleM,
+    Runs,
     Unit,
     Vehicle,
     VehicleName,
@@ -559,3 +562,57 @@ EXACT_IRI = Verb(IriCommand, "logger.api.roads:asked_iri", (PICTURES,))
 CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (
     Out("write the smoothed spectrum of the (left) track as CSV", "--psd", "FILE", ("*",), False, False), PICTURES))
 GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road_of")
+
+
+# --- learn-car ---
+
+_WHEELBASE, _CAR_MASS, _FARTHEST_AHEAD_M = Range(1.5, 5.0, "m"), Range(300.0, 10_000.0, "kg"), 4.0
+
+
+def _ahead(text: str) -> float:
+    name, _, value = text.partition("=")
+    try:
+        ahead_m = float(value)
+    except ValueError:
+        ahead_m = float("nan")
+    if name.strip() != "ahead_m" or not abs(ahead_m) <= _FARTHEST_AHEAD_M:
+        raise ValueError(f"expected ahead_m=METRES, from -{_FARTHEST_AHEAD_M:g} to {_FARTHEST_AHEAD_M:g}")
+    return ahead_m
+
+
+@dataclass(frozen=True)
+class LearnCarQuestion(LongQuestion):
+    """Learn a car that nobody has measured, from ordinary drives over roads that nobody has measured.
+
+    Each DRIVE is a dump of the box (.dump, .dump.gz), a run's folder or its drive.csv (t_s,accel_z_mps2,speed_mps), or
+    a phone's recording as ridelog extract reads it. Twenty minutes are enough, with some at 30, 60 and 90 km/h; town
+    helps. Measure the wheelbase, or read it off the car's data sheet.
+
+      ridelog learn-car drives/*.dump.gz --wheelbase 2.66 --out mycar.yaml
+      ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
+
+    It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
+    wheels; the roads' levels and waviness are found with them. The last drive is kept back first, to show the error on
+    a drive that no fit saw; what is written comes from all drives. Masses, springs and dampers share a scale that the
+    IRI does not need: without --mass it is a convention. What does not fit is refused in words (exit status 1): a
+    wrong wheelbase, drives of two cars, readings of another axis.
+
+    In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
+    """
+
+    drives: Annotated[Runs, Argument("dump, run's folder, drive.csv or recording of a phone", metavar="DRIVE",
+                                     read=Path, many=list)]
+    wheelbase_m: Annotated[float, Option("distance between the axles [m]", _WHEELBASE, "M")]
+    _: KW_ONLY
+    mass_kg: Annotated[float | None, Option(
+        "of the whole car as it is driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
+    sensor: Annotated[float | None, Option(
+        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: about the "
+        "middle)", metavar="ahead_m=M", read=_ahead)] = None
+    compare: Annotated[Path | None, Option(
+        "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
+
+
+LEARN_CAR = Verb(LearnCarQuestion, "logger.api.learn_car:learned", (
+    Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, before and "
+        "after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))

@@ -1,12 +1,15 @@
-"""A car that nobody measured, learnt from ordinary drives: question, answer, words and page."""
+"""A car that nobody measured, learnt from ordinary drives: answer, words and page."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from logger.api.question import Argument, LongQuestion, Option, Out, Range, Runs, Verb, each, function
+from logger.api.drive_questions import LearnCarQuestion
+from logger.api.question import each, function
 from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed
@@ -18,9 +21,6 @@ if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
     from logger.store.formats.vehicle_file import Model
 
-WHEELBASE = Range(1.5, 5.0, "m")
-CAR_MASS = Range(300.0, 10_000.0, "kg")
-_FARTHEST_AHEAD_M = 4.0
 _TOLD_STD_M, _UNTOLD_STD_M = 0.1, 0.2
 """Standard error of where the sensor sits before the centre of gravity, which nobody knows exactly; and where nothing
 is said, within the front of the cabin."""
@@ -44,50 +44,6 @@ _COMPARED = (*(f"{end}.{name}" for end in ("front", "rear") for name in ("bounce
              "wheelbase_m")
 
 
-def _ahead(text: str) -> float:
-    name, _, value = text.partition("=")
-    try:
-        ahead_m = float(value)
-    except ValueError:
-        ahead_m = float("nan")
-    if name.strip() != "ahead_m" or not abs(ahead_m) <= _FARTHEST_AHEAD_M:
-        raise ValueError(f"expected ahead_m=METRES, from -{_FARTHEST_AHEAD_M:g} to {_FARTHEST_AHEAD_M:g}")
-    return ahead_m
-
-
-@dataclass(frozen=True)
-class LearnCarQuestion(LongQuestion):
-    """Learn a car that nobody has measured, from ordinary drives over roads that nobody has measured.
-
-    Each DRIVE is a dump of the box (.dump, .dump.gz), a run's folder or its drive.csv (t_s,accel_z_mps2,speed_mps), or
-    a phone's recording as ridelog extract reads it. Twenty minutes are enough, with some at 30, 60 and 90 km/h; town
-    helps. Measure the wheelbase, or read it off the car's data sheet.
-
-      ridelog learn-car drives/*.dump.gz --wheelbase 2.66 --out mycar.yaml
-      ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
-
-    It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
-    wheels; the roads' levels and waviness are found with them. The last drive is kept back first, to show the error on
-    a drive that no fit saw; what is written comes from all drives. Masses, springs and dampers share a scale that the
-    IRI does not need: without --mass it is a convention. What does not fit is refused in words (exit status 1): a
-    wrong wheelbase, drives of two cars, readings of another axis.
-
-    In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
-    """
-
-    drives: Annotated[Runs, Argument("dump, run's folder, drive.csv or recording of a phone", metavar="DRIVE",
-                                     read=Path, many=list)]
-    wheelbase_m: Annotated[float, Option("distance between the axles [m]", WHEELBASE, "M")]
-    _: KW_ONLY
-    mass_kg: Annotated[float | None, Option(
-        "of the whole car as it is driven [kg] (default: a convention)", CAR_MASS, "KG")] = None
-    sensor: Annotated[float | None, Option(
-        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: about the "
-        "middle)", metavar="ahead_m=M", read=_ahead)] = None
-    compare: Annotated[Path | None, Option(
-        "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class LearnedVehicle(CommandResult):
     """A car out of its drives.
@@ -98,7 +54,7 @@ class LearnedVehicle(CommandResult):
                        wheelbase
     """
 
-    model: "Model"
+    model: Model
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float]
     iri_std: Mapping[float, float]
@@ -128,7 +84,7 @@ class LearnedVehicle(CommandResult):
 # --- drives ---
 
 
-def read_drives(source: "Drive | Path | str", tell: Any) -> "list[Drive]":
+def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
     """The drives of a dump, a run or a phone's recording. BadInput for one that cannot be read."""
     from logger.api.csv_extraction import CsvSettings, recorded_csv
     from logger.api.extraction import even_drives, recorded_dump
@@ -160,7 +116,7 @@ def _is_drive(path: Path) -> bool:
         return False
 
 
-def _read_run(path: Path) -> "Drive":
+def _read_run(path: Path) -> Drive:
     """A run whose distance may be missing."""
     from logger.store.formats.drive_file import DISTANCE, DRIVE, SPEED, drive_of, facts_beside, read_columns
     from logger.store.formats.record_file import TIME, even_rate_hz
@@ -171,7 +127,7 @@ def _read_run(path: Path) -> "Drive":
     return replace(drive, facts=facts_beside(table))
 
 
-def spectra_of(drive: "Drive") -> "DriveSpectra":
+def spectra_of(drive: Drive) -> DriveSpectra:
     """The blocks of a drive, with what is known of its sensor."""
     import numpy as np
 
@@ -195,10 +151,10 @@ class _Used:
 
     name: str
     seconds: float
-    spectra: "DriveSpectra"
+    spectra: DriveSpectra
 
 
-def _used(question: LearnCarQuestion) -> "list[_Used]":
+def _used(question: LearnCarQuestion) -> list[_Used]:
     given = each(question.drives)
     if not given:
         raise BadInput("learn-car: expected a drive, found none")
@@ -238,7 +194,7 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     return _answer(question, used, problem, car)
 
 
-def _check_wheelbase(problem: "UnknownCar", car: "LearnedCar") -> None:
+def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where the interference between the axles is that of another wheelbase."""
     import numpy as np
 
@@ -256,13 +212,13 @@ def _check_wheelbase(problem: "UnknownCar", car: "LearnedCar") -> None:
                           "(with a trailer, or of two cars, drives show none)")
 
 
-def _moved(x: "Array", at: int, step: float) -> "Array":
+def _moved(x: Array, at: int, step: float) -> Array:
     moved = x.copy()
     moved[at] += step
     return moved
 
 
-def _check_drives(used: "Sequence[_Used]", knowledge: "CarKnowledge", start: "Array", tell: Any) -> None:
+def _check_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, tell: Any) -> None:
     """CheckFailed where one drive, or one group of many, is of another car than the rest."""
     from logger.estimation.drive_spectra import joined
     from logger.identification.unknown_car import UnknownCar, apart
@@ -294,7 +250,7 @@ def _check_drives(used: "Sequence[_Used]", knowledge: "CarKnowledge", start: "Ar
                 "make another car)")
 
 
-def _value(car: "LearnedCar", name: str) -> str:
+def _value(car: LearnedCar, name: str) -> str:
     import numpy as np
 
     at = _place(name)
@@ -318,7 +274,7 @@ def _words_of(name: str) -> str:
     return f"{end} {said[number]}"
 
 
-def _check_fit(problem: "UnknownCar", car: "LearnedCar") -> None:
+def _check_fit(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where no car answers a road like that."""
     import numpy as np
 
@@ -331,7 +287,7 @@ def _check_fit(problem: "UnknownCar", car: "LearnedCar") -> None:
                           "body, were they driven without a trailer?")
 
 
-def _answer(question: LearnCarQuestion, used: "Sequence[_Used]", problem: "UnknownCar", car: "LearnedCar"
+def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar
             ) -> LearnedVehicle:
     import numpy as np
 
@@ -397,7 +353,7 @@ def _slope(name: str, value: float) -> float:
     return value * (1 - value) if name == "rear_share" else value
 
 
-def _sprung_side_kg(mass_kg: float, x: "Array") -> float:
+def _sprung_side_kg(mass_kg: float, x: Array) -> float:
     """Sprung mass of one side of a car that weighs so much with its wheels."""
     import numpy as np
 
@@ -408,7 +364,7 @@ def _sprung_side_kg(mass_kg: float, x: "Array") -> float:
     return mass_kg / 2 / (1 + ratios[0] * (1 - share) + ratios[1] * share)
 
 
-def _number_errors(knowledge: "CarKnowledge", car: "LearnedCar", mass: float) -> Any:
+def _number_errors(knowledge: CarKnowledge, car: LearnedCar, mass: float) -> Any:
     """Errors of the numbers of the vehicle's file, that of the common scale left out."""
     import numpy as np
 
@@ -429,7 +385,7 @@ def _number_errors(knowledge: "CarKnowledge", car: "LearnedCar", mass: float) ->
 # --- words ---
 
 
-def _head(used: "Sequence[_Used]", problem: "UnknownCar", seconds: float) -> Iterator[str]:
+def _head(used: Sequence[_Used], problem: UnknownCar, seconds: float) -> Iterator[str]:
     speeds = problem.spectra.speed_mps
     many = f"{len(used)} drives" if len(used) > 1 else "1 drive"
     yield (f"{many}, {seconds / 60:.0f} min; {2 * len(speeds) / 60:.0f} min of them at nearly steady speed, "
@@ -471,7 +427,7 @@ def _mass_line(question: LearnCarQuestion, mass: float) -> str:
             "of one side.")
 
 
-def _warnings(values: Mapping[str, float], deviations: Mapping[str, float], car: "LearnedCar") -> Iterator[str]:
+def _warnings(values: Mapping[str, float], deviations: Mapping[str, float], car: LearnedCar) -> Iterator[str]:
     for end in ("front", "rear"):
         name = f"{end}.damping_ratio"
         if values[name] + deviations[name] < _LIMP:
@@ -481,7 +437,7 @@ def _warnings(values: Mapping[str, float], deviations: Mapping[str, float], car:
         yield "The search did not come to an end: the numbers may be off by more than their errors; give more drives."
 
 
-def _untold(problem: "UnknownCar", car: "LearnedCar", question: LearnCarQuestion) -> Iterator[str]:
+def _untold(problem: UnknownCar, car: LearnedCar, question: LearnCarQuestion) -> Iterator[str]:
     """What the drives cannot tell, a line each."""
     import numpy as np
 
@@ -503,7 +459,7 @@ def _untold(problem: "UnknownCar", car: "LearnedCar", question: LearnCarQuestion
         yield f"Not told by these drives, and as of published cars: {', '.join(words)}."
 
 
-def _changes(question: LearnCarQuestion, car: "LearnedCar") -> Iterator[str]:
+def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
     """What has changed since another file was learnt."""
     import numpy as np
 
@@ -527,7 +483,7 @@ def _changes(question: LearnCarQuestion, car: "LearnedCar") -> Iterator[str]:
            f"Nothing has changed since {question.compare} by more than chance.")
 
 
-def _coordinate_errors(model: "Model") -> "Array":
+def _coordinate_errors(model: Model) -> Array:
     """Standard errors of a model's coordinates, out of those of its numbers; 0 where it says none."""
     import numpy as np
 
@@ -548,7 +504,7 @@ def _coordinate_errors(model: "Model") -> "Array":
     return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
 
 
-def _charts(problem: "UnknownCar", car: "LearnedCar") -> "Iterator[Chart]":
+def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
     """Measured and expected spectra of thirds of the speeds."""
     import numpy as np
 
@@ -571,7 +527,3 @@ def _charts(problem: "UnknownCar", car: "LearnedCar") -> "Iterator[Chart]":
 
 
 learn_car = function("learn_car", LearnCarQuestion, learned)
-
-VERB = Verb(LearnCarQuestion, "logger.api.learn_car:learned", (
-    Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, before and "
-        "after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))

@@ -71,7 +71,7 @@ GROUPS = {
 """Verbs by what a person is about to do; each line begins with a verb and says which question it answers."""
 VERBS = {verb: meaning for group in GROUPS.values() for verb, meaning in group.items()}
 ASKED = {
-    "learn-car": "learn_car:VERB",
+    "learn-car": "drive_questions:LEARN_CAR",
     "identify": "identify.question:VERB",
     "compare": "lab.question:COMPARE",
     "diagnose": "lab.question:DIAGNOSE",
