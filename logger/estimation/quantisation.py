@@ -15,6 +15,7 @@ on one side only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import log
 
 import numpy as np
@@ -28,10 +29,8 @@ Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
 _TRIALS = 12
-# Each leaves a tenth of the error before it, so that what changed by less is right within a thousandth: where a
-# chip is read four times per sample mostly after two. All four change no IRI by more than 2e-5 of its standard error.
-_EVENING_ROUNDS, _NEARLY_EVEN = 4, 0.01
-_LEAST_WEIGHT = 1e-9  # among the others, where none tells of another
+_EVENING_ROUNDS, _NEARLY_EVEN = 6, 0.01
+_MEDIUM_S = 0.5  # half a swing of a body on its springs, so that readings of either sign of a wave share a medium
 _LEAST_OTHERS = 1e-3  # of an even reading's information
 _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
 
@@ -69,34 +68,51 @@ def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     [(m/s2)2], and the variance (t,) of even readings that say as much about it; ``variance`` (t,) is that of the
     readings.
 
-    The mean of their precisions would make too much of the precise ones: two of them side by side say little more than
-    one. Even readings that stand for those about a place have the variance e for which a reading put among the others
-    weighs the same on the mean, 1 / (others + e) = mean of 1 / (others + variance).
-    Source: the coherent potential approximation (Soven, Physical Review 156, 1967), with ``variance`` as disorder.
-
-    The mean is over the others alone, each as much as it tells: where C is the covariance of what is left open, the
-    derivative of what is left at t in the precision of the reading at s is -C(t - s)^2.
+    Sharp readings side by side say little more than one. About each place the readings are even ones of precision p
+    that change to their own, w: C is the covariance that even ones leave, c its value at lag 0, and t = (w - p) /
+    (1 + (w - p) c) what one such change does whatever it is. Without its own, a reading finds the medium's c, less
+    sum of t(s) C(s)^2 over the others s, the second order of log det(1 + C (w - p)) in t. The first order is nothing,
+    because p is chosen so that the mean of t about a place is 0.
+    Source: the coherent potential approximation (Soven, Physical Review 156, 1967) and its correction by pairs, with
+    the precisions as disorder.
     """
-    covariance = motion.covariance_left(1 / float((1 / variance).mean()))
-    kernel = np.maximum((covariance / covariance[0]) ** 2, _LEAST_WEIGHT)
-    kernel[0] = 0.0
-    about = np.fft.rfft(kernel / kernel.sum()).real
+    precision = 1 / variance
+    trials, log_trials = _trials(variance)
+    resolved = np.asarray(motion.resolved_per_reading(trials))
+    log_left = np.log(resolved) + log_trials
+    about = _medium(len(variance), motion.rate_hz)
 
     def mean(row: Array) -> Array:
-        return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
+        return np.fft.irfft(np.fft.rfft(row) * about, len(row))
 
-    trials, log_trials = _trials(variance)
-    # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
-    log_others = log_trials - np.log(np.maximum(1 / motion.resolved_per_reading(trials) - 1, _LEAST_OTHERS))
-    log_even = -np.log(mean(1 / variance))
-    others = np.exp(_between_even(log_even, log_trials, log_others))
-    for _ in range(_EVENING_ROUNDS - 1):
-        before = others
-        log_even = np.log(np.maximum(1 / mean(1 / (others + variance)) - others, variance.min()))
-        others = np.exp(_between_even(log_even, log_trials, log_others))
-        if np.abs(others - before).max() < _NEARLY_EVEN * others.min():
+    least = precision.min()
+    medium = np.maximum(mean(precision), least)
+    for _ in range(_EVENING_ROUNDS):
+        left = np.exp(_between_even(-np.log(medium), log_trials, log_left))
+        change = (precision - medium) / (1 + (precision - medium) * left)
+        shared = mean(change)
+        step = shared / (1 + shared * left)
+        medium = np.maximum(medium + step, least)
+        if np.abs(step).max() < _NEARLY_EVEN * medium.min():
             break
-    return others, np.exp(log_even)
+    left = np.exp(_between_even(-np.log(medium), log_trials, log_left))
+    change = (precision - medium) / (1 + (precision - medium) * left)
+    covariance = motion.covariance_left(1 / float(medium.mean()))
+    alike = (covariance / covariance[0]) ** 2
+    alike[0] = 0.0
+    pairs = np.fft.irfft(np.fft.rfft(change * left) * np.fft.rfft(alike).real, len(variance))
+    others = left / np.maximum(1 + pairs - medium * left, _LEAST_OTHERS)
+    # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
+    log_others = log_trials - np.log(np.maximum(1 / resolved - 1, _LEAST_OTHERS))
+    return others, np.exp(np.interp(np.log(others), log_others, log_trials))
+
+
+@lru_cache(maxsize=4)
+def _medium(count: int, rate_hz: float) -> Array:
+    """The rfft of how much each neighbour counts for the even readings about a place; kept, for there are few."""
+    lag_s = np.minimum(np.arange(count), count - np.arange(count)) / rate_hz
+    kernel = np.exp(-0.5 * (lag_s / _MEDIUM_S) ** 2)
+    return np.asarray(np.fft.rfft(kernel / kernel.sum()).real)
 
 
 def _trials(variance: Array) -> tuple[Array, Array]:
