@@ -9,6 +9,7 @@ rounds.
 from __future__ import annotations
 
 from collections import Counter
+from copy import copy
 from dataclasses import dataclass, replace
 from math import exp, log, pi
 
@@ -31,7 +32,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.roughness import Roughness, mean_resolved
+from logger.estimation.roughness import Roughness, evidence_slope, mean_resolved
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
@@ -61,6 +62,8 @@ _LEAST_SHARE_OF_STEP = 0.07
 # and 0.07 with none, 1 to 4, 5 to 19, 20 to 99 and more such readings in a block, where these say 0.70, 0.55, 0.22,
 # 0.11 and 0.02.
 _LIKE_NOISE, _HALVED_BY = 0.7, 6.0
+_RISE, _TAKEN_OVER, _LEAST_BEND, _FOLLOWED_SAMPLES = 0.4, 0.2, 0.05, 600
+DEBUG = False
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
 
@@ -116,7 +119,11 @@ class FollowedRoad:
         self._like_noise = 0.0
         self._other.restart()
         self._solved_last: tuple[Block, ComplexArray] | None = None
-        self._roughness = Roughness(self._spacing_m)
+        self._roughness: Roughness | _Raised = Roughness(self._spacing_m)
+        self._roughness.is_bent = self._is_coarse
+        self._risen = _Change()
+        self._risen_road = None
+        self._bends = np.zeros(2)
         self._unscored = 0
         self._parked: Counter[int] = Counter()
         self._parked_at_mps2 = 0.0
@@ -174,6 +181,7 @@ class FollowedRoad:
             return
         guess = self._expected_of(fresh)
         count = len(guess.variance)
+        self._risen = self._risen.moved_on(count)
         self._gaussian = GaussianReadings(
             np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
             np.concatenate([self._gaussian.variance[count:], guess.variance]),
@@ -226,11 +234,37 @@ class FollowedRoad:
         self._begun = True
         seen = block.seen(read)
         for done in range(1, most + 1):
+            begun_with = self._gaussian, self._belief
             result = self._round(block, samples, read, seen, steps, before, done == rounds, is_last, beyond_mps2,
                                  beyond_variance)
             if done >= rounds and self._roughness.moved < _STILL_MOVES:
                 break
+        if self._is_coarse and is_last and before is not None and begun_with[0] is not None:
+            self._probe(block, samples, read, seen, steps, beyond_mps2, beyond_variance, *begun_with)
         return result
+
+    def _probe(self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, beyond_mps2: Array | float,
+               beyond_variance: float, gaussian: GaussianReadings, belief: Belief) -> None:
+        """How the evidence bends with the level where the bounds follow it."""
+        kept = copy(self)
+        kept._other = copy(self._other)
+        assert self._solved_last is not None and self._gaussian is not None
+        kept._roughness = raised = _Raised(self._log_before + _RISE)
+        kept._gaussian, kept._belief, kept._learner = self._risen.on(gaussian), belief, None
+        waves = self._solved_waves
+        if self._risen_road is not None:
+            waves = waves + block.carried_over(*self._risen_road)
+        kept._solved_last = block, waves
+        kept._round(block, samples, read, seen, steps, belief.spectrum, False, False, beyond_mps2, beyond_variance)
+        assert kept._gaussian is not None
+        self._risen = _Change.between(self._gaussian, kept._gaussian)
+        self._risen_road = block, kept._solved_waves - self._solved_waves
+        counted = seen * (np.arange(block.count) < block.point_at(len(samples) - _FOLLOWED_SAMPLES))
+        before, expected = evidence_slope(*self._shown[:3], counted, *self._shown[3:])
+        after, _ = evidence_slope(*raised.shown[:3], counted, *raised.shown[3:])
+        self._bends[:] = (1 - _TAKEN_OVER) * self._bends + _TAKEN_OVER * np.array([(before - after) / _RISE, expected])
+        if DEBUG: print("bend", (before - after) / _RISE, expected, before)
+        self._roughness.bend = min(max(self._bends[0] / self._bends[1], _LEAST_BEND), 1/_LEAST_BEND) if self._bends[1] > 0 else 1.0
 
     def _round(
         self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
@@ -255,7 +289,7 @@ class FollowedRoad:
 
         moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
-        gain, ratio = solution.gain, np.ones(block.count)
+        gain, ratio, free = solution.gain, np.ones(block.count), None
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(samples), reads)
             solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
@@ -271,6 +305,8 @@ class FollowedRoad:
                 ratio = block.about(np.where(moving, mean_variance / even, 0.0)) / shown
                 ratio = np.where(shown > _LEAST_SHOWN, np.maximum(ratio, _LEAST_SHOWN), 1.0)
                 drift_variance = solution.drift_variance / float(ratio[seen > 0].mean())
+                free = float((weight / (1 / others + weight))[moving].sum())
+                free *= 1 / (1 + block.car.behind_m.max() / self._spacing_m / float(seen.sum()))
                 as_read = samples.reading_mps2.ravel() + _at_each(beyond_mps2, reads)
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
@@ -284,8 +320,11 @@ class FollowedRoad:
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.
             now = learnt(now, power, resolved, block.log_waves, seen_share, before)
+        self._log_before = log_variance
+        self._solved_waves = solution.waves
+        self._shown = exp(0.5 * above_common) * solution.innovations, log_variance, exp(-above_common) * gain, ratio, seen, free
         self._roughness.learn(first, exp(0.5 * above_common) * solution.innovations, log_variance,
-                              exp(-above_common) * gain, seen, ratio, learns and is_last and before is not None)
+                              exp(-above_common) * gain, seen, ratio, learns and is_last and before is not None, free)
         found = self._roughness.at(first, block.count)
         level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
         self._belief = replace(now, spectrum=replace(now.spectrum, log_level=level))
@@ -369,6 +408,48 @@ class FollowedRoad:
         variance = np.exp(self._roughness.at(first, count))
         there = replace(self._belief.spectrum, log_level=COMMON_ROAD.log_level)
         return _levelled(there, variance), self._roughness.log_std(first, count)
+
+
+class _Raised:
+    """A road whose level is known, and what readings would say of it."""
+
+    def __init__(self, log_variance: Array) -> None:
+        self._log_variance = log_variance
+        self.shown: tuple = ()
+
+    def solved_with(self, first: int, count: int) -> Array:
+        return self._log_variance
+
+    def at(self, first: int, count: int) -> Array:
+        return self._log_variance
+
+    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
+              sharper: Array, learns: bool = False, free: float | None = None) -> None:
+        self.shown = innovations, log_before, gain, sharper, seen, free
+
+
+@dataclass(frozen=True)
+class _Change:
+    """Of Gaussian readings: their precision (y,), and that times their value."""
+
+    precision: Array | None = None
+    pull: Array | None = None
+
+    @classmethod
+    def between(cls, one: GaussianReadings, other: GaussianReadings) -> _Change:
+        return cls(1 / other.variance - 1 / one.variance,
+                   other.value_mps2 / other.variance - one.value_mps2 / one.variance)
+
+    def on(self, readings: GaussianReadings) -> GaussianReadings:
+        if self.precision is None:
+            return readings
+        precision = np.maximum(1 / readings.variance + self.precision, 0.1 / readings.variance)
+        return GaussianReadings((readings.value_mps2 / readings.variance + self.pull) / precision, 1 / precision)
+
+    def moved_on(self, count: int) -> _Change:
+        if self.precision is None:
+            return self
+        return _Change(*(np.append(row[count:], np.zeros(count)) for row in (self.precision, self.pull)))
 
 
 def _at_each(row: Array | float, reads: int) -> Array | float:

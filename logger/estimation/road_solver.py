@@ -263,6 +263,10 @@ class Block:
         """How many points of the distance grid the car passed while there were readings."""
         return int(self._advance @ read)
 
+    def point_at(self, sample: int) -> int:
+        """The point of the distance grid behind the front wheel at a sample."""
+        return int(self._front[sample])
+
     def about(self, row: Array) -> Array:
         """Mean (count,) of a row (y,) over the readings that show a step of the road at each point, as much as they do
         with either axle; between the nearest where none does."""

@@ -106,6 +106,7 @@ class Roughness:
         self._level: _Level | None = None
         self._log_variances = np.log(_COMMON_VARIANCES)
         self._curvature: Array | float = 0.0
+        self.is_bent, self.bend = False, 1.0
         self.moved = 0.0  # root mean square change of L by the last step, over its cells
         self._common = _COMMON
         self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
@@ -149,7 +150,7 @@ class Roughness:
         return self._level.cells(int(at[0]), int(at[-1] - at[0]) + 1)[0][at - at[0]]
 
     def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
-              sharper: Array | float = 1.0, learns: bool = False) -> None:
+              sharper: Array | float = 1.0, learns: bool = False, free: float | None = None) -> None:
         """Take what a solved block says.
 
         innovations    (n,) v at its points; n is even
@@ -158,24 +159,21 @@ class Roughness:
         seen           (n,) 1 where the road was read, else 0
         sharper        (n,) information there over that of ``gain``
         learns         the variances and the scatter as well: once per block
+        free           degrees of freedom that the road takes of the readings where it was read; None: what follows
+                       from ``gain``
         """
         if not seen.any():
             return
         count = len(innovations)
         strength = log_before + np.log(sharper)
-        table = np.arange(strength.min(), strength.max() + _TABLE_STEP, _TABLE_STEP)
-        share = np.exp(table)[:, None] * gain
-        share /= 1 + share
-        resolved, freedom = (
-            np.exp(np.interp(strength, table, np.log(np.maximum(each.sum(axis=1) * (2 / count), 1e-300))))
-            for each in (share, share**2))
+        resolved, freedom = _resolved(strength, gain, seen, free)
         squares = innovations**2
         rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
                          np.ones(count)]) * seen
         neighbours = _neighbours(count, self._reach)
         power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * neighbours, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
-        self._learn_level(first, squares, freedom, seen / float(neighbours[0].real), learns)
+        self._learn_level(first, squares, freedom, weight, seen / float(neighbours[0].real), learns)
         level = self._levels(first, count)
         power = power * np.exp(-level)
         if learns:
@@ -185,9 +183,10 @@ class Roughness:
         self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
         self._scale_error = 2 / (self._common + weight)
 
-    def _learn_level(self, first: int, squares: Array, freedom: Array, each: Array, learns: bool) -> None:
-        """One Newton step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a
-        part of a neighbourhood."""
+    def _learn_level(self, first: int, squares: Array, freedom: Array, weight: Array, each: Array, learns: bool
+                     ) -> None:
+        """One step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a part of
+        a neighbourhood."""
         cells = (first + np.arange(len(squares))) // self._cell
         begin, edge, end = int(cells[0]), int(cells[np.flatnonzero(each)[0]]), int(cells[-1]) + 1
         old = self._level
@@ -205,14 +204,24 @@ class Roughness:
         prior = np.tensordot(self.variances, alike, 1) + since.T @ (state_covariance - np.diag(self.variances)) @ since
 
         relative = squares[chosen] * np.exp(-now[at])
-        freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
+        freedom, weight, half = freedom[chosen], weight[chosen], 0.5 * self._common * each[chosen]
         slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
         bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)
-        level, shown, information = (np.concatenate(pair) for pair in zip(
-            old.cells(begin, edge - begin), (now, now + slope / bend, bend), strict=True))
-        self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
-        pull = self._level.pull(mean)
-        step = np.clip(mean + prior @ pull - now, -_LARGEST_STEP, _LARGEST_STEP)
+        before = old.cells(begin, edge - begin)
+
+        def believed(information: Array) -> _Level:
+            rows = (np.concatenate(pair) for pair in zip(before, (now, now + slope / information, information),
+                                                         strict=True))
+            return _Level(begin, *rows, edge, prior, state, state_covariance)
+
+        self._level = believed(np.maximum(self.bend * bend, _LEAST_INFORMATION))
+        level, pull = self._level.log_level, self._level.pull(mean)
+        if self.is_bent:
+            first_bend = np.bincount(at, half * weight / (self._common + weight), total)
+            ahead = prior @ believed(np.maximum(first_bend, self._level.information[edge - begin:])).pull(mean)
+        else:
+            ahead = prior @ pull
+        step = np.clip(mean + ahead - now, -_LARGEST_STEP, _LARGEST_STEP)
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))
         if learns:
@@ -261,6 +270,29 @@ class Roughness:
         self._heard += mean - _FORGOTTEN * self._heard
         scatter = (self._scattered + _COMMON * usual) / (self._heard + _COMMON)
         self._common = 2 / max(scatter, 2 / _MOST_COMMON)
+
+
+def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> tuple[Array, Array]:
+    """What the readings resolve of each point (n,) of relative variance exp(strength), and their degrees of freedom:
+    the share's mean over the waves, and that of its square; ``free`` is its sum over what was ``seen`` (n,)."""
+    table = np.arange(strength.min(), strength.max() + _TABLE_STEP, _TABLE_STEP)
+    share = np.exp(table)[:, None] * gain
+    share /= 1 + share
+    resolved, freedom = (
+        np.exp(np.interp(strength, table, np.log(np.maximum(each.sum(axis=1) * (2 / len(strength)), 1e-300))))
+        for each in (share, share**2))
+    if free is not None:
+        resolved = resolved * (free / float(seen @ resolved))
+    return resolved, freedom
+
+
+def evidence_slope(innovations: Array, log_before: Array, gain: Array, counted: Array, sharper: Array, seen: Array,
+                   free: float) -> tuple[float, float]:
+    """Slope of the log evidence in a level that all points ``counted`` (n,) share, and its expected curvature, as
+    ``Roughness.learn``."""
+    resolved, freedom = _resolved(log_before + np.log(sharper), gain, seen, free)
+    return (0.5 * float(counted @ (innovations**2 * np.exp(-log_before) - resolved)),
+            0.5 * float(counted @ freedom))
 
 
 @lru_cache(maxsize=32)
