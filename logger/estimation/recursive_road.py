@@ -62,7 +62,7 @@ _LEAST_SHARE_OF_STEP = 0.07
 # and 0.07 with none, 1 to 4, 5 to 19, 20 to 99 and more such readings in a block, where these say 0.70, 0.55, 0.22,
 # 0.11 and 0.02.
 _LIKE_NOISE, _HALVED_BY = 0.7, 6.0
-_RISE, _TAKEN_OVER, _LEAST_BEND, _FOLLOWED_SAMPLES = 0.4, 0.2, 0.05, 600
+_RISE, _TAKEN_OVER, _LEAST_BEND, _FOLLOWED_SAMPLES = 0.4, 0.2, 0.15, 600
 DEBUG = False
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
@@ -257,7 +257,7 @@ class FollowedRoad:
         kept._solved_last = block, waves
         kept._round(block, samples, read, seen, steps, belief.spectrum, False, False, beyond_mps2, beyond_variance)
         assert kept._gaussian is not None
-        self._risen = _Change.between(self._gaussian, kept._gaussian)
+        self._risen = _Change.between(self._answered, kept._answered)
         self._risen_road = block, kept._solved_waves - self._solved_waves
         counted = seen * (np.arange(block.count) < block.point_at(len(samples) - _FOLLOWED_SAMPLES))
         before, expected = evidence_slope(*self._shown[:3], counted, *self._shown[3:])
@@ -332,6 +332,12 @@ class FollowedRoad:
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
             self._gaussian = self._improved(readings, samples, each, solution, others + drift_variance, usable)
+            self._answered = self._gaussian
+            if self._risen_road is not None:
+                rise = (self._roughness.solved_with(first, block.count) - log_variance) / _RISE
+                self._gaussian = self._risen.on(self._gaussian, np.repeat(block.felt(rise), reads))
+                change = np.fft.irfft(block.carried_over(*self._risen_road), block.count)
+                self._solved_last = block, self._solved_last[1] + np.fft.rfft(rise * change)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())
@@ -440,11 +446,15 @@ class _Change:
         return cls(1 / other.variance - 1 / one.variance,
                    other.value_mps2 / other.variance - one.value_mps2 / one.variance)
 
-    def on(self, readings: GaussianReadings) -> GaussianReadings:
+    def on(self, readings: GaussianReadings, share: Array | float = 1.0) -> GaussianReadings:
         if self.precision is None:
             return readings
-        precision = np.maximum(1 / readings.variance + self.precision, 0.1 / readings.variance)
-        return GaussianReadings((readings.value_mps2 / readings.variance + self.pull) / precision, 1 / precision)
+        before = 1 / readings.variance
+        # a large change must leave a precision, and does so for the value as well
+        share = np.clip(share, -0.5 * before / np.maximum(np.abs(self.precision), 1e-300),
+                        0.5 * before / np.maximum(np.abs(self.precision), 1e-300))
+        precision = before + share * self.precision
+        return GaussianReadings((readings.value_mps2 * before + share * self.pull) / precision, 1 / precision)
 
     def moved_on(self, count: int) -> _Change:
         if self.precision is None:

@@ -48,6 +48,7 @@ _SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
+_WAY = 0.75
 
 
 @dataclass(frozen=True)
@@ -216,12 +217,8 @@ class Roughness:
 
         self._level = believed(np.maximum(self.bend * bend, _LEAST_INFORMATION))
         level, pull = self._level.log_level, self._level.pull(mean)
-        if self.is_bent:
-            first_bend = np.bincount(at, half * weight / (self._common + weight), total)
-            ahead = prior @ believed(np.maximum(first_bend, self._level.information[edge - begin:])).pull(mean)
-        else:
-            ahead = prior @ pull
-        step = np.clip(mean + ahead - now, -_LARGEST_STEP, _LARGEST_STEP)
+        way = _WAY if self.is_bent else 1.0
+        step = np.clip(way * (mean + prior @ pull - now), -_LARGEST_STEP, _LARGEST_STEP)
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))
         if learns:
