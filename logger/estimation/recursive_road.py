@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
+from logger.estimation.level_response import RISE, Answer, HeldLevel, LevelResponse
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
 from logger.estimation.other_motion import OtherMotion
@@ -32,7 +33,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.roughness import Roughness, evidence_slope, mean_resolved
+from logger.estimation.roughness import Roughness, mean_resolved
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
@@ -62,8 +63,6 @@ _LEAST_SHARE_OF_STEP = 0.07
 # and 0.07 with none, 1 to 4, 5 to 19, 20 to 99 and more such readings in a block, where these say 0.70, 0.55, 0.22,
 # 0.11 and 0.02.
 _LIKE_NOISE, _HALVED_BY = 0.7, 6.0
-_RISE, _TAKEN_OVER, _LEAST_BEND, _FOLLOWED_SAMPLES = 0.4, 0.2, 0.15, 600
-DEBUG = False
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
 
@@ -119,11 +118,11 @@ class FollowedRoad:
         self._like_noise = 0.0
         self._other.restart()
         self._solved_last: tuple[Block, ComplexArray] | None = None
-        self._roughness: Roughness | _Raised = Roughness(self._spacing_m)
-        self._roughness.is_bent = self._is_coarse
-        self._risen = _Change()
-        self._risen_road = None
-        self._bends = np.zeros(2)
+        self._roughness = Roughness(self._spacing_m)
+        self._response = LevelResponse()
+        if self._is_coarse:
+            self._roughness.curvature = self._response.curvature
+        self._answer: Answer | None = None
         self._unscored = 0
         self._parked: Counter[int] = Counter()
         self._parked_at_mps2 = 0.0
@@ -181,7 +180,7 @@ class FollowedRoad:
             return
         guess = self._expected_of(fresh)
         count = len(guess.variance)
-        self._risen = self._risen.moved_on(count)
+        self._response.move_on(count)
         self._gaussian = GaussianReadings(
             np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
             np.concatenate([self._gaussian.variance[count:], guess.variance]),
@@ -234,37 +233,28 @@ class FollowedRoad:
         self._begun = True
         seen = block.seen(read)
         for done in range(1, most + 1):
-            begun_with = self._gaussian, self._belief
+            begun_with = copy(self)
             result = self._round(block, samples, read, seen, steps, before, done == rounds, is_last, beyond_mps2,
                                  beyond_variance)
             if done >= rounds and self._roughness.moved < _STILL_MOVES:
                 break
-        if self._is_coarse and is_last and before is not None and begun_with[0] is not None:
-            self._probe(block, samples, read, seen, steps, beyond_mps2, beyond_variance, *begun_with)
+        if self._answer is not None and is_last and before is not None:
+            raised = begun_with._raised_from(block, self._answer)
+            raised._round(block, samples, read, seen, steps, before, False, False, beyond_mps2, beyond_variance)
+            assert raised._answer is not None
+            self._response.learn(block, self._answer, raised._answer)
+            self._roughness.curvature = self._response.curvature
         return result
 
-    def _probe(self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, beyond_mps2: Array | float,
-               beyond_variance: float, gaussian: GaussianReadings, belief: Belief) -> None:
-        """How the evidence bends with the level where the bounds follow it."""
-        kept = copy(self)
-        kept._other = copy(self._other)
-        assert self._solved_last is not None and self._gaussian is not None
-        kept._roughness = raised = _Raised(self._log_before + _RISE)
-        kept._gaussian, kept._belief, kept._learner = self._risen.on(gaussian), belief, None
-        waves = self._solved_waves
-        if self._risen_road is not None:
-            waves = waves + block.carried_over(*self._risen_road)
-        kept._solved_last = block, waves
-        kept._round(block, samples, read, seen, steps, belief.spectrum, False, False, beyond_mps2, beyond_variance)
-        assert kept._gaussian is not None
-        self._risen = _Change.between(self._answered, kept._answered)
-        self._risen_road = block, kept._solved_waves - self._solved_waves
-        counted = seen * (np.arange(block.count) < block.point_at(len(samples) - _FOLLOWED_SAMPLES))
-        before, expected = evidence_slope(*self._shown[:3], counted, *self._shown[3:])
-        after, _ = evidence_slope(*raised.shown[:3], counted, *raised.shown[3:])
-        self._bends[:] = (1 - _TAKEN_OVER) * self._bends + _TAKEN_OVER * np.array([(before - after) / _RISE, expected])
-        if DEBUG: print("bend", (before - after) / _RISE, expected, before)
-        self._roughness.bend = min(max(self._bends[0] / self._bends[1], _LEAST_BEND), 1/_LEAST_BEND) if self._bends[1] > 0 else 1.0
+    def _raised_from(self, block: Block, answer: Answer) -> FollowedRoad:
+        """As before the round of ``answer``, with a level that is higher than in it and stays; learns nothing."""
+        raised = copy(self)
+        raised._other, raised._learner = copy(self._other), None
+        raised._roughness = HeldLevel(self._spacing_m, answer.log_variance + RISE)
+        if self._gaussian is not None:
+            raised._gaussian = self._response.readings_at(self._gaussian, RISE)
+        raised._solved_last = block, self._response.waves_at(block, answer.waves, np.full(block.count, RISE))
+        return raised
 
     def _round(
         self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
@@ -320,24 +310,21 @@ class FollowedRoad:
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.
             now = learnt(now, power, resolved, block.log_waves, seen_share, before)
-        self._log_before = log_variance
-        self._solved_waves = solution.waves
-        self._shown = exp(0.5 * above_common) * solution.innovations, log_variance, exp(-above_common) * gain, ratio, seen, free
-        self._roughness.learn(first, exp(0.5 * above_common) * solution.innovations, log_variance,
-                              exp(-above_common) * gain, seen, ratio, learns and is_last and before is not None, free)
+        innovations, gain = exp(0.5 * above_common) * solution.innovations, exp(-above_common) * gain
+        self._roughness.learn(first, innovations, log_variance, gain, seen, ratio,
+                              learns and is_last and before is not None, free)
         found = self._roughness.at(first, block.count)
         level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
         self._belief = replace(now, spectrum=replace(now.spectrum, log_level=level))
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
-            self._gaussian = self._improved(readings, samples, each, solution, others + drift_variance, usable)
-            self._answered = self._gaussian
-            if self._risen_road is not None:
-                rise = (self._roughness.solved_with(first, block.count) - log_variance) / _RISE
-                self._gaussian = self._risen.on(self._gaussian, np.repeat(block.felt(rise), reads))
-                change = np.fft.irfft(block.carried_over(*self._risen_road), block.count)
-                self._solved_last = block, self._solved_last[1] + np.fft.rfft(rise * change)
+            improved_ones = self._improved(readings, samples, each, solution, others + drift_variance, usable)
+            self._answer = Answer(improved_ones, solution.waves, innovations, log_variance, gain, ratio, seen, free)
+            # Bounds and road go along with the level.
+            rise = self._roughness.solved_with(first, block.count) - log_variance
+            self._gaussian = self._response.readings_at(improved_ones, np.repeat(block.felt(rise), reads))
+            self._solved_last = block, self._response.waves_at(block, self._solved_last[1], rise)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())
@@ -414,52 +401,6 @@ class FollowedRoad:
         variance = np.exp(self._roughness.at(first, count))
         there = replace(self._belief.spectrum, log_level=COMMON_ROAD.log_level)
         return _levelled(there, variance), self._roughness.log_std(first, count)
-
-
-class _Raised:
-    """A road whose level is known, and what readings would say of it."""
-
-    def __init__(self, log_variance: Array) -> None:
-        self._log_variance = log_variance
-        self.shown: tuple = ()
-
-    def solved_with(self, first: int, count: int) -> Array:
-        return self._log_variance
-
-    def at(self, first: int, count: int) -> Array:
-        return self._log_variance
-
-    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
-              sharper: Array, learns: bool = False, free: float | None = None) -> None:
-        self.shown = innovations, log_before, gain, sharper, seen, free
-
-
-@dataclass(frozen=True)
-class _Change:
-    """Of Gaussian readings: their precision (y,), and that times their value."""
-
-    precision: Array | None = None
-    pull: Array | None = None
-
-    @classmethod
-    def between(cls, one: GaussianReadings, other: GaussianReadings) -> _Change:
-        return cls(1 / other.variance - 1 / one.variance,
-                   other.value_mps2 / other.variance - one.value_mps2 / one.variance)
-
-    def on(self, readings: GaussianReadings, share: Array | float = 1.0) -> GaussianReadings:
-        if self.precision is None:
-            return readings
-        before = 1 / readings.variance
-        # a large change must leave a precision, and does so for the value as well
-        share = np.clip(share, -0.5 * before / np.maximum(np.abs(self.precision), 1e-300),
-                        0.5 * before / np.maximum(np.abs(self.precision), 1e-300))
-        precision = before + share * self.precision
-        return GaussianReadings((readings.value_mps2 * before + share * self.pull) / precision, 1 / precision)
-
-    def moved_on(self, count: int) -> _Change:
-        if self.precision is None:
-            return self
-        return _Change(*(np.append(row[count:], np.zeros(count)) for row in (self.precision, self.pull)))
 
 
 def _at_each(row: Array | float, reads: int) -> Array | float:

@@ -48,7 +48,7 @@ _SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
-_WAY = 0.75
+_WAY = 0.75  # towards the most probable level, where bounds follow it late
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Roughness:
         self._level: _Level | None = None
         self._log_variances = np.log(_COMMON_VARIANCES)
         self._curvature: Array | float = 0.0
-        self.is_bent, self.bend = False, 1.0
+        self.curvature: float | None = None
         self.moved = 0.0  # root mean square change of L by the last step, over its cells
         self._common = _COMMON
         self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
@@ -174,7 +174,7 @@ class Roughness:
         neighbours = _neighbours(count, self._reach)
         power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * neighbours, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
-        self._learn_level(first, squares, freedom, weight, seen / float(neighbours[0].real), learns)
+        self._learn_level(first, squares, freedom, seen / float(neighbours[0].real), learns)
         level = self._levels(first, count)
         power = power * np.exp(-level)
         if learns:
@@ -184,8 +184,7 @@ class Roughness:
         self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
         self._scale_error = 2 / (self._common + weight)
 
-    def _learn_level(self, first: int, squares: Array, freedom: Array, weight: Array, each: Array, learns: bool
-                     ) -> None:
+    def _learn_level(self, first: int, squares: Array, freedom: Array, each: Array, learns: bool) -> None:
         """One step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a part of
         a neighbourhood."""
         cells = (first + np.arange(len(squares))) // self._cell
@@ -205,19 +204,16 @@ class Roughness:
         prior = np.tensordot(self.variances, alike, 1) + since.T @ (state_covariance - np.diag(self.variances)) @ since
 
         relative = squares[chosen] * np.exp(-now[at])
-        freedom, weight, half = freedom[chosen], weight[chosen], 0.5 * self._common * each[chosen]
+        freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
         slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
         bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)
-        before = old.cells(begin, edge - begin)
-
-        def believed(information: Array) -> _Level:
-            rows = (np.concatenate(pair) for pair in zip(before, (now, now + slope / information, information),
-                                                         strict=True))
-            return _Level(begin, *rows, edge, prior, state, state_covariance)
-
-        self._level = believed(np.maximum(self.bend * bend, _LEAST_INFORMATION))
-        level, pull = self._level.log_level, self._level.pull(mean)
-        way = _WAY if self.is_bent else 1.0
+        if self.curvature is not None:
+            bend = np.maximum(self.curvature * bend, _LEAST_INFORMATION)
+        level, shown, information = (np.concatenate(pair) for pair in zip(
+            old.cells(begin, edge - begin), (now, now + slope / bend, bend), strict=True))
+        self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
+        pull = self._level.pull(mean)
+        way = 1.0 if self.curvature is None else _WAY
         step = np.clip(way * (mean + prior @ pull - now), -_LARGEST_STEP, _LARGEST_STEP)
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))
@@ -283,10 +279,10 @@ def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> 
     return resolved, freedom
 
 
-def evidence_slope(innovations: Array, log_before: Array, gain: Array, counted: Array, sharper: Array, seen: Array,
-                   free: float) -> tuple[float, float]:
-    """Slope of the log evidence in a level that all points ``counted`` (n,) share, and its expected curvature, as
-    ``Roughness.learn``."""
+def evidence_slope(innovations: Array, log_before: Array, gain: Array, seen: Array, sharper: Array,
+                   free: float | None, counted: Array) -> tuple[float, float]:
+    """Slope of the log evidence in a level that all points ``counted`` (n,) share, and its expected curvature; the
+    rest as ``Roughness.learn``."""
     resolved, freedom = _resolved(log_before + np.log(sharper), gain, seen, free)
     return (0.5 * float(counted @ (innovations**2 * np.exp(-log_before) - resolved)),
             0.5 * float(counted @ freedom))

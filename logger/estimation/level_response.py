@@ -1,0 +1,121 @@
+"""How the evidence for a road's level bends where the bounds of coarse readings move with it.
+
+Problem. As Gaussian readings (``quantisation``) bounds say how rough a road is with a curvature that assumes that they
+would stay as they are, were the level another. They do not: of a road that toggles between two steps a third or less
+of it is true, for twice the road about a place twice as far from the edge toggles alike; of one that seldom leaves a
+step ten times as much, for the probability of leaving it falls as that of a tail does. Newton's steps with the wrong
+curvature run in circles, and standard errors by it are wrong as much.
+
+Solution. Beside each block it is solved once more with the level raised by ``RISE``, from the bounds of the block as
+far as they moved in the blocks before. The difference of both slopes is the curvature; by the difference of both
+solutions bounds and road go along with a level that changes, so that they need not be found anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.quantisation import GaussianReadings
+from logger.estimation.road_solver import Block
+from logger.estimation.roughness import Roughness, evidence_slope
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
+_FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
+_TAKEN_OVER = 0.2  # of a new curvature: over the 20 s of a block
+_LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
+_MOST_CHANGE = 0.5  # of a precision at once, so that there is one
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a level led to: ``readings`` after it, ``waves`` of the road's innovations, and of the points of the block
+    the arguments of ``evidence_slope``."""
+
+    readings: GaussianReadings
+    waves: ComplexArray
+    innovations: Array
+    log_variance: Array
+    gain: Array
+    sharper: Array
+    seen: Array
+    free: float | None
+
+    def slope(self, counted: Array) -> tuple[float, float]:
+        """Of the log evidence, in a level that all points ``counted`` (n,) share, and its expected curvature."""
+        return evidence_slope(self.innovations, self.log_variance, self.gain, self.seen, self.sharper, self.free,
+                              counted)
+
+
+class HeldLevel(Roughness):
+    """A road whose log variance (n,) is given, point by point of one block, and stays."""
+
+    def __init__(self, spacing_m: float, log_variance: Array) -> None:
+        super().__init__(spacing_m)
+        self._log_variance = log_variance
+
+    def solved_with(self, first: int, count: int) -> Array:
+        """As it was given."""
+        return self._log_variance
+
+    def at(self, first: int, count: int) -> Array:
+        """As it was given."""
+        return self._log_variance
+
+    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
+              sharper: Array | float = 1.0, learns: bool = False, free: float | None = None) -> None:
+        """Nothing."""
+
+
+class LevelResponse:
+    """Of blocks of readings, one after another.
+
+    curvature    of the evidence with the level, over that where the bounds would stay
+    """
+
+    def __init__(self) -> None:
+        self._precision = self._pull = np.zeros(0)
+        self._road: tuple[Block, ComplexArray] | None = None
+        self._curvatures = np.zeros(2)
+        self.curvature = 1.0
+
+    def move_on(self, readings: int) -> None:
+        """The next block is without so many of the oldest."""
+        if self._road is not None:
+            self._precision, self._pull = (
+                np.append(row[readings:], np.zeros(readings)) for row in (self._precision, self._pull))
+
+    def readings_at(self, readings: GaussianReadings, rise: Array | float) -> GaussianReadings:
+        """Readings (y,) where the log level is higher by ``rise``, (y,) or one for all."""
+        if self._road is None:
+            return readings
+        before = 1 / readings.variance
+        most = _MOST_CHANGE * before / np.maximum(np.abs(self._precision), np.finfo(float).tiny)
+        share = np.clip(np.asarray(rise) / RISE, -most, most)
+        precision = before + share * self._precision
+        return GaussianReadings((readings.value_mps2 * before + share * self._pull) / precision, 1 / precision)
+
+    def waves_at(self, block: Block, waves: ComplexArray, rise: Array) -> ComplexArray:
+        """The road's innovations likewise, for points (n,) of the block."""
+        if self._road is None:
+            return waves
+        change = np.fft.irfft(block.carried_over(*self._road), block.count)
+        return waves + np.fft.rfft(rise / RISE * change)
+
+    def learn(self, block: Block, answer: Answer, raised: Answer) -> None:
+        """From a block's answer, and that to a level raised by ``RISE``."""
+        one, other = answer.readings, raised.readings
+        self._precision = 1 / other.variance - 1 / one.variance
+        self._pull = other.value_mps2 / other.variance - one.value_mps2 / one.variance
+        self._road = block, raised.waves - answer.waves
+        counted = answer.seen * (np.arange(block.count) < block.point_at(-_FOLLOWED_SAMPLES))
+        slope, expected = answer.slope(counted)
+        fresh = np.array([(slope - raised.slope(counted)[0]) / RISE, expected])
+        self._curvatures = (1 - _TAKEN_OVER) * self._curvatures + _TAKEN_OVER * fresh
+        if self._curvatures[1] > 0:
+            self.curvature = max(float(self._curvatures[0] / self._curvatures[1]), _LEAST_CURVATURE)
