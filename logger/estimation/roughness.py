@@ -160,8 +160,8 @@ class Roughness:
         seen           (n,) 1 where the road was read, else 0
         sharper        (n,) information there over that of ``gain``
         learns         the variances and the scatter as well: once per block
-        free           degrees of freedom that the road takes of the readings where it was read; None: what follows
-                       from ``gain``
+        free           degrees of freedom that the road takes of the readings where it was read, at most; None: what
+                       follows from ``gain``
         """
         if not seen.any():
             return
@@ -274,8 +274,8 @@ def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> 
     resolved, freedom = (
         np.exp(np.interp(strength, table, np.log(np.maximum(each.sum(axis=1) * (2 / len(strength)), 1e-300))))
         for each in (share, share**2))
-    if free is not None:
-        resolved = resolved * (free / float(seen @ resolved))
+    if free is not None:  # a hole rings on in the readings, which makes them more than it has degrees of freedom
+        resolved = resolved * min(free / float(seen @ resolved), 1.0)
     return resolved, freedom
 
 
