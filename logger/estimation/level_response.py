@@ -29,7 +29,7 @@ RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it 
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
 _TAKEN_OVER = 0.2  # of a new curvature: over the 20 s of a block
 _LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
-_MOST_CHANGE = 0.5  # of a precision at once, so that there is one
+_MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,9 @@ class LevelResponse:
         if self._road is None:
             return readings
         before = 1 / readings.variance
-        most = _MOST_CHANGE * before / np.maximum(np.abs(self._precision), np.finfo(float).tiny)
-        share = np.clip(np.asarray(rise) / RISE, -most, most)
+        share = np.asarray(rise) / RISE
+        share = share * np.minimum(1.0, _MOST_CHANGE * before / np.maximum(np.abs(share * self._precision),
+                                                                            _MOST_CHANGE * before))
         precision = before + share * self._precision
         return GaussianReadings((readings.value_mps2 * before + share * self._pull) / precision, 1 / precision)
 
