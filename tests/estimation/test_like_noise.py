@@ -80,7 +80,7 @@ def test_the_ride_is_open_as_far_as_another_noise_makes_another_ride(step_mps2: 
     change = mean_iri(step_mps2, more * NOISE_MPS2) / mean_iri(step_mps2, less * NOISE_MPS2)
     found = np.log(change) / np.log(more / less)
     stated = scaled(step_mps2, readings(step_mps2))
-    assert stated == pytest.approx(abs(found), abs=0.35 if toggles else 0.1)
+    assert stated == pytest.approx(abs(found), abs=0.35 if toggles else 0.15)  # twice the r.m.s. of such drives
 
 
 def test_what_is_taken_off_a_nonlinear_cars_readings_is_on_no_other_steps() -> None:
