@@ -3,7 +3,7 @@
 A block cannot be solved without the road's spectrum, its roughness from place to place, the noise, and what coarse
 readings tell; none of them is known before it is solved. So each block is solved with what the one before it led to,
 in a few steps from where that one ended, and the belief follows. The first block has none before it: it gets more
-rounds.
+rounds. Where readings are bounds, they move with the road's level: how, is learnt on the way (``level_response``).
 """
 
 from __future__ import annotations

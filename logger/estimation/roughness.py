@@ -96,7 +96,11 @@ class _Level:
 
 class Roughness:
     """Log variance of innovations by number of the point on an endless grid of ``spacing_m``, over that of a common
-    road, for a spectrum of any level."""
+    road, for a spectrum of any level.
+
+    ``curvature`` is that of the evidence with the level over the expected one, where bounds move with the level
+    (``level_response``); None: they do not. ``moved`` is the root mean square change of L by the last step.
+    """
 
     def __init__(self, spacing_m: float) -> None:
         self._reach = _REACH_M / spacing_m
@@ -108,7 +112,7 @@ class Roughness:
         self._log_variances = np.log(_COMMON_VARIANCES)
         self._curvature: Array | float = 0.0
         self.curvature: float | None = None
-        self.moved = 0.0  # root mean square change of L by the last step, over its cells
+        self.moved = 0.0
         self._common = _COMMON
         self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
 

@@ -40,8 +40,8 @@ def levels(iri: float, in_a_step: float, seed: int) -> np.ndarray:
         part = slice(last - COUNT, last)
         column = reading[part, None]
         samples = Samples(column, np.ones(column.shape, bool), np.zeros(column.shape), SPEED_MPS * time_s[part])
-        if COUNT < last < len(time_s) or (len(found) == 0 and last == len(time_s)):
-            road.move_on(Samples(*(row[-HOP:] for row in (column, samples.usable, samples.at_end, samples.distance_m))))
+        if last > COUNT and not found:
+            road.move_on(samples.part(COUNT - HOP, COUNT))
         block = Block(grid, samples.distance_m, SPACING_M, 50 * SPACING_M)
         road.solved(block, samples, read)
         seen = np.flatnonzero(block.seen(read))
