@@ -50,6 +50,7 @@ _RECEIVER_MPS = 0.05  # standard error of its mean speed over a block (0.1 m/s a
 _SPEED_STEP = 0.02  # of speeds that count as one, as a share
 _STEP = 1e-4  # of differences that derivatives are taken by
 _MOST_ROUNDS, _MOST_HALVINGS, _MOST_INNER, _SMALL_GAIN, _SMALL_MOVE = 60, 8, 12, 1e-3, 1e-4
+_NEIGHBOURS = 10  # blocks: 20 s
 _HOPS_APART = 0.15  # of the logarithm
 _LONGEST_STEP = 0.3  # of a coordinate in a round
 _PRECISION = np.array([_LEVEL_APART**-2, WAVINESS_WITHIN**-2])
@@ -338,11 +339,24 @@ class _Step:
 
     @property
     def covariance(self) -> Array:
-        """Of the car's coordinates (p, p); 0 of those that are held."""
+        """Of the car's coordinates (p, p); 0 of those that are held.
+
+        Potholes and levels that change within a block make scores vary more than the model lets them: their own spread
+        counts where it is larger (P. Huber, Fifth Berkeley Symposium 1, 1967), by groups of neighbouring blocks.
+        """
         found = np.zeros((len(self._x),) * 2)
         if len(self._free):
             at = np.ix_(self._free, self._free)
-            found[at] = np.linalg.inv(self.system[0][at])
+            inverse = np.linalg.inv(self.system[0][at])
+            own, _ = self._of_stretches
+            share = self._outer[:, 0, 1:] / own[:, None]
+            stretch = self._problem.spectra.stretch
+            scores = self.block_scores[:, 1:] - self.block_scores[:, :1] * share[stretch]
+            groups = np.add.reduceat(scores, np.arange(0, len(scores), _NEIGHBOURS), axis=0)[:, self._free]
+            groups = groups - groups.mean(axis=0)
+            spread = inverse @ (groups.T @ groups + self._problem.knowledge.precision[at]) @ inverse
+            wider = np.sqrt(np.maximum(np.diag(spread) / np.diag(inverse), 1.0))
+            found[at] = inverse * np.outer(wider, wider)
         return found
 
     @property
