@@ -53,14 +53,20 @@ def vehicle_error_variance(
     car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, vehicle_error: float, rate_hz: float
 ) -> float:
     """White noise of readings that costs the IRI as much as a model whose axles' gains are each off by a share
-    ``vehicle_error`` [(m/s2)2], or whose numbers are off by their standard errors where that is more: the error's
-    density over wave numbers, weighted as the IRI weights them."""
+    ``vehicle_error`` [(m/s2)2]: the error's density over wave numbers, weighted as the IRI weights them.
+
+    Where its numbers are off by their standard errors and that costs more, the noise of as much: what a gain turns into
+    road, it multiplies by 1 / gain, so the errors count most where the axles' shares cancel. A gain that is off
+    elsewhere moves all readings of a drive alike, which is no noise (``SlopeKnowledge.vehicle_std``)."""
     road = spectrum.psd_of(LOG_WAVES)
     weight = _SLOPE_POWER * road
     off = vehicle_error**2 * car.power_apart(speed_mps)
-    if not car.is_exact:
-        off = np.maximum(off, car.power(speed_mps) * (np.abs(car.changes(speed_mps)) ** 2).sum(axis=0))
     density = float((off * road) @ weight / weight.sum())
+    if not car.is_exact:
+        gain = car.power(speed_mps) + off
+        seen = gain > 0
+        turned = _SLOPE_POWER[seen] / gain[seen]
+        density = max(density, float((car.changed_power(speed_mps) * road)[seen] @ turned / turned.sum()))
     return density * rate_hz / (2 * speed_mps)
 
 
