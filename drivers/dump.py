@@ -61,12 +61,15 @@ class DumpHeader:
     accelerometer    ``{"driver": one of ``ACCELEROMETERS``, ...}``, with what that one adds to it
     gps              settings of the receiver's line, such as ``{"baud": 9600}``
     vehicle          name of the vehicle
+    wheelbase_m, mass_kg    what the settings said of a vehicle that is not known otherwise; None: nothing
     """
 
     start_utc: str | None
     accelerometer: dict[str, Any]
     gps: dict[str, Any]
     vehicle: str
+    wheelbase_m: float | None = None
+    mass_kg: float | None = None
 
 
 def open_dump(path: str | os.PathLike[str]) -> DumpReader:
@@ -203,7 +206,8 @@ class DumpWriter:
     """
 
     def __init__(self, path: str | os.PathLike[str], header: DumpHeader, files: FileSystem | None = None) -> None:
-        first = f"# ridelog-dump {VERSION} {json.dumps(asdict(header), allow_nan=False)}\n"
+        said = {key: value for key, value in asdict(header).items() if value is not None or key == "start_utc"}
+        first = f"# ridelog-dump {VERSION} {json.dumps(said, allow_nan=False)}\n"
         self._files = files or FileSystem()
         self._is_packed = ".gz" in Path(path).suffixes
         self._engine: zlib._Compress | None = None
@@ -347,7 +351,7 @@ def _parse_header(path: Path, lines: list[bytes]) -> DumpHeader:
         raise refuse("'gps' as an object")
     if not isinstance(vehicle, str):
         raise refuse("'vehicle' as a name")
-    return DumpHeader(start_utc, accelerometer, gps, vehicle)
+    return DumpHeader(start_utc, accelerometer, gps, vehicle, fields.get("wheelbase_m"), fields.get("mass_kg"))
 
 
 def _is_iso_time(value: object) -> bool:

@@ -120,12 +120,13 @@ def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | Non
 def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
     """All of a recording. BadInput as ``extract_csv``."""
     from logger.extraction.even_samples import SEEN, even_samples
+    from logger.service import wiring
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
 
     if asked.vehicle is not None:
         config = replace(config, vehicle=vehicle_path(asked.vehicle))
-    model = read_model(config.vehicle)
+    model = wiring.car_of(config, read_model)
     tell(f"reading {source.name}")
     notes: list[str] = []
     tables = _tables(source, asked, notes)

@@ -195,6 +195,7 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
 
 def _car_of(log: Path) -> str:
     """The vehicle's name in the description beside a log."""
+    from logger.shipped import GENERIC
     from logger.store.log.sidecar import read_sidecar
 
     try:
@@ -205,6 +206,8 @@ def _car_of(log: Path) -> str:
     name = vehicle.get("name") if isinstance(vehicle, dict) else None
     if not isinstance(name, str) or not name:
         raise BadInput(f"{log}: expected the car's name in the description beside it, or --car NAME")
+    if name == GENERIC:
+        raise BadInput(f"{log}: expected to know which car it is, found {GENERIC}, which any may be: --car NAME")
     return name
 
 

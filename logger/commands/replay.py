@@ -69,6 +69,7 @@ class Outcome:
     known: Any
     noise: NoiseLearning
     better: str
+    notices: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, SI units in the names."""
@@ -84,6 +85,7 @@ class Outcome:
             "receiver": self.receiver,
             "noise": self.noise.fields(),
             "better_setting": self.better or None,
+            "notices": list(self.notices),
             "summary": summary_json(self.summary),
         }
 
@@ -98,6 +100,7 @@ class Outcome:
         lines += [*drive_words(self.receiver, self.known), f"Sensor's noise: {self.noise.words()}"]
         if self.better:
             lines.append(f"Sensor's settings: {self.better}")
+        lines += self.notices
         lines.append(f"Logs: {self.directory} ({counted(len(self.files), 'file')}, {counted(self.rows, 'row')})")
         return "\n".join(lines)
 
@@ -109,7 +112,6 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service.learning import NoiseLearning, drive_fields
     from logger.service.main_loop import Player
     from logger.service.wiring import check_recorded_rate
-    from logger.store.formats.vehicle_file import read_on_board
     from logger.store.log.atomic_file import FolderLock
     from logger.store.log.log_writer import SegmentLog, next_session, repair
 
@@ -119,7 +121,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         noise = wiring.noise_for_dump(reader.header, config, place=f"{dump}:1")
         sensor = wiring.instrument(config.accelerometer, noise)
         check_recorded_rate(dump, sensor)
-        car = read_on_board(config.vehicle)
+        car = wiring.car_of(config)
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         facts = wiring.sidecar(config, sensor, car, known, noise) | {"replayed_from": dump.name}
         make_folder(out)
@@ -141,7 +143,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
     learning = NoiseLearning(out, pipeline, config.accelerometer, noise)
     return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known,
-                   learning, pipeline.range_use.advice)
+                   learning, pipeline.range_use.advice, wiring.notices(config, car, sensor))
 
 
 def _written(out: Path, session: int) -> tuple[list[Path], Any]:

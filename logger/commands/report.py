@@ -18,7 +18,7 @@ from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.drawing import ENDINGS
 from logger.report.maps import MapWay
-from logger.report.page import page
+from logger.report.page import notices, page
 from logger.report.placed import of_files
 from logger.report.summary import summarise, summary_json
 from logger.store.formats.road_lines import read_road_lines
@@ -52,10 +52,11 @@ def run(args: argparse.Namespace) -> int:
     records = [record for file in files for record in file.records]
     if args.json:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
-                          "summary": summary_json(summarise(records)), **left_out_json(of_files(files))}))
+                          "summary": summary_json(summarise(records)), "notices": notices(files),
+                          **left_out_json(of_files(files))}))
     else:
         print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})",
-              *left_out_lines(of_files(files)), sep="\n")
+              *notices(files), *left_out_lines(of_files(files)), sep="\n")
     return EXIT_DONE
 
 

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from itertools import chain
+from math import isfinite
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -69,6 +70,7 @@ from logger.report.summary import (
     span_words,
     summarise,
 )
+from logger.shipped import GENERIC
 from logger.store.log.log_reader import LoggedFile, along_m, joined, length_m, split_drives, utc
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
@@ -222,11 +224,20 @@ def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
     return section("Drives", grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
 
 
+def notices(files: Sequence[LoggedFile]) -> list[str]:
+    """That the car of some was not known, and how wrong that can make their IRI at most; empty: it was."""
+    shares = [_inside(file.sidecar or {}, "iri_vehicle_share_std") for file in files
+              if _inside(file.sidecar or {}, "vehicle", "name") == GENERIC]
+    known = [share for share in shares if isinstance(share, float) and isfinite(share)]
+    return [not_known(max(known))] if known else []
+
+
 def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
     notes = [_sensor_note(sidecar) for sidecar in _different(_inside(file.sidecar or {}, "sensor") for file in files)]
     missing = [file.name for file in files if file.sidecar is None]
     lost = [file.name for file in files if _inside(file.sidecar or {}, "settings_lost") is True]
     damaged = sum(file.damaged_lines for file in files)
+    notes += [_warning(words) for words in notices(files)]
     if missing:
         notes.append(_warning("Without their description (.json):") + f" {', '.join(missing[:20])}")
     if lost:

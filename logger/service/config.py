@@ -21,7 +21,7 @@ from drivers.errors import SettingsError
 from drivers.nmea import ROLLOVERS_MAX
 from drivers.readings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
-from logger.shipped import shipped, vehicle_file, vehicle_path
+from logger.shipped import GENERIC, shipped, vehicle_file, vehicle_path
 from logger.store.export.pairing import MODES, NOT_PAIRED, Pairing
 from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.units import WINDOW_M
@@ -30,6 +30,7 @@ MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
 AUTO = "auto"
 LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
+WHEELBASES_M, MASSES_KG = (1.5, 6.0), (300.0, 10_000.0)  # from the smallest car with two axles to a lorry
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -103,11 +104,14 @@ class LogConfig:
 
 @dataclass(frozen=True)
 class Config:
-    """All settings of the service. ``vehicle`` is the path of its file. Paths are resolved."""
+    """All settings of the service. ``vehicle`` is the path of its file; of a car that is not known (``GENERIC``) its
+    wheelbase [m] and curb weight [kg] may be; None: neither is. Paths are resolved."""
 
     accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig)
     gps: GpsConfig = GpsConfig()
-    vehicle: Path = field(default_factory=lambda: vehicle_file("rav4-2009"))
+    vehicle: Path = field(default_factory=lambda: vehicle_file(GENERIC))
+    wheelbase_m: float | None = None
+    mass_kg: float | None = None
     vehicle_error: float = 0.05
     pipeline: PipelineConfig = PipelineConfig()
     log: LogConfig = LogConfig()
@@ -128,6 +132,8 @@ def load_config(path: Path) -> Config:
         "accelerometer": _accelerometer,
         "gps": _gps,
         "vehicle": _vehicle,
+        "wheelbase_m": _or_none("null", _number(*WHEELBASES_M)),
+        "mass_kg": _or_none("null", _number(*MASSES_KG)),
         "vehicle_error": _number(0, 1),
         "pipeline": _pipeline,
         "log": _log,

@@ -43,7 +43,6 @@ from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.service.systemd_notify import Notifier, Stop, go_first, watchdog_interval_s
 from logger.shipped import version
-from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.atomic_file import FolderLock
 from logger.store.log.disk_quota import QuotaLimits, memory_notice
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
@@ -293,7 +292,7 @@ def serve(config: Config, stop: Stop) -> None:
 def _serve(config: Config, stop: Stop) -> None:
     noise = noise_at_start(config.log.directory, config.accelerometer)
     sensor = wiring.instrument(config.accelerometer, noise)
-    model = read_on_board(config.vehicle)
+    model = wiring.car_of(config)
     learnt = read_delay(config.log.directory)
     receiver_delay = delay_at_start(config.gps, learnt)
     facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
@@ -315,7 +314,7 @@ def _serve(config: Config, stop: Stop) -> None:
     listeners = [Listener(part, events, source.rest)
                  for part, source in zip((accelerometer, gps), sources, strict=True)]
     counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: asdict(decoder.counters)}
-    notices = tuple(filter(None, (*wiring.notices(model.vehicle), memory_notice(config.log.directory))))
+    notices = tuple(filter(None, (*wiring.notices(config, model, sensor), memory_notice(config.log.directory))))
     for notice in notices:
         log.warning("%s", notice)
     observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, delay_learning,

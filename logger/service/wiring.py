@@ -8,6 +8,7 @@ From settings to working parts: decoders, pipeline, and what a log must carry to
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from itertools import islice
@@ -28,13 +29,25 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
+from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.hyperparameters import COMMON_ROAD
+from logger.estimation.iri_posterior import SlopeErrors
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
+from logger.service.config import (
+    AUTO,
+    AXES,
+    LEAST_NOISE_MPS2,
+    MASSES_KG,
+    MOST_NOISE_MPS2,
+    WHEELBASES_M,
+    AccelerometerConfig,
+    Config,
+)
 from logger.service.drive_readings import RangeUse
 from logger.service.learning import DELAY, NOISE, KnownNoise, delay_at_start, is_loggers
 from logger.service.pipeline import Pipeline, PipelineSettings
@@ -46,12 +59,13 @@ from logger.service.signal_chain import (
     recorder_gain,
     weighted_response,
 )
-from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
-from logger.store.formats.vehicle_file import Model
+from logger.shipped import GENERIC, vehicle_file, vehicle_names, vehicle_path, version
+from logger.store.formats.vehicle_file import Model, read_on_board
+from logger.units import WINDOW_M
 from logger.vehicle.compose import Car, compose
-from logger.vehicle.linearise import known_car
-from logger.vehicle.uncertain import cars_off
-from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.linearise import known_car, known_vehicle
+from logger.vehicle.published_cars import WHEELBASE_ERROR, generic_car
+from logger.vehicle.uncertain import cars_off, not_known
 
 
 def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, slower: float = 1.5) -> None:
@@ -73,6 +87,8 @@ def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, s
 
 
 _READS = "reads"  # how many readings per sample there are, each of which has the noise that is said
+_SAME_WHEELBASE = 3 * WHEELBASE_ERROR
+_SPEEDS_MPS = (10.0, 20.0, 30.0)  # town, road, motorway
 _FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through
 
 
@@ -175,6 +191,16 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
                     RangeUse(config.accelerometer.kind.others(config.accelerometer.settings)))
 
 
+def car_of(config: Config, read: Callable[[Path], Model] = read_on_board) -> Model:
+    """The car of the settings: its file, as ``read`` reads it; of a car that is not known what its wheelbase and mass
+    tell besides. Raises BadInput as ``read``."""
+    model = read(config.vehicle)
+    if model.vehicle.name != GENERIC:
+        return model
+    vehicle, errors = generic_car(config.wheelbase_m, config.mass_kg)
+    return replace(model, vehicle=replace(vehicle, sensor=model.vehicle.sensor), errors=errors)
+
+
 def _driven_share(car: Car) -> float:
     """Way that is driven while the distance that is recorded grows by one metre [m]; 1 where nothing is said of it."""
     if not car.drives:
@@ -197,13 +223,35 @@ def _noise_floor(sensor: Instrument, low_pass_hz: float | None) -> NoiseFloor:
     return NoiseFloor(gain, GRID_RATE_HZ, sensor.sensor.step_mps2, sensor.reads)
 
 
-def notices(vehicle: Vehicle) -> tuple[str, ...]:
+def notices(config: Config, model: Model, sensor: Instrument) -> tuple[str, ...]:
     """What the settings allow and somebody should know all the same."""
-    if not vehicle.sensor.left_m:
-        return ()
-    side = "left" if vehicle.sensor.left_m > 0 else "right"
-    return (f"vehicle {vehicle.name}: the sensor sits {abs(vehicle.sensor.left_m):g} m {side} of the middle "
-            "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
+    vehicle, found = model.vehicle, []
+    if vehicle.sensor.left_m:
+        side = "left" if vehicle.sensor.left_m > 0 else "right"
+        found.append(f"vehicle {vehicle.name}: the sensor sits {abs(vehicle.sensor.left_m):g} m {side} of the middle "
+                     "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.")
+    if vehicle.name == GENERIC:
+        missing = "" if config.wheelbase_m is not None else " Until then, give its wheelbase there (wheelbase_m)."
+        found.append(f"vehicle: {not_known(iri_share_std(model, sensor))}{missing}")
+    elif (said := config.wheelbase_m) is not None and vehicle.rear is not None:
+        wheelbase_m = vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
+        if abs(wheelbase_m / said - 1) > _SAME_WHEELBASE:
+            found.append(f"vehicle {vehicle.name}: its wheelbase is {wheelbase_m:.2f} m, and wheelbase_m says {said:g}: "
+                         "it is another car, and the IRI is wrong. Set vehicle: generic, or run ridelog learn-car.")
+    return tuple(found)
+
+
+def iri_share_std(model: Model, sensor: Instrument) -> float:
+    """Share by which the IRI may be off because nobody knows the car: the largest of some speeds."""
+    psd = COMMON_ROAD.psd_of(LOG_WAVES)
+    car, off = known_vehicle(model.vehicle, model.effects), cars_off(model.vehicle, model.effects, model.errors)
+    shares = []
+    for speed_mps in _SPEEDS_MPS:
+        response = CarResponse(car.at(speed_mps, WAVE_NUMBERS_CPM, psd),
+                               [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in off])
+        errors = SlopeErrors(response, GRID_RATE_HZ, WINDOW_M, 1)
+        shares.append(errors.at(speed_mps, COMMON_ROAD, sensor.sensor.variance_mps2_2).vehicle_std)
+    return max(shares)
 
 
 def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None,
@@ -216,6 +264,7 @@ def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief |
         "settings": _plain(_as_written(config)),
         "receiver": DELAY.fields(receiver or delay_at_start(config.gps, None)),
         **_noise_said(config.accelerometer, noise),
+        **({"iri_vehicle_share_std": round(iri_share_std(model, sensor), 3)} if model.errors is not None else {}),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
@@ -244,7 +293,8 @@ def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNois
                      **sensor.kind.header(sensor.settings), **_noise_said(sensor, noise)}
     stem = config.vehicle.stem
     is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
-    return DumpHeader(None, accelerometer, gps, stem if is_shipped else str(config.vehicle))
+    return DumpHeader(None, accelerometer, gps, stem if is_shipped else str(config.vehicle),
+                      config.wheelbase_m, config.mass_kg)
 
 
 def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
@@ -254,7 +304,8 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
 
     Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """
-    said = RecordedWords({**header.accelerometer, "vehicle": header.vehicle})
+    said = RecordedWords({**header.accelerometer, "vehicle": header.vehicle,
+                          "wheelbase_m": header.wheelbase_m, "mass_kg": header.mass_kg})
     config = given or Config()
     axis, noise_mps2 = config.accelerometer.vertical_axis, config.accelerometer.noise_mps2
     try:
@@ -268,6 +319,8 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
         baud = round(RecordedWords(header.gps).number("baud", config.gps.baud, min(BAUDS.numbers), max(BAUDS.numbers)))
         if given is None and vehicle is None:
             vehicle = said.name("vehicle", "", vehicle_names(), "--vehicle FILE.yaml or ")
+            config = replace(config, wheelbase_m=said.number_or_none("wheelbase_m", None, *WHEELBASES_M),
+                             mass_kg=said.number_or_none("mass_kg", None, *MASSES_KG))
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
     return replace(config, accelerometer=sensor, gps=replace(config.gps, baud=baud),

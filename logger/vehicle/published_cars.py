@@ -19,6 +19,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.named_parameters import read, sized
+from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -81,6 +83,7 @@ QUARTER_CARS = {
 _HOP_APART = 0.08
 """Logarithm by which a car's wheel hops differ (a judgement: the tables give both axles one tire and often one mass, so
 that they do not say it)."""
+_STEP = 1e-5  # of logarithms, for slopes
 _PATCH_M, _PATCH_SPREAD = 0.22, 0.15
 """Length over which a tire averages the road: contact patch and what the belt bridges, 0.2 to 0.25 m in the files that
 come with ridelog, 0.25 m in ASTM E1926; a judgement."""
@@ -115,6 +118,41 @@ def published_prior() -> CarPrior:
         mean[place], covariance[place, place] = value[0], variance[0]
     mean[-1], covariance[-1, -1] = np.log(_PATCH_M), _PATCH_SPREAD**2
     return CarPrior(mean, covariance)
+
+
+WHEELBASE_ERROR = 0.01
+"""Share by which a wheelbase out of a car's papers, or by a tape, is off (a judgement)."""
+
+
+def generic_car(wheelbase_m: float | None = None, mass_kg: float | None = None) -> tuple[Vehicle, NumberErrors]:
+    """The car that nobody has measured, as a half car, and the standard errors of its numbers with their correlations.
+
+    wheelbase_m    known to ``WHEELBASE_ERROR`` [m]; None: that of one more of the published cars
+    mass_kg        of the whole car [kg]; None: as of ``USUAL_MASS_KG``. It is a scale: no IRI depends on it
+    """
+    prior = published_prior()
+    logs, spread = _one_more(np.log([[one[2] + one[3]] for one in HALF_CARS.values()]))
+    middle, variance = (logs[0], spread[0]) if wheelbase_m is None else (np.log(wheelbase_m), WHEELBASE_ERROR**2)
+    mean = np.append(prior.mean, middle)
+    covariance = np.diag(np.append(np.zeros(len(prior.mean)), variance))
+    covariance[:-1, :-1] = prior.covariance
+
+    def vehicle(at: Array, sprung_mass_kg: float = USUAL_MASS_KG) -> Vehicle:
+        return car_of(at[:-1], float(np.exp(at[-1])), sprung_mass_kg)
+
+    usual = vehicle(mean)
+    whole_kg = 2 * (USUAL_MASS_KG + sum(one.unsprung_mass_kg for one in (usual.front, usual.rear) if one is not None))
+    car = usual if mass_kg is None else vehicle(mean, USUAL_MASS_KG * mass_kg / whole_kg)
+    names = [name for name in sized(car) if name != "sprung_mass_kg"]
+
+    def logarithms(at: Array) -> Array:
+        moved = vehicle(at)
+        return np.log([read(moved, name) for name in names])
+
+    steps = _STEP * np.eye(len(mean))
+    slopes = np.array([logarithms(mean + step) - logarithms(mean - step) for step in steps]).T / (2 * _STEP)
+    values = np.array([read(car, name) for name in names])
+    return car, NumberErrors.of_covariance(names, slopes @ covariance @ slopes.T * np.outer(values, values))
 
 
 def _of_half_car(mass: float, inertia: float, front_m: float, rear_m: float, front: Sequence[float],

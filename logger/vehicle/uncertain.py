@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import exp
+from math import exp, log
 
 import numpy as np
 import numpy.typing as npt
@@ -129,6 +129,12 @@ def _moved(vehicle: Vehicle, effects: Sequence[Chosen], steps: Mapping[str, floa
             value = read(vehicle, name)
             numbers[name] = value * exp(max(-_FARTHEST, min(step / value, _FARTHEST))) if value > 0 else value + step
     return known_vehicle(changed(vehicle, numbers), others)
+
+
+def not_known(iri_share_std: float) -> str:
+    """What a person is to know and do where nobody knows the car, and the IRI may be off by such a share of it."""
+    return (f"the car is not known: the IRI can be {iri_share_std:.0%} off. Drive at different speeds, run ridelog "
+            "learn-car, and name its file in the settings (vehicle).")
 
 
 # Of a car of the middle class: sprung mass on each wheel, frequency of its bounce, wheelbase.

@@ -36,7 +36,6 @@ from logger.service.event_core import EventCore
 from logger.service.learning import KnownNoise, delay_at_start
 from logger.service.main_loop import EventMerger
 from logger.service.signal_chain import Axis
-from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.log_writer import ClockMap
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
@@ -154,7 +153,7 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief
     rows = _Rows()
     # As the service began, not as the recording: the header's delay is that of another drive.
     belief = delay_at_start(config.gps, receiver)
-    pipeline = wiring.pipeline(config, instrument, read_on_board(config.vehicle), belief)
+    pipeline = wiring.pipeline(config, instrument, wiring.car_of(config), belief)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:
         core.feed(event)
