@@ -13,9 +13,6 @@ from pathlib import Path
 from drivers.errors import shortened
 from logger.errors import BadInput
 
-GENERIC = "generic"
-"""The vehicle that stands for a car of which nobody knows the numbers: the mean of published cars, with their spread."""
-
 _PACKAGE = Path(__file__).parent
 
 

@@ -93,8 +93,8 @@ def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: T
     receiver = known if known.std_s == 0.0 else combined(known, kept.alignment.estimate())
     receiver = replace(receiver, delay_s=max(0.0, receiver.delay_s))
     fixes = _fixes(kept, receiver.delay_s - known.delay_s)
-    recorded = Recorded(kept.readings(), fixes, config, wiring.car_of(config, read_model), _facts(sensor, config), receiver,
-                        reader.torn_tail)
+    recorded = Recorded(kept.readings(), fixes, config, wiring.car_of(config, read_model), _facts(sensor, config),
+                        receiver, reader.torn_tail)
     if not len(recorded.readings.time_s) or not recorded.readings.present.any():
         raise BadInput(f"{dump}: expected readings of the accelerometer, found none")
     if len(fixes.time_s) < 2:

@@ -195,8 +195,8 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
 
 def _car_of(log: Path) -> str:
     """The vehicle's name in the description beside a log."""
-    from logger.shipped import GENERIC
     from logger.store.log.sidecar import read_sidecar
+    from logger.vehicle.vehicle import GENERIC
 
     try:
         content: Any = read_sidecar(log)

@@ -38,7 +38,7 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import known_car
 from logger.vehicle.uncertain import NumberErrors, cars_off
-from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.vehicle import GENERIC, Vehicle
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -167,7 +167,8 @@ def assess(
         if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
             noise = noise.without_rounding(sensor.step_mps2)
         sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)
-    windows, road = estimated(car, gridded, window_m, readings, distance_m, cars_off(vehicle, effects, errors))
+    windows, road = estimated(car, gridded, window_m, readings, distance_m, cars_off(vehicle, effects, errors),
+                              vehicle.name != GENERIC)
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     road_effects = tuple(one.effect.name for one in effects if isinstance(one.effect, RoadEffect))
     if track is not None:

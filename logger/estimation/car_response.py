@@ -33,12 +33,14 @@ class CarResponse:
 
     off    the cars that it may be instead: each a standard error away, in directions that have nothing to do with one
            another
+    is_measured    those are of a car that was measured; False: they are what cars are like
 
     ``behind_m`` (x,) is how far behind the front axle each axle stands [m], the front axle first.
     """
 
-    def __init__(self, car: LinearCar, off: Sequence[LinearCar] = ()) -> None:
+    def __init__(self, car: LinearCar, off: Sequence[LinearCar] = (), is_measured: bool = True) -> None:
         self._car = car
+        self.is_measured = is_measured
         self._off = tuple(off)
         self._powers: dict[int, Array] = {}
         self._apart: tuple[float, Array] | None = None

@@ -137,7 +137,8 @@ class RoadEstimator:
     ride_response    of the comfort weighting at frequencies (n,) [Hz], to compute the figures of the ride; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
     off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
-                     that have nothing to do with one another
+                     that have nothing to do with one another; of a car that nobody measured (not ``is_measured``) what
+                     cars are like
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
     """
@@ -155,13 +156,14 @@ class RoadEstimator:
         ride_response: Callable[[Array], ComplexArray] | None = None,
         ride_ahead_m: float = 0.0,
         off: Sequence[KnownCar] = (),
+        is_measured: bool = True,
         driven_share: float = 1.0,
         reads: int = 1,
     ) -> None:
         if reads > 1 and not sensor.is_coarse:
             raise ValueError("expected one reading per sample, for the noise blurs the steps")
         self._reads = reads
-        self._car, self._off = car, tuple(off)
+        self._car, self._off, self._is_measured = car, tuple(off), is_measured
         self._driven_share = driven_share
         window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
         self._takes_bounds = sensor.is_coarse
@@ -186,7 +188,8 @@ class RoadEstimator:
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
         if car in self._kept:
             return self._kept[car]
-        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd, car) for one in self._off])
+        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd, car) for one in self._off],
+                               self._is_measured)
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[car] = _Answers(

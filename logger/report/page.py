@@ -70,8 +70,9 @@ from logger.report.summary import (
     span_words,
     summarise,
 )
-from logger.shipped import GENERIC
 from logger.store.log.log_reader import LoggedFile, along_m, joined, length_m, split_drives, utc
+from logger.vehicle.uncertain import not_known
+from logger.vehicle.vehicle import GENERIC
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
 _MAX_SIDECARS = 10

@@ -59,13 +59,14 @@ from logger.service.signal_chain import (
     recorder_gain,
     weighted_response,
 )
-from logger.shipped import GENERIC, vehicle_file, vehicle_names, vehicle_path, version
+from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
 from logger.store.formats.vehicle_file import Model, read_on_board
 from logger.units import WINDOW_M
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.linearise import known_car, known_vehicle
 from logger.vehicle.published_cars import WHEELBASE_ERROR, generic_car
 from logger.vehicle.uncertain import cars_off, not_known
+from logger.vehicle.vehicle import GENERIC
 
 
 def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, slower: float = 1.5) -> None:
@@ -181,6 +182,7 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
         ride_response=weighted_response(WEIGHTING, low_pass_hz) if sensor.sensor.is_coarse else None,
         ride_ahead_m=settings.front_axle_ahead_m,
         off=off,
+        is_measured=vehicle.name != GENERIC,
         driven_share=_driven_share(composed),
         reads=sensor.reads,
     )
@@ -236,8 +238,9 @@ def notices(config: Config, model: Model, sensor: Instrument) -> tuple[str, ...]
     elif (said := config.wheelbase_m) is not None and vehicle.rear is not None:
         wheelbase_m = vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
         if abs(wheelbase_m / said - 1) > _SAME_WHEELBASE:
-            found.append(f"vehicle {vehicle.name}: its wheelbase is {wheelbase_m:.2f} m, and wheelbase_m says {said:g}: "
-                         "it is another car, and the IRI is wrong. Set vehicle: generic, or run ridelog learn-car.")
+            found.append(f"vehicle {vehicle.name}: its wheelbase is {wheelbase_m:.2f} m, and wheelbase_m says "
+                         f"{said:g}: it is another car, and the IRI is wrong. Set vehicle: generic, or run ridelog "
+                         "learn-car.")
     return tuple(found)
 
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from logger.vehicle.named_parameters import read, sized
 from logger.vehicle.uncertain import NumberErrors
-from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, GENERIC, Axle, SensorPlace, Vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -170,7 +170,7 @@ def _one_more(values: Array) -> tuple[Array, Array]:
 
 
 def car_of(coordinates: Array, wheelbase_m: float, sprung_mass_kg: float = USUAL_MASS_KG,
-           sensor: SensorPlace = AT_CENTRE_OF_GRAVITY, name: str = "generic") -> Vehicle:
+           sensor: SensorPlace = AT_CENTRE_OF_GRAVITY, name: str = GENERIC) -> Vehicle:
     """The half car with these coordinates (p,), as ``CarPrior`` has them; ``sprung_mass_kg`` of one side."""
     x = np.asarray(coordinates, float)
     share = float(1 / (1 + np.exp(-x[NUMBERS.index("rear_share")])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import exp, log
+from math import exp
 
 import numpy as np
 import numpy.typing as npt

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+GENERIC = "generic"
+"""The vehicle that stands for a car that nobody has measured: the mean of published cars, with their spread."""
+
 
 @dataclass(frozen=True)
 class Axle:

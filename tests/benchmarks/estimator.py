@@ -534,7 +534,7 @@ class Logged:
 
 def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Config:
     """The service's settings for a sensor; ``latency_s`` is what it is given for the receiver."""
-    config = Config()
+    config = Config(vehicle=vehicle_file("rav4-2009"))
     driver = "pasco" if sensor is PASCO else "bma220"
     sections = config.accelerometer.sections
     chip = replace(sections["bma220"], oversample=sensor.oversample)

@@ -15,10 +15,11 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
 from logger.service.config import Config, GpsConfig
+from logger.shipped import vehicle_file
 
 from ..support.drives.replay import rows_of
 
-CONFIG = Config(gps=GpsConfig(latency_s=0.15))
+CONFIG = Config(gps=GpsConfig(latency_s=0.15), vehicle=vehicle_file("rav4-2009"))
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config
 from logger.service.event_core import EventCore
 from logger.service.supervisor import Supervisor
+from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 
 from .accelerometer_fakes import fakes
@@ -39,7 +40,7 @@ def core_of(config: Config) -> tuple[EventCore, Rows]:
     """A service with these settings."""
     rows = Rows()
     sensor = wiring.instrument(config.accelerometer)
-    pipeline = wiring.pipeline(config, sensor, read_model(config.vehicle))
+    pipeline = wiring.pipeline(config, sensor, wiring.car_of(config, read_model))
     return EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, rows), rows
 
 
@@ -52,7 +53,7 @@ class Ride:
         self.fake: Fake = fakes()[name](folder, self.clock, settings)
         self.fake.accel = rough
         sections = AccelerometerConfig().sections | {name: self.fake.settings}
-        self.config = Config(accelerometer=AccelerometerConfig(name, sections=sections))
+        self.config = Config(AccelerometerConfig(name, sections=sections), vehicle=vehicle_file("rav4-2009"))
         self.source = self.kind.source(self.fake.settings, self.fake.machine())
         self.supervisor = Supervisor(self.source, self.clock)
         self.events: list[Event] = []

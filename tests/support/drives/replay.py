@@ -44,7 +44,7 @@ def core_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCor
 def parts_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows, Pipeline]:
     config = wiring.config_for_dump(header, config, None)
     sensor = wiring.instrument(config.accelerometer, wiring.noise_for_dump(header, config))
-    vehicle = read_model(config.vehicle)
+    vehicle = wiring.car_of(config, read_model)
     rows = Rows()
     pipeline = wiring.pipeline(config, sensor, vehicle, wiring.receiver_for_dump(header, config))
     return EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, rows), rows, pipeline

@@ -47,6 +47,7 @@ from logger.service.status import ServiceStatus
 from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import LASTING_US
+from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
@@ -138,7 +139,7 @@ class Car:
         self.travelled_m = 0.0
         self.receiver: Callable[[float], bytes] = lambda s: epoch(s, self.speed_mps, self.travelled_m)
         folder.mkdir(exist_ok=True)
-        config = Config(status_file=folder / "status.json")
+        config = Config(status_file=folder / "status.json", vehicle=vehicle_file("rav4-2009"))
         settings = settings or Bma220Settings()
         if serial:
             config = replace(config, accelerometer=AccelerometerConfig("pasco", "+z"))
@@ -148,7 +149,7 @@ class Car:
                 sections=AccelerometerConfig().sections | {"bma220": chip}))
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = wiring.instrument(self.config.accelerometer)
-        vehicle = read_model(self.config.vehicle)
+        vehicle = wiring.car_of(self.config, read_model)
         self.storage = Storage(folder, {}, 4_000_000, None, QuotaLimits(), self.clock)
         self.decoder = wiring.gps_decoder(self.config)
         self.pipeline = wiring.pipeline(self.config, sensor, vehicle)

@@ -94,7 +94,7 @@ class _Service:
 
     def __init__(self, directory: Path, quota_bytes: int) -> None:
         config = wiring.config_for_dump(HEADER, Config(log=LogConfig(directory, MAX_FILE_BYTES)), None)
-        sensor, vehicle = wiring.instrument(config.accelerometer), read_model(config.vehicle)
+        sensor, vehicle = wiring.instrument(config.accelerometer), wiring.car_of(config, read_model)
         self._directory = directory
         self._sync_us = config.log.sync_s * 1e6
         self.t_us = START_US
