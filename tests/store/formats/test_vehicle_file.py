@@ -214,7 +214,7 @@ def test_other_units_are_distinguished_from_those_of_the_format(tmp_path: Path, 
     """Every number of every car that comes with ridelog, in g, t, mm, cm, kN/m, kN s/m."""
     lines = vehicle_file(name).read_text("utf-8").splitlines()
     tried = 0
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(lines[:lines.index("effects: []")], 1):  # its standard errors may be of any size
         key, _, value = line.split("#")[0].partition(":")
         for factor in WRONG_UNITS.get(key.strip(), ()):
             changed = [*lines[: number - 1], f"{key}: {float(value) * factor:.6g}", *lines[number:]]
