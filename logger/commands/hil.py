@@ -48,8 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
     parser.add_argument("--nmea-port", metavar="PORT", help="serial port wired to that of the service's GPS")
     parser.add_argument("--accelerometer-port", metavar="PORT", help="serial port wired to that of its accelerometer")
-    parser.add_argument(*(f"--{name}-port" for name in serial_accelerometers()), dest="accelerometer_port",
-                        default=argparse.SUPPRESS, help=argparse.SUPPRESS)  # as it was called before
     parser.add_argument("--log", metavar="DIR", type=Path, help="folder of the service's logs, or a copy of it")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service (default: those of 'run')")
     parser.add_argument("--seconds", metavar="N", type=float, help="only the first N seconds of the recording")

@@ -17,7 +17,7 @@ from tests.support.command import called
 from tests.support.printed import printed, shown, words
 
 FEW = ("dry_friction", "damper_asymmetry", "sensor_gain", "sensor_offset", "time_offset")
-DOC = Path(__file__).parents[2] / "docs" / "field-lab.md"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_drives_are_unpacked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,15 +85,16 @@ def test_the_effect_is_found_and_the_fourth_drive_is_judged_rightly(
 
 
 @pytest.mark.slow
-def test_the_document_shows_what_its_commands_print(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "verbs"), [
+    ("field-lab.md", "demo extract extract estimate compare diagnose add-effect compare estimate replay replay"),
+    ("lab.md", "demo compare diagnose add-effect compare"),
+])
+def test_the_document_shows_what_its_commands_print(page: str, verbs: str, tmp_path: Path) -> None:
     """All of it, in order, in one folder; ``python -m tests.support.printed`` rewrites it."""
-    page = DOC.read_text("utf-8")
-    commands = shown(page)
-    assert [one.command.split()[1] for one in commands] == [
-        "demo", "extract", "extract", "estimate", "compare", "diagnose", "add-effect", "compare", "estimate", "replay",
-        "replay"]
+    commands = shown((DOCS / page).read_text("utf-8"))
+    assert [one.command.split()[1] for one in commands] == verbs.split()
     for one in commands:
         now = list(map(words, printed(one.command, tmp_path)))
         assert one.paragraphs, one.command
         for line, paragraph in one.paragraphs:
-            assert words(paragraph) in now, f"{DOC.name}:{line + 1}"
+            assert words(paragraph) in now, f"{page}:{line + 1}"

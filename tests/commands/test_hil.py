@@ -332,7 +332,7 @@ def test_late_bytes_fail_the_run_and_say_so() -> None:
 @pytest.mark.parametrize(("arguments", "said"), [
     ((), "two ports"), (("--nmea-port", "/dev/x"), "or neither"), (("--log", "none"), "none: expected the folder"),
     (("--log", ".", "--seconds", "0"), "more than 0"), (("--log", "."), "driver pasco"),
-    (("--log", ".", "--nmea-port", "/dev/x", "--pasco-port", "/dev/y"), "ridelog run"),
+    (("--log", ".", "--nmea-port", "/dev/x", "--accelerometer-port", "/dev/y"), "ridelog run"),
 ])
 def test_wrong_use_is_refused(short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                               arguments: tuple[str, ...], said: str) -> None:
@@ -393,7 +393,7 @@ def test_a_drive_through_serial_ports_and_the_running_service(
         f"gps: {{port: {tmp_path / 'gps'}}}\nlog: {{directory: {tmp_path / 'log'}}}\nstatus_file: {status}\n"
     )
     compared = [ridelog, "hil", short_dump, "--log", tmp_path / "log", "--config", config, "--seconds", str(PIECE_S)]
-    ports = ["--nmea-port", tmp_path / "gps-out", "--pasco-port", tmp_path / "accelerometer-out"]
+    ports = ["--nmea-port", tmp_path / "gps-out", "--accelerometer-port", tmp_path / "accelerometer-out"]
     with (tmp_path / "stderr.txt").open("wb") as errors, subprocess.Popen(
         [ridelog, "run", "--config", config], stderr=errors
     ) as service:
