@@ -55,9 +55,9 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     several               so many numbers that are unusually far off are another car's (a judgement: a missing effect
                           changes few numbers so far)
     """
-    if normalised_rms_error(runs, predictions) < POOR_ERROR:
-        return None
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
+    if numbers >= anything.numbers or normalised_rms_error(runs, predictions) < POOR_ERROR:
+        return None
     some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
     wide = Posterior(some, vehicle, anything, vehicle)
     error = wide.error(align(wide, wide.start(effects)).state)

@@ -41,7 +41,8 @@ from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Effort, Search, Selection, is_outside_data
+from logger.lab.selection.starts import UnknownNumbers
+from logger.lab.selection.stepwise import Effort, MeasuredRoad, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.named_parameters import free_parameters_of
@@ -99,6 +100,8 @@ class Diagnosis:
     band                 in which the runs were compared; None: all
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
+    ends                 of how many starts the fit of an effect ended at the best, by name; where numbers are not known
+    contradicted         numbers that the runs took so far beyond their tolerance that all were taken to be unknown
     tolerance            share by which the car's masses, springs and dampers may well be off
     no_better            names of the other effects that were tried
     """
@@ -127,6 +130,8 @@ class Diagnosis:
     tolerance: float = Tolerance().share
     no_better: tuple[str, ...] = ()
     moved: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ends: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    contradicted: tuple[str, ...] = ()
     as_moved: Chosen | None = None
 
     @property
@@ -181,9 +186,11 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
-    before = refit(posterior, nominal)
-    search: Search[Baseline, Screened, CandidateFit] = Search(tried, len(present), misalignment(posterior, nominal),
-                                                              progress, workers, effort or Effort())
+    unknown = UnknownNumbers() if posterior.prior.is_vague else None
+    before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
+    search: Search[Baseline, Screened, CandidateFit] = Search(
+        tried, len(present), misalignment(posterior, nominal), progress, workers,
+        effort or (Effort() if unknown is None else Effort(fitted=3)), unknown or MeasuredRoad())
     return search, search.run(before)
 
 
@@ -219,6 +226,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
         moved={name: one for name, one in fine.prior.moved(state.logs, errors.covariance).items()
                if name not in beyond},
+        ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
@@ -261,11 +269,13 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         after = fit_model(fine, start, selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
         if not ended:
-            found = standard_errors(after).effects[search.present:]
-            weakest = min(found, key=deviations_from_null, default=None)
-            if weakest is None or deviations_from_null(weakest) > UNUSUAL_SIGMA:
+            errors = standard_errors(after)
+            far = {one.effect.name: deviations_from_null(one, errors.numbers)
+                   for one in errors.effects[search.present:]}
+            weakest = min(far, key=far.__getitem__, default=None)
+            if weakest is None or far[weakest] > UNUSUAL_SIGMA:
                 return selection, after
-            ended = [weakest.effect.name]
+            ended = [weakest]
         selection = search.without_effect(selection, ended[0])
 
 

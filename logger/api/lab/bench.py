@@ -98,10 +98,17 @@ class Bench:
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given, self.tolerance)
 
     def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> Diagnosis:
-        """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
+        """Which effects the model lacks, without some that are left out. Where the runs contradict what is known of the
+        car's numbers and nothing explains that, nothing is taken to be known of them. BadInput as ``compared``."""
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
         with self.blamed():
-            return diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
+            found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
+            if found.verdict or not (found.beyond and found.exceeds_noise) or not self.timed:
+                return found
+            notify("the runs contradict the vehicle's file: searching with its numbers unknown")
+            wide = replace(self, tolerance=self.tolerance.widened())
+            again = diagnose(wide.posterior(searches=True), effects, self.model.effects, notify)
+        return replace(again, contradicted=tuple(found.beyond)) if again.verdict else found
 
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
         """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
@@ -192,7 +199,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
-    predictions = check_model(word, model, runs, warn, shipped, tolerance.numbers, anyway)
+    predictions = check_model(word, model, runs, warn, shipped, tolerance.largest, anyway)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
@@ -214,7 +221,7 @@ def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingP
     of masses, springs and dampers either way, or that all are unknown; None: the usual one. BadInput for a share that
     no car's numbers have."""
     if said == UNKNOWN:
-        return Tolerance.unknown()
+        return Tolerance().widened()
     by_name = {name: one.deviation for name, one in known.items()}
     if said is None:
         return Tolerance(by_name=by_name)

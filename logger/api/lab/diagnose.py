@@ -341,6 +341,9 @@ _SUSPECT = 0.1
 def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = [*removed_words(found.removed, found.band)]
+    if found.contradicted:
+        lines.append(f"The runs contradict the vehicle's file, by {enumerated(found.contradicted, 'and')}: its numbers "
+                     "were taken to be unknown, but for those of which it says how well they are known.")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
@@ -420,6 +423,9 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     name, numbers = one.effect.name, f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(name)
     likely = f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}."
+    if name in found.ends:
+        there, count = found.ends[name]
+        likely += f" The car's numbers were not known: {there} of {count} starts ended there."
     says = "would explain part of what is missing, or imitates something else" if found.unexplained else "is missing"
     if candidate.confused_with:
         group = enumerated([name, *candidate.confused_with], "or")
@@ -474,6 +480,8 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
              "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
             for one in found.candidates],
         "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
+        "starts": {name: {"ended_there": there, "of": count} for name, (there, count) in found.ends.items()},
+        "contradicted": list(found.contradicted),
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.beyond),
         "numbers_moved": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},

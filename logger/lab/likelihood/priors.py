@@ -9,7 +9,7 @@ numbers on their logarithms.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -49,11 +49,15 @@ class Tolerance:
     band: float = 1.6
     by_name: Mapping[str, float] = field(default_factory=dict)
 
-    @staticmethod
-    def unknown() -> Tolerance:
-        """Nothing is known of any number."""
+    @property
+    def largest(self) -> float:
+        """The largest standard deviation of a mass, inertia, spring or damper."""
+        return max(self.numbers, *self.by_name.values(), 0.0)
+
+    def widened(self) -> Tolerance:
+        """Nothing is known of any number of which the file does not say how well it is known."""
         numbers, lengths = (Known.unknown(name, 1.0).deviation for name in ("sprung_mass_kg", "track_width_m"))
-        return Tolerance(numbers, lengths)
+        return replace(self, numbers=numbers, lengths=lengths)
 
     @property
     def share(self) -> float:
@@ -84,6 +88,11 @@ class VehiclePrior:
         usual = np.where(lengths, tolerance.lengths, tolerance.numbers)
         deviations = [tolerance.by_name.get(name, one) for name, one in zip(names, usual, strict=True)]
         return VehiclePrior(names, np.array(deviations, float), np.where(lengths, 1e-4, 0.002))
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether a number may well be off by a factor of two: a fit that begins at the file's may end elsewhere."""
+        return bool((UNUSUAL_SIGMA * self.deviations > np.log(2.0)).any())
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""

@@ -57,6 +57,10 @@ class JointBands:
     def whitener(self, residual: Array) -> JointWhitener:
         return JointWhitener([one.whitener(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
+    def flat_whitener(self, samples: Array) -> JointWhitener:
+        return JointWhitener([one.flat_whitener(part) for one, part in zip(
+            self.each, self.parts(samples), strict=True)])
+
 
 @dataclass(frozen=True, eq=False)
 class JointWhitener:

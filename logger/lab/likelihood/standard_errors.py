@@ -21,6 +21,9 @@ from logger.vehicle.uncertain import NumberErrors, grows_with_mass
 Array = npt.NDArray[np.float64]
 
 
+_SCALE = "sprung_mass_kg"
+
+
 @dataclass(frozen=True, eq=False)
 class StandardErrors:
     """Standard errors of a fitted model.
@@ -49,12 +52,22 @@ def standard_errors(found: LinearModel) -> StandardErrors:
     return StandardErrors(effects, deviations[:p], covariance[:p, :p], _number_errors(linear, covariance))
 
 
-def deviations_from_null(one: Chosen) -> float:
+def deviations_from_null(one: Chosen, errors: NumberErrors | None = None) -> float:
     """By how many standard errors an effect is from doing nothing (A. Wald's test), by the strength of which that is
-    most; infinite where none has a standard error."""
+    most; infinite where none has a standard error. The sprung mass is taken as it is: a factor that all masses and
+    forces share says nothing of whether there is a force.
+
+    errors    of all numbers, with their correlations; None: the effect is judged alone
+    """
     found = []
+    errors = errors or NumberErrors({})
+    names, matrix = list(errors.standard_errors), errors.matrix()
+    mass = names.index(_SCALE) if _SCALE in names else None
     for parameter in one.effect.parameters:
         value, error = one.values[parameter.name], one.standard_errors.get(parameter.name, np.inf)
+        name = f"{one.effect.name}.{parameter.name}"
+        if mass is not None and name in names:
+            error *= float(np.sqrt(max(1 - matrix[names.index(name), mass]**2, 0.0)))
         if parameter.null is not None and 0 < error < np.inf:
             null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
             found.append(abs((parameter.coordinate(value) - null) / (error * slope_of(parameter, value))))

@@ -109,6 +109,11 @@ class Bands:
         """The whitening filter for the levels under a residual (n,)."""
         return Whitener(self, self.levels(residual))
 
+    def flat_whitener(self, samples: Array) -> Whitener:
+        """A filter that weighs all bands alike, in units of the r.m.s. of samples (n,) in them."""
+        power = float(np.average(self.levels(samples), weights=self.freedom))
+        return Whitener(self, np.full(len(self.floor), power))
+
     def _spectrum(self, residual: Array) -> Array:
         """Mean power per frequency, scaled so that white noise has its variance at each."""
         return np.asarray(self._spectra(residual).mean(axis=0))

@@ -23,7 +23,9 @@ SLIP_MPS = 1e-4
 
 @dataclass(frozen=True)
 class Rig:
-    """Masses [kg], springs [N/m], the damper [N s/m], dry friction [N] in the suspension."""
+    """Masses [kg], springs [N/m], the damper [N s/m], dry friction [N] in the suspension, the
+    suspension's hardening [N/m3], friction of wheel and body against their guides [N], and the tire's damper [N s/m].
+    """
 
     body_kg: float = 2.5
     wheel_kg: float = 0.4
@@ -31,6 +33,10 @@ class Rig:
     damper: float = 12.0
     tire: float = 5400.0
     friction_n: float = 0.0
+    cubic: float = 0.0
+    wheel_guide_n: float = 0.0
+    body_guide_n: float = 0.0
+    tire_damper: float = 0.0
 
     def vehicle_yaml(self, off: float = 1.0) -> str:
         """Its file, with masses and springs that are ``off`` by a factor; of friction it says nothing."""
@@ -74,23 +80,26 @@ def shaken(rig: Rig, elevation_m: Array) -> Recorded:
     time_s = np.arange(len(elevation_m)) / RATE_HZ
     table = CubicSpline(time_s, elevation_m)
 
-    def forces(t: float, x: Array) -> tuple[float, float]:
-        rate = x[2] - x[3]
-        between = rig.spring * (x[0] - x[1]) + rig.damper * rate + rig.friction_n * np.tanh(rate / SLIP_MPS)
-        return between, rig.tire * (float(table(t)) - x[1])
+    rises = table.derivative()
+
+    def forces(t: Array, x: Array) -> tuple[Array, Array]:
+        travel, rate = x[0] - x[1], x[2] - x[3]
+        between = (rig.spring * travel + rig.cubic * travel**3 + rig.damper * rate
+                   + rig.friction_n * np.tanh(rate / SLIP_MPS))
+        tire = rig.tire * (table(t) - x[1]) + rig.tire_damper * (rises(t) - x[3])
+        return (-between - rig.body_guide_n * np.tanh(x[2] / SLIP_MPS),
+                between + tire - rig.wheel_guide_n * np.tanh(x[3] / SLIP_MPS))
 
     def motion(t: float, x: Array) -> list[float]:
-        between, tire = forces(t, x)
-        return [x[2], x[3], -between / rig.body_kg, (between + tire) / rig.wheel_kg]
+        on_body, on_wheel = forces(np.asarray(t), x)
+        return [x[2], x[3], float(on_body) / rig.body_kg, float(on_wheel) / rig.wheel_kg]
 
     dense = 4
     fine_s = np.arange((len(time_s) - 1) * dense + 1) / RATE_HZ / dense
     found = solve_ivp(motion, (0.0, fine_s[-1]), np.zeros(4), "LSODA", fine_s, rtol=1e-7, atol=1e-10, max_step=0.002)
     x = found.y
-    rate = x[2] - x[3]
-    between = rig.spring * (x[0] - x[1]) + rig.damper * rate + rig.friction_n * np.tanh(rate / SLIP_MPS)
-    body = -between / rig.body_kg
-    wheel = (between + rig.tire * (table(fine_s) - x[1])) / rig.wheel_kg
+    on_body, on_wheel = forces(fine_s, x)
+    body, wheel = on_body / rig.body_kg, on_wheel / rig.wheel_kg
     return Recorded(time_s, elevation_m, *(_sampled(one, dense) for one in (body, wheel, x[0] - x[1])))
 
 
