@@ -102,12 +102,12 @@ def _covariance(linear: LinearModel) -> Array:
 
 def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
     """The derivatives by the car's numbers and by those of its effects (m, n), per run, without a common scale of all
-    masses and forces: a car in which they are larger by one factor moves the same. Differences of dry friction, which
-    sticks and slips, are too jagged to show that, and would seem to measure a size that only the prior knows. A user's
-    own effects may have units that nobody knows."""
+    masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
+    that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
+    to measure a size that only the prior knows. A user's own effects may have units that nobody knows."""
     state, prior, numbers = linear.state, linear.prior, linear.numbers
     if numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
-            state.effects, state.logs).rubs:
+            state.effects, state.logs).bends_laws:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]
     for free in free_parameters_of(state.effects):
