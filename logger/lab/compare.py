@@ -90,7 +90,9 @@ class Comparison:
     @cached_property
     def repeats(self) -> Repeats | None:
         """Repeatability of runs of one excitation; None where none repeats another."""
-        return find_repeats(self.plain.residuals.runs)
+        left = self.refitted.residuals
+        return find_repeats(left.runs, [run.residual(run.main(one)) for run, one in zip(
+            left.runs, left.predictions, strict=True)])
 
     @property
     def exceeds_discrepancy(self) -> bool:

@@ -18,7 +18,6 @@ import numpy as np
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import (
-    UNEXPLAINED,
     Noise,
     SignalErrors,
     excess_over_noise,
@@ -30,6 +29,7 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from

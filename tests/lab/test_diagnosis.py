@@ -15,8 +15,8 @@ from logger.lab.diagnosis import (
     diagnose,
     obstacles_of,
 )
-from logger.lab.likelihood.noise_floor import UNEXPLAINED
 from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.runs import RecordFacts, Run
 from logger.simulation.virtual_drive import SimulatedRuns

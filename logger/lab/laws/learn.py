@@ -27,9 +27,10 @@ from logger.lab.diagnosis import Diagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft, Family, LawContext
 from logger.lab.laws.refusals import Nearest, Refusal, known_instead, refusal
 from logger.lab.likelihood.map_fit import align, effect_slopes, fit_to_the_end
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess_over_noise
+from logger.lab.likelihood.noise_floor import excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine, refine_to_the_end
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, screen

@@ -19,7 +19,7 @@ from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.repeats import find_repeats
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
-from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.lab.likelihood.whittle import DISCREPANCY, UNEXPLAINED, Bands
 from logger.runs import signal_errors
 
 Array = npt.NDArray[np.float64]
@@ -34,9 +34,6 @@ _FILTERED = 0.75
 # frequencies at most that share of their power, which the recorder's filter leaves: what a car leaves falls towards the
 # highest band, and the sensor's own noise does not pass through the filter (judgements).
 _FLAT_SHARE, _FILTERED_SHARE = 0.22, 0.01
-UNEXPLAINED = 0.10
-"""A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's
-power."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +86,7 @@ def _noise_of(one: SignalResiduals) -> Noise:
     """The noise of one signal; of a sensor no less than what repeated runs differ by."""
     scaled = [residual * np.sqrt(share) for residual, share in zip(one.residuals, one.shares, strict=True)]
     found = sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
-    repeats = None if one.name else find_repeats(one.runs)
+    repeats = None if one.name else find_repeats(one.runs, one.residuals)
     if repeats is None or repeats.deviation_mps2 <= found.deviation_mps2:
         return found
     return Noise(repeats.deviation_mps2, repeats.deviation_mps2 / float(np.sqrt(2 * repeats.freedom)))

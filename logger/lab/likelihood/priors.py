@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.named_parameters import WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
@@ -26,7 +26,6 @@ in thirty comparisons (normal distribution)."""
 CONFLICT_SIGMA = 4.0
 """A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
 as far in 1300 comparisons (normal distribution)."""
-
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -91,8 +90,9 @@ class VehiclePrior:
 
     @property
     def is_vague(self) -> bool:
-        """Whether a number may well be off by a factor of two: a fit that begins at the file's may end elsewhere."""
-        return bool((UNUSUAL_SIGMA * self.deviations > np.log(2.0)).any())
+        """Whether a number may well be so far off that it counts as not measured: a fit that begins at the file's may
+        end elsewhere."""
+        return bool((UNUSUAL_SIGMA * self.deviations > WEAKEST).any())
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""

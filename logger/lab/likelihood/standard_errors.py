@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of
+from logger.profiles.excitation import Excitation
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
 from logger.vehicle.uncertain import NumberErrors, grows_with_mass
@@ -104,9 +105,11 @@ def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple
     """The derivatives by the car's numbers and by those of its effects (m, n), per run, without a common scale of all
     masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
     that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
-    to measure a size that only the prior knows. A user's own effects may have units that nobody knows."""
+    to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
+    drives a rig shows the size."""
     state, prior, numbers = linear.state, linear.prior, linear.numbers
-    if numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
+    forced = any(isinstance(run.track, Excitation) and run.track.forces for run in linear.posterior.runs.runs)
+    if forced or numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
             state.effects, state.logs).bends_laws:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]

@@ -24,6 +24,9 @@ DISCREPANCY = 0.003
 """Share of the signal in a band by which two right simulations of one car may differ. They differ most where a car has
 dry friction, whose force is delayed by part of a step. A judgement: with 1 %, searches called right models unexplained.
 """
+UNEXPLAINED = 0.10
+"""A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's
+power."""
 BLOCK_S = 3.0
 """Length of a block of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 HIGHEST_OF_RATE = 0.37

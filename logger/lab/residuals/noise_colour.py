@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.growing_power import growing_power
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
+from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointBands
-from logger.lab.likelihood.whittle import Bands
+from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 

@@ -22,14 +22,15 @@ import numpy.typing as npt
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, align, fit, optimise_numbers
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.repeats import repeat_each_other
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
-from logger.profiles.excitation import Excitation
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
-from logger.vehicle.named_parameters import free_parameters_of
+from logger.vehicle.named_parameters import WEAKEST, free_parameters_of
 
 Array = npt.NDArray[np.float64]
 
@@ -55,11 +56,9 @@ class _BySquares:
     """Least squares over runs of which none repeats another, all bands weighed alike."""
 
     def __init__(self, posterior: Posterior) -> None:
-        runs, tracks, kept = posterior.runs.runs, set[object](), list[int]()
+        runs, kept = posterior.runs.runs, list[int]()
         for index, run in enumerate(runs):
-            same = run.track.elevation_m.tobytes() if isinstance(run.track, Excitation) else index
-            if same not in tracks:
-                tracks.add(same)
+            if not any(repeat_each_other(runs[one], run) for one in kept):
                 kept.append(index)
         self.kept, self.whole = kept, posterior
         self.posterior = posterior if len(kept) == len(runs) else Posterior(
@@ -190,7 +189,8 @@ class UnknownNumbers(MeasuredRoad):
                 found = fit(begun, begun.numbers, at_most=12)
         except (np.linalg.LinAlgError, OverflowError):
             return begun
-        return found if posterior.error(found.state) < _LEADS_AWAY * posterior.error(start) else begun
+        leads_away = posterior.error(found.state) > (1 + UNEXPLAINED) * posterior.error(start)
+        return begun if leads_away else found
 
     def _by_squares(self, posterior: Posterior) -> _BySquares:
         if id(posterior) not in self._squares:
@@ -215,7 +215,7 @@ class UnknownNumbers(MeasuredRoad):
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
-                logs = logs + np.minimum(prior.deviations, _SPREAD) * rng.standard_normal(len(logs))
+                logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
             effects = [_drawn(one, rng) for one in near.effects]
             if effect is not None:
                 effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng))
@@ -226,19 +226,12 @@ class UnknownNumbers(MeasuredRoad):
         return tuple(state for _, state in ends)
 
 
-_LEADS_AWAY = 1.1
-"""A fit by the likelihood whose error is larger by this factor than by squares leads away. A judgement: of a right
-model the two differ by hundredths."""
-_SPREAD = 0.6
-"""Standard deviation of the logarithms of numbers that are drawn: a factor of two lies within (nominal numbers that
-nobody measured are off by as much); what is farther off is found from there."""
-
-
 def _drawn(one: Chosen, rng: np.random.Generator) -> Chosen:
-    """An effect with its sizes drawn around those that it has."""
+    """An effect with its sizes drawn around those that it has, as those of the car are: as far as what counts as not
+    measured."""
     values: dict[str, Any] = dict(one.values)
     for parameter in one.effect.parameters:
         if parameter.is_free and values[parameter.name]:
-            value = values[parameter.name] * float(np.exp(_SPREAD * rng.standard_normal()))
+            value = values[parameter.name] * float(np.exp(WEAKEST * rng.standard_normal()))
             values[parameter.name] = min(max(value, parameter.low), parameter.high)
     return replace(one, values=values)

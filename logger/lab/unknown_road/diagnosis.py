@@ -17,8 +17,9 @@ import numpy as np
 
 from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
+from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.likelihood.standard_errors import with_standard_errors
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.selection.holdout import HoldOut

@@ -12,7 +12,7 @@ from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.repeats import find_repeats
-from logger.profiles.excitation import Excitation
+from logger.profiles.excitation import AppliedForce, Excitation
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -68,3 +68,25 @@ def test_drives_and_other_excitations_repeat_nothing() -> None:
     assert find_repeats([first, other]) is None
     drive = a_run("drive", 10.0, 20.0, 1)
     assert find_repeats([drive, replace(drive, name="again")]) is None
+
+
+def test_shakers_that_do_not_move_quite_alike_repeat_each_other_by_what_the_model_says() -> None:
+    first, other = rig_runs((2, 3))
+    track = first.track
+    assert isinstance(track, Excitation)
+    louder = replace(other, track=replace(track, elevation_m=1.08 * track.elevation_m))
+    (made,) = SimulatedRuns([louder]).predict(compose(CAR))
+    (before,) = SimulatedRuns([other]).predict(compose(CAR))
+    louder = replace(louder, measured_mps2=louder.measured_mps2 + made - before)
+    found = find_repeats([first, louder], [first.measured_mps2 - before, louder.measured_mps2 - made])
+    assert found is not None and found.deviation_mps2 == pytest.approx(LEVEL, rel=0.1)
+    assert find_repeats([first, replace(other, track=replace(track, elevation_m=-track.elevation_m))]) is None
+
+
+def test_other_forces_are_no_repeat_though_no_table_moves() -> None:
+    rng = np.random.default_rng(4)
+    on_body = (AppliedForce("force_n", ("body",)),)
+    runs = [replace(run, track=Excitation(RATE_HZ, np.zeros(COUNT), 0.0, rng.normal(0, 1, (COUNT, 1)), on_body))
+            for run in rig_runs((2, 3))]
+    assert find_repeats(runs) is None
+    assert find_repeats([runs[0], replace(runs[1], track=runs[0].track)]) is not None
