@@ -392,7 +392,8 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
     return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=fewer(one, one.measured_mps2),
                     distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor],
                     facts=replace(one.facts, step_mps2=None), usable=_thinned_marks(one.usable, factor),
-                    more=np.array([fewer(one, samples) for samples in one.more])) for one in runs]
+                    more=np.array([fewer(one, samples) for samples in one.more]) if one.signals else one.more)
+            for one in runs]
 
 
 def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
