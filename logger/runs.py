@@ -39,7 +39,7 @@ class Signal:
 
     name              of its column, which ends in its unit
     measures          ``acceleration`` [m/s2], ``velocity`` [m/s] or ``displacement`` (height over the ground) [m] of
-                      body or wheel, ``travel`` (extension of a suspension, or height over a base) [m], ``pitch_rate``
+                      body or wheel, ``force`` (that a component pulls back with) [N], ``travel`` (extension of a suspension, or height over a base) [m], ``pitch_rate``
                       (nose up) or ``roll_rate`` (left side up) [rad/s]
     of                the part that is measured: ``body``, ``front_wheel``, ``rear_suspension`` ...
     ahead_m, left_m   where on the body, from the centre of gravity [m]
@@ -57,6 +57,12 @@ class Signal:
     def has_zero(self) -> bool:
         """Whether what it reads at rest is known: of places it is not."""
         return self.measures not in ("displacement", "travel")
+
+    @property
+    def never_repeats(self) -> bool:
+        """Whether equal samples are one that was written twice: noise makes an acceleration another one each time, a
+        place may stay what it is."""
+        return self.measures == "acceleration" and self.kind != "encoder"
 
 
 SENSOR = "accel_z_mps2"

@@ -25,10 +25,11 @@ from logger.identification.noise_models import Autoregressive, Noise, RoadNoise,
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.road_operator import Drive
-from logger.runs import READING, Run, normalised_rms
+from logger.profiles.track import Pushing
+from logger.runs import ACCELERATION, READING, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free
-from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.vehicle import OWN_NAMES, Vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -95,11 +96,12 @@ def check_records(records: Sequence[Run]) -> None:
         if not np.ptp(record.kept_mps2) > 0:
             raise UnusableRun(run, "expected an acceleration that moves, "
                                    f"found {record.kept_mps2[0]:g} m/s2 all along")
-        if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
+        mean_mps2 = float(record.measured_mps2.mean())
+        if record.facts.main.measures == "acceleration" and abs(mean_mps2) > _LARGEST_MEAN_MPS2:
             raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
                                    "average (subtract the mean while the car stood)")
         whole = slice(None) if record.usable is None else record.usable[record.first:] == READING
-        if repeats := find_repeats(record.kept_mps2[whole][:, None]):
+        if record.facts.main.never_repeats and (repeats := find_repeats(record.kept_mps2[whole][:, None])):
             raise UnusableRun(run, f"{repeats.complaint}: write a record only as often as the sensor is read")
 
 
@@ -132,8 +134,11 @@ def obstacle_starts(
 
 def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequence[Free], records: Sequence[Run],
                 road: RoadInput) -> DriveModel:
-    """The model of these drives: in frequency where the car has no effects. ValueError as ``DriveModel``."""
-    if effects:
+    """The model of these drives: in frequency where a car without effects drove, or stood on a rig that elevations
+    alone moved, and its acceleration was measured. ValueError as ``DriveModel``."""
+    benches = any(one.facts.main != ACCELERATION or (isinstance(one.track, Pushing) and one.track.acts_on)
+                  for one in records)
+    if effects or benches or vehicle.model in OWN_NAMES:
         return SimulatedModel(vehicle, parameters, records, road, effects)
     return VehicleModel(vehicle, parameters, records, road)
 

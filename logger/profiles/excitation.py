@@ -47,6 +47,7 @@ class Excitation:
     start_s        when the first of them was, counted from the first sample of the record [s]
     force_n        (n, f) [N]; None: there are none
     forces         what each of them acts on
+    moves_part     the elevations are how much longer a part is than at its rest, whose ends the bench moves
 
     ValueError for a rate that is not above 0, samples that are not finite or of another shape, or fewer than four.
     """
@@ -56,6 +57,7 @@ class Excitation:
     start_s: float = 0.0
     force_n: Array | None = None
     forces: tuple[AppliedForce, ...] = ()
+    moves_part: bool = False
 
     timed = True
     two_tracks = False

@@ -17,7 +17,7 @@ from logger.roads.obstacles import OBSTACLES
 from logger.runs import ACCELERATION, SENSOR, Run, Signal
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
-from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
 from logger.vehicle.structure import Output, Structure, body_point, corner_of, suspension_travel, wheel
 from logger.vehicle.vehicle import Vehicle
@@ -28,7 +28,7 @@ _MOST_TRIES = 200
 _NEARLY_M = 1e-9
 _RATES = {"pitch_rate": 1, "roll_rate": 2}
 """Columns of ``Structure.body``."""
-_ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
+_ORDERS = {"force": 0, "displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 
 
 def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
@@ -62,6 +62,9 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], ma
 def output_of(car: Car, signal: Signal) -> Output:
     """The motion that a signal measures. ValueError for one that this car does not have."""
     structure, part = car.structure, signal.of.rpartition("_")[2]
+    if structure.held != (signal.measures == "force"):
+        raise ValueError(f"signal {signal.name}: expected {'its force' if structure.held else 'a motion'} to be "
+                         f"measured of a {car.vehicle.model.replace('_', ' ')}")
     try:
         if part in ("wheel", "suspension"):
             of = suspension_travel if part == "suspension" else wheel
@@ -97,15 +100,22 @@ _KEPT_PASSAGES = 4
 _STEPPERS = 2
 _HOP_HZ = 13.0  # of a car's wheels
 _MOST_FINER = 16
+_STEP_ERROR, _LEAST_DAMPING = 3e-3, 1e-3  # the error is that of the lab's discrepancy between right simulations
 # Dry friction jumps: it needs so many times the steps of other laws.
 _FINER_WITH_FRICTION = 2
 
 
 def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
     """Steps a second in which a vehicle is simulated: as usual for one whose wheels hop as those of cars do, twice as
-    many for one an octave quicker, and so on up to four octaves."""
-    quickest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[-1])
-    octaves = float(np.round(np.log2(max(quickest_hz, _HOP_HZ) / _HOP_HZ)))
+    many for one an octave quicker, and so on up to four octaves; more for a mass on a base that little damps. A force
+    that is a straight line over a step of h moves a resonance at f by (2 pi f h)^2 / 12 at most, which at a damping
+    ratio z is a share (2 pi f h)^2 / 24 z of its amplitude."""
+    structure = structure_of(vehicle)
+    needed_hz = float(undamped_frequencies_hz(structure)[-1]) / _HOP_HZ * usual_hz
+    for one in vibrating(modes(structure)) if structure.on_base and not structure.held else []:
+        needed_hz = max(needed_hz, 2 * np.pi * one.frequency_hz / np.sqrt(24 * max(one.damping_ratio, _LEAST_DAMPING)
+                                                                          * _STEP_ERROR))
+    octaves = float(np.round(np.log2(max(needed_hz / usual_hz, 1.0))))
     return usual_hz * min(2**octaves, _MOST_FINER)
 
 
@@ -136,7 +146,8 @@ class SimulatedRuns:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._passages_of(car, distance_error_m, rough, tracks)
-            for step_s, forces in {(one.step_s, one.forces) for one in passages if car.bends_laws}:
+            steps = car.bends_laws or car.structure.held
+            for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
             partial(_recorded, car), passages, [run.signals for run in self.runs],

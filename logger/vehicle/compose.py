@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +36,7 @@ from logger.vehicle.structure import (
     Output,
     Structure,
     body_point,
+    carried,
     driven_outputs,
     over_ground,
     pushed,
@@ -159,6 +160,8 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     laws = []
     for axle in _axles(vehicle):
         corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear)
+        if vehicle.preload_n:
+            corner = corner.with_spring(partial(_preload, vehicle.preload_n))
         for one in forces:
             assert isinstance(one.effect, ForceEffect)
             corner = one.effect.laws(one.p, corner)
@@ -188,7 +191,8 @@ def respond(car: Car, passage: Passage) -> Response:
     structure = car.structure
     motion = moved(car, passage)
     inputs, _ = passage.under_wheels(structure)
-    accel = _of_motion(passage.driven(structure), motion, inputs, [car.output])[0]
+    accel = (fine_outputs(car, passage, [car.output]) if structure.held else
+             _of_motion(passage.driven(structure), motion, inputs, [car.output]))[0]
     n, elevation = len(structure.mass), inputs[:, :len(structure.wheels)]
     states, elevation = passage.sampled(motion.states), passage.sampled(elevation)
     coordinates, velocities = states[:, :n], states[:, n:]
@@ -207,7 +211,7 @@ def bounded(records: Sequence[Array]) -> bool:
 
 def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
-    if car.bends_laws:
+    if car.bends_laws or car.structure.held:
         return stepper_of(car, passage.step_s, passage.forces).march(
             *passage.under_wheels(car.structure), passage.way)
     states = in_blocks(passage.driven(car.structure), passage, np.eye(2 * len(car.structure.mass)))
@@ -224,10 +228,17 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
     """Outputs at the fine instants (p, M)."""
     structure = passage.driven(car.structure)
     inputs, _ = passage.under_wheels(structure)
+    if structure.held:
+        matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
+        return np.stack([inputs @ matrices + moved(car, passage).forces[:, 0] for _ in outputs])
     if car.bends_laws:
         return _of_motion(structure, moved(car, passage), inputs, outputs)
     observe, direct = structure.output_matrices(outputs)
     return (in_blocks(structure, passage, observe) + inputs @ direct.T).T
+
+
+def _preload(force_n: float, travel_m: Array) -> Array:
+    return np.full_like(travel_m, force_n)
 
 
 def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Sequence[Output]) -> Array:
@@ -257,7 +268,8 @@ def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
 @lru_cache(maxsize=4)
 def stepper_of(car: Car, step_s: float, forces: Forces = ()) -> Stepper:
     """What steps a car, which passes all of its runs one after the other or at once, under forces on these parts."""
-    return Stepper.of(pushed(car.structure, forces), car.laws, step_s)
+    structure = carried(car.structure) if car.structure.held else pushed(car.structure, forces)
+    return Stepper.of(structure, car.laws, step_s)
 
 
 def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:

@@ -182,6 +182,7 @@ class Effect(ABC):
     sought       whether a search tries it where nobody asked for it by name
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
+    needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
     """
@@ -198,6 +199,7 @@ class Effect(ABC):
     sought: Sought = Sought.ALWAYS
     needs_road: bool = False
     needs_wheel: bool = False
+    needs_body: bool = False
     also_by: tuple[str, ...] = ()
     stage: int = 0
 
@@ -214,6 +216,8 @@ class Effect(ABC):
         """The same where runs may be driven by time (``timed``)."""
         if self.needs_wheel and vehicle.model in OWN_NAMES:
             return f"a {vehicle.model.replace('_', ' ')} has no wheel, no tire and no body that turns"
+        if self.needs_body and vehicle.model == "component":
+            return "its bench moves it, whatever hangs on it"
         return ON_A_RIG if timed and self.needs_road else self.obstacle(vehicle, two_tracks)
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
@@ -283,6 +287,8 @@ class VehicleEffect(Effect):
 
 class BodyEffect(Effect):
     """Other masses, springs and dampers in the car's matrices, or one more mass on the body (``structure.hung``)."""
+
+    needs_body = True
 
     @abstractmethod
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:

@@ -74,7 +74,12 @@ def single_mass(vehicle: Vehicle) -> Structure:
     return mass_on_base(vehicle.sprung_mass_kg, front.suspension_stiffness_n_per_m, front.suspension_damping_n_s_per_m)
 
 
-MODELS = {"single_mass": single_mass, "quarter_car": quarter_car, "half_car": half_car, "full_car": full_car}
+def component(vehicle: Vehicle) -> Structure:
+    """Matrices of a part alone on its bench, which moves it."""
+    return replace(single_mass(vehicle), held=True, springs=np.zeros(1))  # nothing rests on it
+
+
+MODELS = {"single_mass": single_mass, "component": component, "quarter_car": quarter_car, "half_car": half_car, "full_car": full_car}
 
 
 def structure_of(vehicle: Vehicle) -> Structure:

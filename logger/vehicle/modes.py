@@ -96,7 +96,8 @@ def _of_state_matrix(matrix: Array, n: int) -> list[Mode]:
         root, shape = roots[index], shapes[:, index]
         if root.imag >= 0:
             largest = shape[np.abs(shape).argmax()]
-            found.append(Mode(float(abs(root)) / (2 * np.pi), float(-root.real / abs(root)), shape / largest + 0j))
+            ratio = float(-root.real / abs(root)) if root else 1.0  # what moves freely does not swing
+            found.append(Mode(float(abs(root)) / (2 * np.pi), ratio, shape / largest + 0j))
     return found
 
 
@@ -124,6 +125,8 @@ def undamped_frequencies_hz(structure: Structure) -> Array:
 
     A motion without any spring, such as of a car without tires, has frequency 0.
     """
+    if structure.held:  # its bench moves it, whatever it is
+        return np.zeros(len(structure.mass))
     inverse = np.linalg.inv(np.linalg.cholesky(structure.mass))
     squares = np.linalg.eigvalsh(inverse @ structure.stiffness @ inverse.T)
     return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)

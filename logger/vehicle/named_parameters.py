@@ -17,6 +17,8 @@ from logger.vehicle.vehicle import OWN_NAMES, Axle, Vehicle
 Array = npt.NDArray[np.float64]
 
 BOTH, AXLES, SENSOR = "both", ("front", "rear"), "sensor"
+PRELOAD = "preload_n"
+"""The one number of a vehicle's part that may have either sign."""
 _BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m", "contact_patch_m")
 _AXLE = ("cg_distance_m", "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
          "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
@@ -28,6 +30,7 @@ WEAKEST = 0.5
 _FACTOR = 20.0
 _LENGTHS, _LENGTH_FACTOR = ("cg_distance_m", "track_width_m", "contact_patch_m"), 3.0
 _FARTHEST_M = 3.0
+_PRELOAD_N = 50.0  # where a search for one begins that is not known
 _LONGEST_PATCH_M = 1.0
 
 
@@ -170,15 +173,18 @@ def free(
     """
     value = read(vehicle, name) if start is None else start
     low, high = bounds_of(name, value) if bounds is None else bounds
-    if not name.startswith(f"{SENSOR}.") and not (low > 0 and value > 0):
+    is_place = name == PRELOAD or name.startswith(f"{SENSOR}.")
+    if not is_place and not (low > 0 and value > 0):
         raise ValueError(f"{name}: expected a start and bounds above 0, found {value:g} and {low:g} to {high:g}")
-    return Free(name, value, low, high)
+    return Free(name, value, low, high, is_place)
 
 
 def bounds_of(name: str, value: float) -> tuple[float, float]:
     """Bounds of a vehicle's number, the lower and the upper, where nothing else is said of it."""
     if name.startswith(f"{SENSOR}."):
         return -_FARTHEST_M, _FARTHEST_M
+    if name == PRELOAD:
+        return -_FACTOR * max(abs(value), _PRELOAD_N), _FACTOR * max(abs(value), _PRELOAD_N)
     factor = _LENGTH_FACTOR if name.rpartition(".")[2] in _LENGTHS else _FACTOR
     high = value * factor
     return value / factor, min(high, _LONGEST_PATCH_M) if name == "contact_patch_m" else high
@@ -304,7 +310,7 @@ def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | N
 
 
 def _usual(parameter: Parameter, value: float) -> float:
-    return max(abs(value), parameter.usual_range())
+    return abs(value) or parameter.usual_range()
 
 
 def slope_of(parameter: Parameter, value: float) -> float:

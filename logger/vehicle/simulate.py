@@ -259,11 +259,12 @@ class Passage:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins; then further inputs of the structure, forces last."""
         place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface,
-                 structure.on_base)
+                 structure.on_base, structure.held)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
             elevation, mean = under_surface(self.track, structure.surface).under_wheels(self._way, structure)
-            level = elevation[0, 0] * (np.arange(elevation.shape[1]) < len(structure.wheels))
+            heights = np.arange(elevation.shape[1]) < len(structure.wheels) * (not structure.held)
+            level = elevation[0, 0] * heights
             known = elevation - level, mean - level
             self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}
         return known

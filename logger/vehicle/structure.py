@@ -167,6 +167,8 @@ class Structure:
                                 made whole
     surface                     how the road that it meets differs from the profile that was written of it
     on_base                     it is a mass on a base: the one corner's wheel is the base
+    held                        it is a part that its bench moves: its place is the first of its inputs, those of a mass on
+                                a base, and its force is measured
     """
 
     mass: Array
@@ -185,6 +187,7 @@ class Structure:
     sides: int = 1
     surface: Surface = ()
     on_base: bool = False
+    held: bool = False
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, u) of x' = A x + B z, with u inputs z and x = (q, q'). Row n is the body's
@@ -215,6 +218,8 @@ class Structure:
 
     def at_rest(self, inputs: Array) -> Array:
         """The state (2n,) that stays where it is under these inputs (u,); at 0 in a direction without any spring."""
+        if self.held:
+            return inputs[:2]
         still = np.linalg.lstsq(self.stiffness, self.road @ inputs)[0] if self.on_base else (
             np.linalg.solve(self.stiffness, self.road @ inputs))
         return np.concatenate([still, np.zeros(len(self.mass))])
@@ -280,6 +285,15 @@ def mass_on_base(mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: fl
         road=np.array([[0.0, 0.0, -mass_kg]]), behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.0,
         body=np.eye(1, 3), wheels=none, travel=one, springs=np.array([stiffness_n_per_m]),
         dampers=np.array([damping_n_s_per_m]), tires=np.zeros(1), on_base=True)
+
+
+_MOUNTAIN_KG = 1e15
+
+
+def carried(structure: Structure) -> Structure:
+    """What moves as the bench of a part moves it, whatever the part's forces are: so heavy that they do not matter."""
+    return replace(structure, mass=np.full((1, 1), _MOUNTAIN_KG), stiffness=np.zeros((1, 1)), damping=np.zeros((1, 1)),
+                   road=np.array([[0.0, 0.0, _MOUNTAIN_KG]]))
 
 
 GROUND = "ground"

@@ -139,25 +139,48 @@ def not_known(iri_share_std: float) -> str:
 
 # Of a car of the middle class: sprung mass on each wheel, frequency of its bounce, wheelbase.
 _MASS_KG, _BOUNCE_HZ, _WHEELBASE_M = 350.0, 1.4, 2.7
-# Powers of mass and time by the end of a name, the longest ends first.
+_TRAVEL_M = 0.02
+# Powers of force, way and time by the end of a name, the longest ends first.
 _POWERS = {
-    "_n_per_m3": (1, -6), "_n_s_per_m": (1, -1), "_n_per_m": (1, -2), "_m_per_s": (0, 1), "_kg": (1, 0), "_n": (1, 0),
+    "_n_per_m3": (1, -3, 0), "_n_s_per_m": (1, -1, 1), "_n_per_m": (1, -1, 0), "_m_per_s": (0, 1, -1),
+    "_kg": (1, -1, 2), "_n": (1, 0, 0),
 }
 _LENGTH = "_m"
 
 
-def sized(effect: Effect, vehicle: Vehicle) -> Effect:
+@dataclass(frozen=True)
+class Scales:
+    """How large what happens on a bench is, over what happens in a car: powers of ten of forces, ways and times."""
+
+    force: float
+    way: float
+    time: float
+
+    @classmethod
+    def of(cls, force_n: float, travel_m: float, rate_mps: float) -> Scales:
+        """Of r.m.s. values. Those of a car are its bounce with a travel of 2 cm."""
+        omega = 2 * np.pi * _BOUNCE_HZ
+        return cls(_power_of_ten(force_n / (_MASS_KG * omega**2 * _TRAVEL_M)), _power_of_ten(travel_m / _TRAVEL_M),
+                   _power_of_ten(travel_m / rate_mps * omega, 2))
+
+
+def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Effect:
     """An effect with starts, trials and bounds in the sizes of a vehicle; of a car itself.
 
     Problem: the values that a search begins at, and what may be asked for, are those of cars: a friction of 60 N holds
     a rig of 25 N still. Solution: a vehicle that is lighter or quicker than cars by a factor has forces, springs,
     dampers and travels that follow by their dimensions (E. Buckingham, Physical Review 4, 1914), gravity being the same
-    for all: with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Places
+    for all: with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Where
+    ``scales`` are known of a bench, on which gravity drives nothing, forces, travels and times go by them. Places
     on the car go with its wheelbase. Factors of masses and places are powers of ten, those of times half ones, as
     trials are that far apart: of every car they are 1.
     """
-    mass, time, wheelbase = _factors(vehicle)
-    found = tuple(_times(one, _factor(effect, one.name, mass, time, wheelbase)) for one in effect.parameters)
+    if scales is None:
+        mass, time, wheelbase = _factors(vehicle)
+        scales = Scales(mass, time**2, time)
+    else:
+        wheelbase = 1.0
+    found = tuple(_times(one, _factor(effect, one.name, scales, wheelbase)) for one in effect.parameters)
     if found == effect.parameters:
         return effect
     made = copy(effect)
@@ -175,7 +198,7 @@ def grows_with_mass(name: str) -> bool:
 def _factors(vehicle: Vehicle) -> tuple[float, float, float]:
     """Of masses, times and places on the vehicle, over those of a car."""
     structure = structure_of(vehicle)
-    mass_kg = vehicle.sprung_mass_kg / len(structure.wheels)
+    mass_kg = vehicle.sprung_mass_kg / len(structure.wheels) or _MASS_KG
     bounce_hz = float(undamped_frequencies_hz(structure)[0])
     wheelbase_m = float(structure.behind_m.max()) or _WHEELBASE_M
     return (_power_of_ten(mass_kg / _MASS_KG), _power_of_ten(_BOUNCE_HZ / bounce_hz, 2) if bounce_hz else 1.0,
@@ -187,12 +210,12 @@ def _power_of_ten(ratio: float, parts: int = 1) -> float:
     return float(10.0 ** (np.round(parts * np.log10(ratio)) / parts))
 
 
-def _factor(effect: Effect, name: str, mass: float, time: float, wheelbase: float) -> float:
-    for end, (of_mass, of_time) in _POWERS.items():
+def _factor(effect: Effect, name: str, scales: Scales, wheelbase: float) -> float:
+    for end, (of_force, of_way, of_time) in _POWERS.items():
         if name.endswith(end):
-            return mass**of_mass * time**of_time
+            return scales.force**of_force * scales.way**of_way * scales.time**of_time
     if name.endswith(_LENGTH):
-        return time**2 if isinstance(effect, ForceEffect) else wheelbase
+        return scales.way if isinstance(effect, ForceEffect) else wheelbase
     return 1.0  # frequencies that resonate are looked for everywhere between bounce and what the recorder keeps
 
 

@@ -43,6 +43,7 @@ AT_CENTRE_OF_GRAVITY = SensorPlace()
 OWN_NAMES = {"single_mass": {
     "mass_kg": "sprung_mass_kg", "stiffness_n_per_m": "front.suspension_stiffness_n_per_m",
     "damping_n_s_per_m": "front.suspension_damping_n_s_per_m"}}
+OWN_NAMES["component"] = {**OWN_NAMES["single_mass"], "preload_n": "preload_n"}
 """What models that are no cars call their numbers, and where these stand in a ``Vehicle``."""
 
 
@@ -54,13 +55,15 @@ class Vehicle:
     has neither pitch inertia nor a rear axle: both are None. A full car has the sprung mass and the inertias of the
     whole car; its axles are still those of one side, so each stands for two equal wheels. Only a full car has a roll
     inertia and a track width. A single mass on a spring and a damper is the sprung mass with the suspension of
-    ``front``, and has nothing else: no wheel, no tire.
+    ``front``, and has nothing else: no wheel, no tire. So has a component, a part alone on its bench that moves it and
+    measures its force; its mass is of what moves.
 
     sprung_mass_kg         [kg]
     pitch_inertia_kg_m2    of the sprung mass, about its centre of gravity [kg m2]
     contact_patch_m        length over which a tire averages the road [m]
     roll_inertia_kg_m2     of the sprung mass, about its centre of gravity [kg m2]
     track_width_m          from the left wheels to the right ones [m]
+    preload_n              what a component pulls back with at its rest [N]
     """
 
     name: str
@@ -73,6 +76,7 @@ class Vehicle:
     roll_inertia_kg_m2: float | None = None
     track_width_m: float | None = None
     sensor: SensorPlace = AT_CENTRE_OF_GRAVITY
+    preload_n: float = 0.0
 
 
 def with_load(vehicle: Vehicle, extra_sprung_mass_kg: float) -> Vehicle:

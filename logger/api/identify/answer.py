@@ -156,9 +156,10 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
         if not 0 <= skip_s < lasts_s - LEAST_SAMPLES / drive.rate_hz:
             raise question.wrong("skip_s", f" {skip_s:g}: expected a beginning that leaves {LEAST_SAMPLES} samples or "
                                            f"more of {drive.path}, which lasts {lasts_s:g} s")
-        records.append(Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, skip_s, drive.facts,
-                              drive.marks()))
+        samples = drive.accel_z_mps2 - (0.0 if drive.facts.main.has_zero else drive.accel_z_mps2.mean())
+        records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
+                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, skip_s,
+                              replace(drive.facts, signals=()), drive.marks()))
     try:
         check_records(records)
     except UnusableRun as error:

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
 from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
@@ -29,14 +31,17 @@ from logger.lab.likelihood.record_band import with_pass_bands
 from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment, screen
+from logger.profiles.excitation import Excitation
 from logger.runs import Array, Run
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import Model, Step
+from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
-from logger.vehicle.uncertain import Known, sized
+from logger.vehicle.uncertain import Known, Scales, sized
+from logger.vehicle.vehicle import OWN_NAMES
 
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
@@ -192,7 +197,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
     low_pass_hz what lies above is not compared; None: all is that the records hold
     """
-    effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))
+    effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs), _scales(word, model, runs))
     if searches is not None:
         require_compiler(searches, effects.values())
     found = Bench(word, model, runs, effects, files, tolerance)
@@ -229,21 +234,40 @@ def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingP
     return Tolerance(numbers=float(said) / Tolerance.band, by_name=by_name)
 
 
-def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
+def _scales(word: str, model: Model, runs: SimulatedRuns) -> Scales | None:
+    """How large forces and motions are on the bench that the runs are of; None where they are those of a car. BadInput
+    as ``check_moves``."""
+    if model.vehicle.model not in OWN_NAMES:
+        return None
+    check_moves(word, model, runs)
+    responses = runs.respond(compose(model.vehicle, model.effects))
+    travel_m, rate_mps = (float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in (
+        [response.travel_m for response in responses], [response.rate_mps for response in responses]))
+    front = model.vehicle.front
+    forces_n = [np.hypot(front.suspension_stiffness_n_per_m * travel_m, front.suspension_damping_n_s_per_m * rate_mps),
+                *(float(np.std(run.measured_mps2)) for run in runs.runs if run.facts.main.measures == "force"),
+                *(float(np.std(run.track.force_n)) for run in runs.runs
+                  if isinstance(run.track, Excitation) and run.track.force_n is not None)]
+    return Scales.of(float(max(forces_n)), travel_m, rate_mps)
+
+
+def known_effects(model: Model, files: Sequence[str], on_rig: bool = False, scales: Scales | None = None
                   ) -> tuple[dict[str, Effect], dict[str, str]]:
     """The effects that a search tries, by name: those that it tries unasked, in the model's sizes, a model's own, and
     those of some more files; and the files of the user's own, by name. BadInput for a name that is there twice.
 
     files     of effects, or names of such that a search does not try unasked
     on_rig    as ``sought_effects``
+    scales    as ``sized``
     """
-    effects, own = {name: sized(one, model.vehicle) for name, one in sought_effects(on_rig).items()}, {}
+    effects, own = {name: sized(one, model.vehicle, scales) for name, one in sought_effects(on_rig).items()}, {}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
     for file in files:
         is_shipped = file in effect_file.shipped_effects()
-        effect = sized(effect_file.shipped_effects()[file], model.vehicle) if is_shipped else own_effect(Path(file))
+        effect = (sized(effect_file.shipped_effects()[file], model.vehicle, scales) if is_shipped else
+                  own_effect(Path(file)))
         if effect.name in effects:
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
         effects[effect.name] = effect

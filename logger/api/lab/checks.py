@@ -175,6 +175,8 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
     if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body moves with the
     road whatever is missing, but one run holds few such waves."""
+    if not followed.pairs:
+        return
     clear = [(run.name, around.gain, below.gain) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
              if around.is_clear and run.facts.main.measures == "acceleration"]
@@ -471,5 +473,5 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
     read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]
-    if repeats := find_repeats(read[:, None]):
+    if drive.facts.main.never_repeats and (repeats := find_repeats(read[:, None])):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")

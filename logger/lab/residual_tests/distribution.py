@@ -59,6 +59,9 @@ class FrequencyTest(ResidualTest):
         chances = []
         for part in parts:
             width = part.high - part.low
+            if width >= whole:  # all there is, which cannot hold more than another
+                chances.append(1.0)
+                continue
             ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
             chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
         best = max((i for i in range(len(parts)) if chances[i] < SIGNIFICANCE), key=lambda i: parts[i].share,

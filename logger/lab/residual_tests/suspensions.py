@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil, log10
+
 import numpy as np
 
 from logger.lab.residual_tests.tests import (
@@ -80,7 +82,8 @@ def _ends(curve: Curve, factor: float, unit: str) -> str:
     words = []
     for index, side in ((0, "compression"), (-1, "extension")):
         force, error = float(curve.force_n[index]), float(curve.error_n[index])
-        size = f"{force:+.0f} ± {error:.0f} N" if abs(force) > 2 * error else "about zero"
+        digits = max(0, ceil(-log10(error))) if error > 0 else 0
+        size = f"{force:+.{digits}f} ± {error:.{digits}f} N" if abs(force) > 2 * error else "about zero"
         words.append(f"{size} at {abs(curve.at[index]) * factor:.2g} {unit} of {side}")
     return f"{' and '.join(words)} (positive pulls body and wheel together)"
 

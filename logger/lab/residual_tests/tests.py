@@ -34,6 +34,9 @@ BANDS = {
     "wheel hop": "around the wheels' hop",
     "above wheel hop": "above the wheels' hop",
     "far above wheel hop": "far above the wheels' hop",
+    "above body bounce": "above the body's bounce",
+    "far above body bounce": "far above the body's bounce",
+    "all": "in the whole band",
     "beyond the recorder's filter": "beyond the recorder's filter",
 }
 """Where a band of a breakdown lies, for a sentence."""

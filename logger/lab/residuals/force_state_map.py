@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
+from logger.runs import ACCELERATION
+from logger.simulation.virtual_drive import output_of
 from logger.vehicle.simulate import smooth_length
 from logger.vehicle.stepping import force_input
 
@@ -180,19 +182,26 @@ def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
                          highest_of_rate: float = 0.4) -> list[Array]:
     """Responses of the sensor to forces of these shapes in the suspensions, up to where the recorder's filter begins:
     (n, k) per run, the samples that count."""
-    structure = residuals.car.structure
+    car, structure = residuals.car, residuals.car.structure
     n, w = len(structure.mass), len(structure.wheels)
-    a, _ = structure.state_space()
-    push = force_input(structure)[:, :w]
+    push, a = np.zeros((2 * n, w)), np.zeros((2 * n, 2 * n))
+    if not structure.held:
+        push, a = force_input(structure)[:, :w], structure.state_space()[0]
     found = []
     for run, response in zip(residuals.runs, residuals.responses, strict=True):
         length = smooth_length(run.count + round(4 * run.rate_hz))
         f_hz = np.fft.rfftfreq(length, 1 / run.rate_hz)
-        kept = np.flatnonzero(f_hz < highest_of_rate * run.rate_hz)
+        # Where there is no spring a steady force has no end.
+        kept = np.flatnonzero((f_hz < highest_of_rate * run.rate_hz) & ((f_hz > 0) | bool(structure.stiffness.any())))
         s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
         states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
-        transfer = (np.einsum("n,fnw->fw", residuals.car.row @ a[n:], states) + residuals.car.row @ push[n:])
-        transfer *= residuals.car.factor(s)[:, None]
+        if structure.held:
+            transfer = np.ones((len(s), w), complex)
+        else:
+            output = car.output if run.facts.main == ACCELERATION else output_of(car, run.facts.main)
+            direct = output.row @ push[n:] if output.order == 2 else 0.0
+            transfer = np.einsum("n,fnw->fw", structure.output_matrices([output])[0][0], states) + direct
+        transfer *= car.factor(s)[:, None]
         columns = []
         for shape in shapes:
             force = np.fft.rfft(shape(response.travel_m, response.rate_mps), length, axis=0)

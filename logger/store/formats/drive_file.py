@@ -33,7 +33,14 @@ from logger.profiles.track import Track
 from logger.runs import ACCELERATION, BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts, Signal
 from logger.store.formats.csv_table import find_table, parse_columns, place, taken
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
-from logger.store.formats.profile_file import EXCITATION_COLUMNS, PROFILE_NAME, Profile, read_excitation, read_profile
+from logger.store.formats.profile_file import (
+    EXCITATION_COLUMNS,
+    PART_COLUMNS,
+    PROFILE_NAME,
+    Profile,
+    read_excitation,
+    read_profile,
+)
 from logger.store.formats.record_file import DRIVE_NAME, MAX_BYTES, TIME, USABLE, VERTICAL, even_rate_hz
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
@@ -51,6 +58,7 @@ _MEASURES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "velocity": ("_mps", ("body", *_WHEELS, *_SUSPENSIONS)),
     "displacement": ("_m", ("body", *_WHEELS)),
     "travel": ("_m", _SUSPENSIONS),
+    "force": ("_n", ("body",)),
     "pitch_rate": ("_rad_per_s", ("body",)),
     "roll_rate": ("_rad_per_s", ("body",)),
 }
@@ -60,7 +68,7 @@ _KINDS = ("accelerometer", "encoder", "potentiometer", "laser", "load_cell")
 # Columns of a rig's record that need no word in run.yaml.
 _OWN_SIGNALS = {one.name: one for one in (
     Signal("displacement_m", "displacement"), Signal("travel_m", "travel", "suspension"),
-    Signal("velocity_mps", "velocity"))}
+    Signal("velocity_mps", "velocity"), Signal("force_n", "force"))}
 
 
 def write_run_facts(folder: Path, facts: RecordFacts, forces: Sequence[AppliedForce] = ()) -> None:
@@ -411,7 +419,8 @@ def write_excitation(path: Path, excitation: Excitation) -> None:
     pushes = {} if excitation.force_n is None else {
         one.name: column for one, column in zip(excitation.forces, excitation.force_n.T, strict=True)}
     kept = (time_s, *heights) if heights.any() or not pushes else (time_s,)
-    write_drive(path, {**dict(zip(EXCITATION_COLUMNS, kept, strict=False)), **pushes})
+    names = PART_COLUMNS if excitation.moves_part else EXCITATION_COLUMNS
+    write_drive(path, {**dict(zip(names, kept, strict=False)), **pushes})
 
 
 def write_table(path: Path, names: Sequence[str], table: Array, form: str) -> None:

@@ -208,14 +208,16 @@ def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
 
 
 EXCITATION_COLUMNS = (TIME, "elevation_m", "elevation_rear_m")
+PART_COLUMNS = (TIME, "displacement_m", "velocity_mps")
 _FORCE = re.compile("force(_[a-z0-9_]+)?_n")
-_OTHER_UNIT = re.compile("(force|elevation)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)", re.IGNORECASE)
+_OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)", re.IGNORECASE)
 _FEWEST = 4
 
 
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
-    """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; it
-    begins at the file's own time.
+    """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; or
+    of a part alone ``displacement_m``. It begins at the file's own time. A ``velocity_mps`` beside that is not read: the
+    displacement says it.
 
     forces    what each of its forces acts on
 
@@ -226,7 +228,7 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
     names, table, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path), partial(_driving, file=str(path)),
         f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}][,force_n][,force_NAME_n], in metres "
-        "and newtons")
+        f"and newtons, or of a part alone {','.join(PART_COLUMNS[:2])}")
     if len(table) < _FEWEST:
         raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
     pushes = tuple(name for name in names if _FORCE.fullmatch(name))
@@ -238,11 +240,12 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
                        f"found {', '.join(names)}")
     columns = {name: taken(FORCE if name in pushes else ELEVATION, name, column, file)
                for name, column in zip(names[1:], table.T[1:], strict=True)}
-    heights = [columns[name] for name in EXCITATION_COLUMNS if name in columns] or [np.zeros(len(table))]
+    heights = [columns[name] for name in (*EXCITATION_COLUMNS, PART_COLUMNS[1]) if name in columns
+               ] or [np.zeros(len(table))]
     return Excitation(
         even_rate_hz(table[:, 0], file), np.stack(heights, axis=1) if len(heights) > 1 else heights[0].copy(),
         float(table[0, 0]), np.stack([columns[name] for name in pushes], axis=1) if pushes else None,
-        tuple(known[name] for name in pushes))
+        tuple(known[name] for name in pushes), PART_COLUMNS[1] in names)
 
 
 def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
@@ -252,5 +255,8 @@ def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
         raise BadInput(f"{file}:1: expected elevations in metres and forces in newtons (elevation_m, force_n), found "
                        f"{other[0]}: convert its numbers")
     heights = tuple(name for name in names if not _FORCE.fullmatch(name))
-    fits = heights in (EXCITATION_COLUMNS[:1], EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS)
+    moved = heights in (PART_COLUMNS[:2], PART_COLUMNS)
+    if moved and heights != names:
+        raise BadInput(f"{file}:1: expected a part that is moved (displacement_m) or forces on it, found both")
+    fits = moved or heights in (EXCITATION_COLUMNS[:1], EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS)
     return names if fits and len(set(names)) == len(names) > 1 else None

@@ -48,9 +48,11 @@ if TYPE_CHECKING:
 
 
 _CAR_KEYS = ("sprung_mass_kg", "front", "contact_patch_m")
+# What moves of a component may be too light to matter.
+_OPTIONAL = (("component", "mass_kg"), ("component", "preload_n"))
 # What each model needs beyond its name.
 _MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
-    "single_mass": tuple(OWN_NAMES["single_mass"]),
+    **{model: tuple(name for name in own if (model, name) not in _OPTIONAL) for model, own in OWN_NAMES.items()},
     "quarter_car": _CAR_KEYS,
     "half_car": (*_CAR_KEYS, "pitch_inertia_kg_m2", "rear"),
     "full_car": (*_CAR_KEYS, "pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
@@ -67,11 +69,12 @@ _LIMITS: Mapping[str, tuple[float, float]] = {
     "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.01, 5.0), "cg_distance_m": (0.0, 20.0),
     "contact_patch_m": (0.0, 1.0),
 }
-# What stands on a bench may have any size: masses from a tenth of a gram to a thousand tonnes, which swing at 0.01 Hz
-# to 5 kHz. What is as large as a car, by its tires or its wheelbase, is one.
-_ON_BENCH: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1e-4, 1e6), "mass_kg": (1e-4, 1e6)}
+# What stands on a bench may have any size: masses from a microgram (or what stands for one, in a circuit) to a thousand
+# tonnes, which swing at 0.01 Hz to 5 kHz. What is as large as a car, by its tires or its wheelbase, is one.
+_ON_BENCH: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1e-9, 1e6), "mass_kg": (1e-9, 1e6)}
 _ON_BENCH_PER_KG = {"inertia": (1e-9, 1e3), "mass": (1e-6, 1e3), "stiffness": (4e-3, 1e9), "damping": (0.0, 1e6)}
 _CAR_PATCH_M, _CAR_WHEELBASE_M = 0.1, 1.0
+_MOST_OF_COMPONENT = 1e12
 _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
     "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
     "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
@@ -277,13 +280,16 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
     model = model_node.choice(*_MODEL_KEYS)
     keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=(
+        *(name for one, name in _OPTIONAL if one == model),
         "sensor", "effects", "standard_errors", "correlations", "given", "history"))
     name = _name_of(keys["name"])
     if model in OWN_NAMES:
+        bench = Vehicle(name, model, 0.0, None, Axle(0.0, 0.0, 0.0, 0.0, 0.0), None, 0.0)
+        own = [key for key in OWN_NAMES[model] if key in keys]
+        if model == "component":
+            return changed(bench, {key: _of_component(keys[key], key) for key in own}), keys, known
         mass_kg = _number_of(keys, "mass_kg", 1.0, False)
-        rest = {key: _number_of(keys, key, mass_kg, False) for key in _MODEL_KEYS[model][1:]}
-        bench = Vehicle(name, model, mass_kg, None, Axle(0.0, 0.0, 0.0, 0.0, 0.0), None, 0.0)
-        return changed(bench, rest), keys, known
+        return changed(bench, {key: _number_of(keys, key, mass_kg, False) for key in own}), keys, known
     is_car = _looks_car_sized(keys)
     mass_kg = _number_of(keys, "sprung_mass_kg", 1.0, is_car)
     front = _read_axle(keys["front"], model, mass_kg, is_car)
@@ -314,6 +320,11 @@ def _name_of(node: Node) -> str:
     if word(name) != name:
         raise node.wrong(f"a name of at most {LONGEST_WORD} characters that can be seen")
     return name
+
+
+def _of_component(node: Node, key: str) -> float:
+    """A number of a part, none of which need be there, and of which its preload may have either sign."""
+    return node.number(low=-_MOST_OF_COMPONENT if key == "preload_n" else 0.0, high=_MOST_OF_COMPONENT)
 
 
 def _looks_car_sized(keys: Mapping[str, Node]) -> bool:
@@ -493,7 +504,7 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
     Not with the vehicle's name. The recorder's gain is given by its values at 0.01 to 100 Hz.
     """
     numbers = asdict(vehicle)
-    del numbers["name"]
+    del numbers["name"], numbers["preload_n"]  # a car has none
     gain = recorder_gain(_GAIN_PROBES_HZ).round(_GAIN_DIGITS).tolist() if recorder_gain else None
     with_effects = {"effects": {one.effect.name: dict(one.values) for one in effects}} if effects else {}
     return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain,
