@@ -39,7 +39,8 @@ class Signal:
 
     name              of its column, which ends in its unit
     measures          ``acceleration`` [m/s2], ``velocity`` [m/s] or ``displacement`` (height over the ground) [m] of
-                      body or wheel, ``force`` (that a component pulls back with) [N], ``travel`` (extension of a suspension, or height over a base) [m], ``pitch_rate``
+                      body or wheel, ``force`` (that a component pulls back with) [N], ``travel`` (extension of a
+                      suspension, or height over a base) [m], ``pitch_rate``
                       (nose up) or ``roll_rate`` (left side up) [rad/s]
     of                the part that is measured: ``body``, ``front_wheel``, ``rear_suspension`` ...
     ahead_m, left_m   where on the body, from the centre of gravity [m]

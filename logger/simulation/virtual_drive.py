@@ -48,9 +48,9 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], ma
 
     ValueError for a signal that this car does not have.
     """
-    if not signals and main == ACCELERATION:
+    first = output_of(car, main) if main.name != SENSOR or car.structure.held else car.output
+    if not signals and main.name == SENSOR:
         return recorded(car, passage)
-    first = car.output if main == ACCELERATION else output_of(car, main)
     outputs = [first, *(output_of(car, one) for one in signals)]
     found = passage.recorded_of((car.body, main, signals), lambda: fine_outputs(car, passage, outputs), car.factor)
     found[0] = car.written(passage, found[0])

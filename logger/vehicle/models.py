@@ -79,7 +79,8 @@ def component(vehicle: Vehicle) -> Structure:
     return replace(single_mass(vehicle), held=True, springs=np.zeros(1))  # nothing rests on it
 
 
-MODELS = {"single_mass": single_mass, "component": component, "quarter_car": quarter_car, "half_car": half_car, "full_car": full_car}
+MODELS = {"single_mass": single_mass, "component": component, "quarter_car": quarter_car, "half_car": half_car,
+          "full_car": full_car}
 
 
 def structure_of(vehicle: Vehicle) -> Structure:

@@ -207,7 +207,7 @@ UNIT_M, UNIT_MPS = 0.01, 0.02
 LANES = 4
 """Numbers that are summed side by side."""
 _PASSES = 2
-_NEWTON_STEPS, _NEAR = 4, 1e-3
+_NEWTON_STEPS, _NEAR, _HARDLY = 4, 1e-3, 1e-9
 _SWEEPS = 4  # a wheel that rubs on suspension and guide is so light that each friction changes what the other has to be
 _SLIDES = 8.0  # tanh is 1 from there on, but for some ten-millionths
 _SMALL_SHARE, _SMALL = 1e-6, 1e-9  # by so much of itself, and so much, a law's state is moved to see how it decays
@@ -314,6 +314,8 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
     if transition <= 0.0:
         return min(max(free / ease, -most), most)
     size, pull = abs(free), ease * most
+    if pull < _HARDLY * transition:  # it changes next to nothing of the rate
+        return most * np.tanh(free / transition)
     if size - pull > _SLIDES * transition:
         return most if free > 0.0 else -most
     rate = max(size / (1.0 + pull / transition), size - pull)

@@ -167,8 +167,8 @@ class Structure:
                                 made whole
     surface                     how the road that it meets differs from the profile that was written of it
     on_base                     it is a mass on a base: the one corner's wheel is the base
-    held                        it is a part that its bench moves: its place is the first of its inputs, those of a mass on
-                                a base, and its force is measured
+    held                        it is a part that its bench moves: its place is the first of its inputs, those of a mass
+                                on a base, and its force is measured
     """
 
     mass: Array

@@ -182,3 +182,57 @@ def test_columns_of_different_length_are_refused(tmp_path: Path) -> None:
     (tmp_path / "bench.yaml").write_text(Bench().yaml)
     with pytest.raises(BadInput, match=f"excitation.csv:{len(lines)}: expected"):
         main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
+def bench_of_a_part(folder: Path, more: str = "") -> Path:
+    """A damper with friction and some mass that its bench moves by a few centimetres, by its equation alone."""
+    way = noise(3.0, 0.02, 6)
+    x_m, v_mps, a_mps2 = (way(TIME_S, order) for order in range(3))
+    force_n = 12.0 + 400.0 * x_m + 90.0 * v_mps + 2.0 * a_mps2 + 15.0 * np.tanh(v_mps / 0.01)
+    (folder / "part.yaml").write_text(
+        "name: damper\nmodel: component\nstiffness_n_per_m: 400\ndamping_n_s_per_m: 90\npreload_n: 12\nmass_kg: 2\n"
+        "effects:\n- {name: dry_friction, friction_force_n: 15, transition_velocity_m_per_s: 0.01}\n" + more)
+    return written(folder / "run", {"force_n": force_n}, {"displacement_m": x_m}, "source: me\n")
+
+
+def test_a_part_alone_on_its_bench_answers_as_its_equation_says(tmp_path: Path) -> None:
+    run = bench_of_a_part(tmp_path)
+    # The record has gone through no filter, and friction jerks above what a recorder keeps.
+    assert ridelog.compare(tmp_path / "part.yaml", [run]).error < 0.02
+    ridelog.write_run(tmp_path / "again", ridelog.read_run(run))
+    assert (tmp_path / "again" / "excitation.csv").read_text().startswith("t_s,displacement_m\n")
+    found = ridelog.identify(tmp_path / "part.yaml", tmp_path / "again", ["damping_n_s_per_m", "preload_n", "mass_kg"],
+                             start={"damping_n_s_per_m": 60.0, "preload_n": -5.0, "mass_kg": 3.0})
+    assert list(found.parameters.values()) == pytest.approx([90.0, 12.0, 2.0], rel=0.01)
+    ridelog.write_vehicle(tmp_path / "found.yaml", found.model)
+    assert ridelog.read_vehicle(tmp_path / "found.yaml").vehicle == found.model.vehicle
+
+
+def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
+    run = bench_of_a_part(tmp_path)
+    text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")
+    (run / "excitation.csv").write_text("\n".join([text.splitlines()[0], *(
+        f"{line},0" for line in text.splitlines()[1:])]) + "\n")
+    with pytest.raises(BadInput, match=r"excitation.csv:1: expected a part that is moved .* found both"):
+        ridelog.compare(tmp_path / "part.yaml", [run])
+    way = {"displacement_m": np.sin(TIME_S)}
+    run = written(tmp_path / "other", {"accel_z_mps2": np.sin(TIME_S)}, way, "source: me\n")
+    with pytest.raises(BadInput, match=r"part.yaml: .*expected its force to be measured of a component"):
+        ridelog.compare(tmp_path / "part.yaml", [run])
+
+
+@pytest.mark.slow
+def test_a_circuit_of_tiny_numbers_is_named_a_hardening_spring(tmp_path: Path, capsys: pytest.CaptureFixture[str]
+                                                              ) -> None:
+    """Places alone are measured, of a mass of 5 mg; the file is off by some per cent."""
+    true = Bench(5e-4, 1.0, 2.5e-3, 30.0)
+    push = noise(20.0, 0.02, 5)
+    measured = true.moved(NOTHING, push, NOTHING)["displacement_m"]
+    measured = measured + np.random.default_rng(8).normal(0.0, 2e-3 * measured.std(), len(measured))
+    run = written(tmp_path / "run", {"displacement_m": measured}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "box.yaml").write_text(Bench(5.1e-4, 0.98, 2.5e-3).yaml)
+    assert main(["diagnose", "--vehicle", str(tmp_path / "box.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ["progressive_spring"]
+    best = next(one for one in found["candidates"] if one["effect"] == "progressive_spring")
+    assert best["parameters"]["cubic_stiffness_n_per_m3"] == pytest.approx(30.0, rel=0.1)

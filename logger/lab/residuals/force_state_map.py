@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.runs import ACCELERATION
+from logger.runs import SENSOR
 from logger.simulation.virtual_drive import output_of
 from logger.vehicle.simulate import smooth_length
 from logger.vehicle.stepping import force_input
@@ -194,12 +194,12 @@ def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
         # Where there is no spring a steady force has no end.
         kept = np.flatnonzero((f_hz < highest_of_rate * run.rate_hz) & ((f_hz > 0) | bool(structure.stiffness.any())))
         s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
-        states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
         if structure.held:
             transfer = np.ones((len(s), w), complex)
         else:
-            output = car.output if run.facts.main == ACCELERATION else output_of(car, run.facts.main)
+            output = car.output if run.facts.main.name == SENSOR else output_of(car, run.facts.main)
             direct = output.row @ push[n:] if output.order == 2 else 0.0
+            states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
             transfer = np.einsum("n,fnw->fw", structure.output_matrices([output])[0][0], states) + direct
         transfer *= car.factor(s)[:, None]
         columns = []

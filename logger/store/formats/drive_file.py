@@ -73,9 +73,11 @@ _OWN_SIGNALS = {one.name: one for one in (
 
 def write_run_facts(folder: Path, facts: RecordFacts, forces: Sequence[AppliedForce] = ()) -> None:
     """Write ``run.yaml`` into a run's folder, with what ``forces`` act on. OSError if that fails."""
-    every = facts.signals if facts.main == ACCELERATION else (facts.main, *facts.signals)
+    own = facts.main.name == VERTICAL
+    every = facts.signals if own else (facts.main, *facts.signals)
+    sensor = {**_some(facts, _SENSOR), **({"kind": facts.main.kind} if own and facts.main.kind else {})}
     places = {"by": facts.places_by, "vehicle": facts.vehicle}
-    said: dict[str, Any] = {"sensor": _some(facts, _SENSOR), "place_std_m": facts.place_std_m,
+    said: dict[str, Any] = {"sensor": sensor, "place_std_m": facts.place_std_m,
                             "pass_band_hz": list(facts.pass_band_hz or ()) or None, "source": facts.source,
                             "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None,
                             "signals": {one.name: _signal_keys(one) for one in every},

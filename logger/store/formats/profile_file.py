@@ -210,14 +210,15 @@ def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
 EXCITATION_COLUMNS = (TIME, "elevation_m", "elevation_rear_m")
 PART_COLUMNS = (TIME, "displacement_m", "velocity_mps")
 _FORCE = re.compile("force(_[a-z0-9_]+)?_n")
-_OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)", re.IGNORECASE)
+_OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)",
+                         re.IGNORECASE)
 _FEWEST = 4
 
 
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
     """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; or
-    of a part alone ``displacement_m``. It begins at the file's own time. A ``velocity_mps`` beside that is not read: the
-    displacement says it.
+    of a part alone ``displacement_m``. It begins at the file's own time. A ``velocity_mps`` beside that is not read:
+    the displacement says it.
 
     forces    what each of its forces acts on
 

@@ -23,7 +23,7 @@ class FrameDamping(BodyEffect):
                   "of the body against its guide, at each suspension", default=0.0),
     )
     needs_wheel = True
-    source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: viscous friction in guides"
+    source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: drag of guides"
     signature = "wheel hop or bounce are damped more than by the damper, as the damper is by their difference alone"
     shown_by = "shake the rig through the bounce and through the wheel's hop, strongly enough that nothing sticks"
     sought = Sought.ON_RIGS
