@@ -134,7 +134,7 @@ def _names(vehicle: Vehicle) -> tuple[str, ...]:
 def sized(vehicle: Vehicle) -> tuple[str, ...]:
     """The numbers that are never quite as a file says, but for those that only a roll shows: masses, inertias, springs,
     dampers and lengths, as far as the vehicle has them."""
-    known = [name for name in names(vehicle) if not name.startswith((BOTH, SENSOR))]
+    known = [name for name in names(vehicle) if not name.startswith((BOTH, SENSOR, PRELOAD))]
     return tuple(name for name in known if name.rpartition(".")[2] not in _OF_ROLL and read(vehicle, name) > 0)
 
 

@@ -194,7 +194,8 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
             keys[name] = replace(one, content=repr(read(vehicle, name)))
         else:
             keys[name] = _plain_number(one, name, known)
-    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], vehicle.sprung_mass_kg,
+    mass_kg = 0.0 if vehicle.model == "component" else vehicle.sprung_mass_kg
+    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg,
                                _is_car_sized(vehicle)) for name, one in keys.items()}
     for name, value in values.items():
         if not value > 0:
@@ -343,6 +344,8 @@ def _is_car_sized(vehicle: Vehicle) -> bool:
 def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car: bool) -> float:
     """The number of a key, within its limits: those of cars, or of anything on a bench."""
     node = keys[key]
+    if not sprung_mass_kg:  # of a part that need not have one
+        return _of_component(node, key)
     limits = _LIMITS if is_car else {**_LIMITS, **_ON_BENCH}
     if key in limits:
         low, high = limits[key]
