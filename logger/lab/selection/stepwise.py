@@ -45,9 +45,9 @@ class Effort:
     """How much work a search takes; more of it finds no less.
 
     effects                    most effects that are added
-    fitted, refined            how many effects are fitted at most, and how many of them with derivatives of their own
-    fit_share, refine_share    least gain for that, as a share of the largest gain or of the required one (with a tenth
-                               for fitting, a sensor's bandwidth was missed)
+    fitted                     how many effects are fitted at most
+    fit_share, refine_share    least gain for that, and for a fit with derivatives of its own, as a share of the largest
+                               gain or of the required one (with a tenth for fitting, a sensor's bandwidth was missed)
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
@@ -56,7 +56,6 @@ class Effort:
 
     effects: int = 4
     fitted: int = 6
-    refined: int = 3
     fit_share: float = 0.03
     refine_share: float = 0.25
     tie_share: float = 0.9
@@ -328,8 +327,8 @@ class Search(Generic[M, P, F]):
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth)
             rough = _best_of_each(tries)
-            best = {one.effect.name: one.gain for one in rough[: effort.refined]
-                    if one.gain > effort.refine_share * max(rough[0].gain, required_gain)}
+            enough = effort.refine_share * max(rough[0].gain, required_gain) if rough else np.inf
+            best = {one.effect.name: one.gain for one in rough if one.gain > enough}
             good = [one for one in tries if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
             if len(good) == 1 and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
