@@ -90,7 +90,7 @@ def test_what_cannot_be_compared(runs: list[str], tmp_path: Path) -> None:
         ((wrong(changed(3, "99999"), "away"),), "on the profile"),
         ((wrong(changed(1, "0"), "silent"),), "zeros only"),
         ((str(tmp_path / "none"),), "expected a folder"),
-        ((runs[0], "--tolerance", "nan"), "--tolerance nan: expected 0.001 to 0.5"),
+        ((runs[0], "--tolerance", "nan"), "--tolerance nan: expected unknown, or 0.001 to 0.5"),
     ):
         with pytest.raises(BadInput, match=words):
             compare(*arguments)

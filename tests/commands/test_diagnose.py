@@ -139,7 +139,7 @@ def test_what_cannot_be_diagnosed(offset_runs: list[str], tmp_path: Path) -> Non
     for arguments, words in (
         (("--effect-file", str(wrong)), "wrong.py:.*nothing"),
         (("--effect-file", str(taken)), "taken.py: .*sensor_gain"),
-        (("--tolerance", "2"), "--tolerance 2: expected 0.001 to 0.5"),
+        (("--tolerance", "2"), "--tolerance 2: expected unknown, or 0.001 to 0.5"),
         ((str(tmp_path / "none"),), "expected a folder"),
     ):
         with pytest.raises(BadInput, match=words):

@@ -99,12 +99,13 @@ OTHERS = {
     "demo --out": "logs of sessions that are new, and files that ship with ridelog: never written over another's",
     "replay --out": "logs of sessions that are new", "capture --out": "a dump that must be new",
     "lab --out": "one file after the other, each as write_text does it", "export --to --note": "the stick's own rules",
+    "learn-car --out": "a vehicle's file and a page, each as write_text does it",
     "install --root": "steps, each as replace_bytes does it", "uninstall --root": "removes",
 }
 """Options that ask for what is written, of commands that are judged beside their own tests, and why."""
 WRITE = {"--out", "--profile-out", "--psd", "--diagram", "--page", "--visit", "--to", "--note", "--root"}
 READ = {"--config", "--from", "--base", "--route", "--roads", "--smoothness", "--profile", "--location", "--csv",
-        "--excitation", "--speed-file", "--log", "--unmounted", "--led", "--effect-file"}
+        "--compare", "--excitation", "--speed-file", "--log", "--unmounted", "--led", "--effect-file"}
 
 
 def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:

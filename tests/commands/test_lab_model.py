@@ -211,7 +211,7 @@ def test_two_tracks_are_asked_for_where_no_profile_is_known(runs: list[str], tmp
 @pytest.mark.parametrize("share", ["0", "-1", "nan", "0.6"])
 @pytest.mark.parametrize("more", [[], ["--same-road"]])
 def test_a_tolerance_that_no_car_has(share: str, more: list[str], runs: list[str]) -> None:
-    with pytest.raises(BadInput, match=rf"--tolerance {share}: expected 0.001 to 0.5"):
+    with pytest.raises(BadInput, match=rf"--tolerance {share}: expected unknown, or 0.001 to 0.5"):
         main(["diagnose", *more, "--vehicle", "rav4-2009", *runs, f"--tolerance={share}"])
 
 

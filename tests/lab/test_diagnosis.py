@@ -175,11 +175,11 @@ def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named(
 
 
 def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: Diagnosis) -> None:
-    why = EFFECTS["roll"].obstacle(CAR, False)
-    assert why is not None
+    why = {name: EFFECTS[name].obstacle(CAR, False) for name in ("roll", "constant_force")}
+    assert all(why.values())
     found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
-    assert found == {"sensor_gain": ALREADY_PRESENT, "roll": why}
-    assert offset.not_tried == {"roll": why} and "roll" in offset.catalogue
+    assert found == {"sensor_gain": ALREADY_PRESENT, **why}
+    assert offset.not_tried == {"roll": why["roll"]} and "roll" in offset.catalogue
 
 
 def test_what_only_shifts_records_is_not_tried_on_runs_that_were_laid_where_the_road_was_felt() -> None:

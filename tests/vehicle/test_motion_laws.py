@@ -414,7 +414,8 @@ def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
 def test_which_a_search_tries_unasked() -> None:
     model = Model(RIG, ())
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
-    assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {"frame_friction"}
+    assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
+        "constant_force", "frame_damping", "frame_friction"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):
         known_effects(model, ["dry_friction"])

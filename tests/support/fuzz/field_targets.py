@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.csv_extraction import CsvSettings, _recorded
+from logger.api.csv_extraction import CsvSettings, recorded_csv
 from logger.api.datasets.lira_map import ProfilerPass
 from logger.errors import BadInput
 from logger.files import json_sha256
@@ -168,7 +168,7 @@ def phone(folder: Path) -> Target:
         alone = b"lat_deg" in data[:200]
         asked = CsvSettings(named_columns(columns) if data.startswith(b"time") else None,
                       None if alone else place, speed_mps=12.0 if rng.random() < 0.1 else None)
-        found = _recorded(file.hold(data), asked, Config(), lambda words: None)
+        found = recorded_csv(file.hold(data), asked, Config(), lambda words: None)
         _finite(found.readings.time_s, found.readings.accel_mps2, found.fixes.time_s, found.fixes.speed_mps)
         return len(found.notes), found.torn_tail
     return Target("phone csv", [one, ridelog, semicolons], read, damage=fields.tables(), limit_s=10.0)
