@@ -384,17 +384,6 @@ class _Step:
         return self._x + move, Roads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
 
 
-def misfit(problem: UnknownCar, learned: LearnedCar) -> Array:
-    """Mean power over what is expected, less 1, in units of its standard deviation: (s, k) by thirds of the drives'
-    speeds and bands; 0 where there are no readings."""
-    road, noise = problem.expected_power(learned.x, learned.roads)
-    speeds = problem.spectra.speed_mps
-    group = np.searchsorted(np.quantile(speeds, (1 / 3, 2 / 3)), speeds)
-    off = problem.weight * (problem.power / (road + noise) - 1)
-    sums, weights = (np.array([one[group == each].sum(axis=0) for each in range(3)]) for one in (off, problem.weight))
-    return np.where(weights > 0, sums / np.sqrt(np.maximum(weights, 1e-12)), 0.0)
-
-
 def log_error(problem: UnknownCar, x: Array) -> float:
     """Root mean square of the logarithm of the mean power of each band and third of the speeds over what a car lets
     expect, each block at its most probable level and waviness: how far the shape of the spectra is off."""

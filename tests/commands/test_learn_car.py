@@ -62,6 +62,21 @@ def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     assert "the drives show axles 2.6" in found.stderr and len(found.stderr.splitlines()) == 1
 
 
+def test_braking_that_is_read_as_up_and_down_is_refused(runs: list[Path], tmp_path: Path) -> None:
+    turned = []
+    for number, run in enumerate(runs):
+        drive = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
+        drive["accel_z_mps2"] = (np.gradient(drive["speed_mps"], drive["t_s"]) + 0.1 * drive["accel_z_mps2"]
+                                 + np.random.default_rng(number).normal(0.0, 0.15, len(drive)))
+        folder = tmp_path / run.name
+        folder.mkdir()
+        np.savetxt(folder / "drive.csv", drive, "%.6f", ",", header=",".join(drive.dtype.names or ()), comments="")
+        turned.append(folder)
+    found = called("learn-car", *turned, "--wheelbase", 2.66)
+    assert found.returncode == 1
+    assert "no car answers roads like these drives" in found.stderr
+
+
 @pytest.mark.slow
 def test_drives_of_two_cars_are_refused(runs: list[Path], tmp_path: Path) -> None:
     other = UnmeasuredCar(2.66, 0.4, (1.5, 0.4, 12.8, 0.1), (1.6, 0.35, 12.6, 0.12))
