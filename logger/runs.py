@@ -33,6 +33,10 @@ LATE_WITHIN_S = 0.3
 bounce of a body."""
 
 
+_UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m", "travel": "m", "force": "N",
+          "pitch_rate": "rad/s", "roll_rate": "rad/s"}
+
+
 @dataclass(frozen=True)
 class Signal:
     """A measured signal other than the acceleration of the sensor.
@@ -53,6 +57,11 @@ class Signal:
     ahead_m: float = 0.0
     left_m: float = 0.0
     kind: str | None = None
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return _UNITS[self.measures]
 
     @property
     def has_zero(self) -> bool:

@@ -286,9 +286,10 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     off[_place("wheelbase_m")] = 0.0  # it has a check of its own
     at = int(np.abs(off).argmax())
     if abs(off[at]) > _NO_CAR:
-        raise CheckFailed(f"learn-car: no car answers roads like these drives: {COORDINATES[at].replace('_', ' ')} would "
-                          f"be {abs(off[at]):.1f} standard deviations from what is known before. Is vertical_axis the "
-                          "one that points up, is the sensor bolted to the body, were they driven without a trailer?")
+        raise CheckFailed(f"learn-car: no car answers roads like these drives: {COORDINATES[at].replace('_', ' ')} "
+                          f"would be {abs(off[at]):.1f} standard deviations from what is known before. Is "
+                          "vertical_axis the one that points up, is the sensor bolted to the body, were they driven "
+                          "without a trailer?")
 
 
 def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar

@@ -56,7 +56,7 @@ from logger.report.document import (
     tiles,
 )
 from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, wrapped
-from logger.runs import normalised_rms_error, runs_left_out, short_names
+from logger.runs import Run, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Effect
 
@@ -203,7 +203,8 @@ def headline(found: LabComparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
-    lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
+    unit = plain.residuals.runs[0].facts.main.unit
+    lines = [f"The residual (measured - model) is {residual:.3g} {unit} r.m.s., of {measured:.3g} {unit} measured: "
              f"error {plain.error:.3f}, their ratio."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
@@ -220,7 +221,7 @@ def headline(found: LabComparison) -> list[str]:
     lines += removed_words(found.removed, found.band)
     if found.repeats is not None:
         apart = found.repeats.deviation_mps2
-        lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} m/s2 r.m.s. "
+        lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} {unit} r.m.s. "
                      f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
@@ -331,7 +332,8 @@ def _comparison_tables(found: LabComparison) -> list[str]:
         ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
     ):
         lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))] if other else []
-    lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
+    main = found.plain.residuals.runs[0].facts.main
+    lines += [f"Model's {main.measures}", *(_row(None, part, main.unit) for part in refitted.amplitude)]
     names = short_names(found.plain.residuals.runs)
     places = [_place(part, names[part.name]) for part in refitted.worst_places(_PLACES)]
     return [*lines, "Worst places", *places] if places else lines
@@ -381,6 +383,11 @@ def _tiles(found: LabComparison) -> Html:
 # --- pictures ---
 
 
+def _axis(run: Run) -> str:
+    """What a run measured, with its unit."""
+    return f"{run.facts.main.measures} [{run.facts.main.unit}]"
+
+
 def whole_drives(residuals: ModelResiduals) -> Html:
     """What was measured and what the model leaves of it, over the whole of each run."""
     names, drawn = short_names(residuals.runs), []
@@ -388,7 +395,7 @@ def whole_drives(residuals: ModelResiduals) -> Html:
         time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
         lines = tuple(line(word, time_s, values[index]) for word, values in (
             ("measured", residuals.measured), ("residual", residuals.residual)))
-        drawn.append(chart(Curves(names[run.name], "time in the run [s]", "acceleration [m/s2]", lines)))
+        drawn.append(chart(Curves(names[run.name], "time in the run [s]", _axis(run), lines)))
     return section("The whole drive", concatenated(drawn))
 
 
@@ -398,7 +405,8 @@ def _worst_place(standing: Standing) -> Html:
     time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
         ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
-    return section("The worst place", chart(Curves(worst.words, "time in the run [s]", "acceleration [m/s2]", lines)))
+    drawn = Curves(worst.words, "time in the run [s]", _axis(residuals.runs[index]), lines)
+    return section("The worst place", chart(drawn))
 
 
 def spectra_section(residuals: ModelResiduals) -> Html:
@@ -408,13 +416,13 @@ def spectra_section(residuals: ModelResiduals) -> Html:
 
 def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     """The charts of it: of the body, and of the wheels and above."""
-    f_hz = frequencies(residuals)
+    f_hz, unit = frequencies(residuals), residuals.runs[0].facts.main.unit
     density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
                for one in (residuals.measured, residuals.residual, residuals.model)]
 
     def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
-        return Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
+        return Curves(title, "frequency [Hz]", f"power [dB of ({unit})2/Hz]", tuple(
             Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
             for name, one in zip(("measured", "residual", "model"), density, strict=True)))
 
@@ -424,17 +432,17 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
 def _places(standing: Standing) -> Html:
     if not standing.where.place:
         return EMPTY
-    lines, names = [], short_names(standing.residuals.runs)
+    lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.runs[0].facts.main.unit
     for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
                               np.array([part.residual_mps2 for part in parts])))
-    along = Curves("Residual along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
+    along = Curves("Residual along the road", "distance [m]", f"r.m.s. [{unit}]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
              error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
-        ("Run", "From, to [m]", "Share of the residual", "Residual [m/s2]", "Error"), rows))
+        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "Error"), rows))
 
 
 def forces_section(forces: ForceMap) -> Html:
@@ -470,9 +478,10 @@ def _alignment(found: LabComparison) -> Html:
 
 def _comparison_page_tables(found: LabComparison) -> Html:
     plain, refitted = found.plain.where, found.refitted.where
+    unit = found.plain.residuals.runs[0].facts.main.unit
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
             + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
-            + _table("By how strongly the road moves the car", "m/s2", plain.amplitude, refitted.amplitude))
+            + _table("By how much it moves", unit, plain.amplitude, refitted.amplitude))
 
 
 def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> Html:
