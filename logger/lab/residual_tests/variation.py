@@ -30,11 +30,11 @@ class ExcitationTest(ResidualTest):
         grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
         large = len(parts) > 1 and (grown > LEAST_GROWTH if rho > 0 else grown < 1 / LEAST_GROWTH)
         return self.result(rho, None, p_value, large, low=low, high=high,
-                           unit=residuals.runs[0].facts.main.unit)
+                           motion_unit=residuals.runs[0].facts.main.unit)
 
     def sentence(self, found: ResidualTestResult) -> str:
         """The residual at small and at large motion."""
-        low, high, unit = (found.figures[key] for key in ("low", "high", "unit"))
+        low, high, unit = (found.figures[key] for key in ("low", "high", "motion_unit"))
         return (f"The residual {'grows' if found.value > 0 else 'shrinks'} with the motion: "
                 f"{low.residual_mps2:.2g} {unit} where the model has up to {low.high:.2g} {unit}, "
                 f"{high.residual_mps2:.2g} where it has {high.low:.2g} and more.")
