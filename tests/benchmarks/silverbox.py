@@ -3,14 +3,14 @@
     python -m tests.benchmarks.silverbox SNLS80mV.csv[.gz]
 
 The file is that of T. Wigren and J. Schoukens, Three free data sets for development and benchmarking in nonlinear
-system identification, European Control Conference 2013 (nonlinearbenchmark.org): volts in, volts out, at 1e7 / 2^14 Hz.
-They stand for newtons and metres. Split as published: of samples 40650 to 127400 the first three quarters are for
-fitting, of which the first 20,000 are used, and the rest is a test, as is the arrow, samples 100 to 40575. The vehicle's
-file says mass and spring to 20 % and the damper to 50 %. ``diagnose`` and ``add-effect`` see the first alone; errors
-are those of the simulated output by ``compare``, without the first 2 s.
+system identification, European Control Conference 2013 (nonlinearbenchmark.org): volts in, volts out, at 1e7 / 2^14
+Hz. They stand for newtons and metres. Split as published: of samples 40650 to 127400 the first three quarters are for
+fitting, of which the first 20,000 are used, and the rest is a test, as is the arrow, samples 100 to 40575. The
+vehicle's file says mass and spring to 20 % and the damper to 50 %. ``diagnose`` and ``add-effect`` see the first part
+alone; errors are those of the simulated output by ``compare``, without the first 2 s.
 
-Published (M. D. Champneys et al., arXiv 2405.10779) on multisine, arrow, and arrow without extrapolation [mV]: GRU 1.49,
-2.80, 0.95; LSTM 1.50, 2.68, 0.96; FIR-MLP 18.9, 20.2, 15.3.
+Published (M. D. Champneys et al., arXiv 2405.10779) on multisine, arrow, and arrow without extrapolation [mV]: GRU
+1.49, 2.80, 0.95; LSTM 1.50, 2.68, 0.96; FIR-MLP 18.9, 20.2, 15.3.
 """
 
 from __future__ import annotations
