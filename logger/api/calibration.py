@@ -120,6 +120,7 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Calibrate
     except ValueError as error:
         raise question.wrong("window_m", f": {error}") from None
     vehicle = model.vehicle
+    vehicle_file.check_on_road(vehicle)
     if any(one.file is not None for one in model.effects):
         path = None  # what is in that file may change
     ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute,

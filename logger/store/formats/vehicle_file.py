@@ -158,10 +158,18 @@ def read_model(path: Path | str) -> Model:
     )
 
 
+def check_on_road(vehicle: Vehicle) -> None:
+    """Raise BadInput for a vehicle that no road moves, a part on a test bench."""
+    if vehicle.model in OWN_NAMES:
+        raise BadInput(f"{vehicle.name}: expected a car, found model: {vehicle.model}, which stands on a test bench")
+
+
 def read_on_board(path: Path | str) -> Model:
-    """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput).
+    """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput),
+    and so are parts on a test bench.
     """
-    _, keys, known = _read(path)
+    vehicle, keys, known = _read(path)
+    check_on_road(vehicle)
     for name, one in known.items():
         if one.words == UNKNOWN and "given" not in keys:
             raise BadInput(f"{path}: expected a number for {name}, found unknown: nothing is fitted on board "

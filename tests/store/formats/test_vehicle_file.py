@@ -580,3 +580,11 @@ def test_no_number_is_unknown_on_board(tmp_path: Path) -> None:
     path.write_text(QUARTER.replace("1.8e5", "unknown"), "utf-8")
     with pytest.raises(BadInput, match=r"expected a number for front\.tire_stiffness_n_per_m, found unknown"):
         read_on_board(path)
+
+
+def test_no_road_moves_a_part_on_its_bench(tmp_path: Path) -> None:
+    path = tmp_path / "box.yaml"
+    path.write_text("name: box\nmodel: single_mass\nmass_kg: 0.3\nstiffness_n_per_m: 30\ndamping_n_s_per_m: 1\n",
+                    "utf-8")
+    with pytest.raises(BadInput, match="box: expected a car, found model: single_mass, which stands on a test bench"):
+        read_on_board(path)
