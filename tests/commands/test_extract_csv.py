@@ -90,7 +90,7 @@ def test_every_layout_at_any_angle_gives_what_the_car_did(
 def test_the_lab_finds_the_same_error_as_on_the_true_drive(
         layout: str, drive: DemoDrive, phone: Phone, line: Path, tmp_path: Path) -> None:
     done = called("extract", "--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs",
-                  "--profile", line, "--json")
+                  "--profile", line, "--vehicle", "rav4-2009", "--json")
     run = run_of(done)
     assert json.loads(done.stdout)["runs"][0]["by_road"]
     found = columns(run)

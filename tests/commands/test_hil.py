@@ -150,7 +150,7 @@ def test_a_service_that_would_not_hear_it_is_refused(sensor: AccelerometerConfig
 @pytest.fixture(scope="module")
 def rows(short_dump: Path) -> list[WindowRecord]:
     """What is expected of the short drive, all with UTC."""
-    serial = Config(accelerometer=AccelerometerConfig(driver="pasco"))
+    serial = Config(vehicle="rav4-2009", accelerometer=AccelerometerConfig(driver="pasco"))
     with open_dump(short_dump) as reader:
         return expected_rows(wired(reader.header, reader, None, "x"), serial, "x")
 
