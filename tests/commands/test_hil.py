@@ -35,6 +35,7 @@ from logger.service.hil.log_comparison import LoggedSession, compare, read_sessi
 from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.learning import DELAY
 from logger.service.pipeline import longest_wait_us
+from logger.shipped import vehicle_file
 from logger.store.log import row_format
 from logger.store.log.sidecar import Tally, store_sidecar
 from logger.units import STANDARD_GRAVITY_MPS2
@@ -150,7 +151,7 @@ def test_a_service_that_would_not_hear_it_is_refused(sensor: AccelerometerConfig
 @pytest.fixture(scope="module")
 def rows(short_dump: Path) -> list[WindowRecord]:
     """What is expected of the short drive, all with UTC."""
-    serial = Config(vehicle="rav4-2009", accelerometer=AccelerometerConfig(driver="pasco"))
+    serial = Config(vehicle=vehicle_file("rav4-2009"), accelerometer=AccelerometerConfig(driver="pasco"))
     with open_dump(short_dump) as reader:
         return expected_rows(wired(reader.header, reader, None, "x"), serial, "x")
 
