@@ -277,14 +277,12 @@ def _words_of(name: str) -> str:
 
 def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where a number is as far from those of published cars as no car's."""
-    import numpy as np
-
     from logger.identification.unknown_car import COORDINATES
 
     knowledge = problem.knowledge
-    off = (car.x - knowledge.mean) / np.sqrt(np.diag(np.linalg.inv(knowledge.precision)))
+    off = (car.x - knowledge.mean) / knowledge.std
     off[_place("wheelbase_m")] = 0.0  # it has a check of its own
-    at = int(np.abs(off).argmax())
+    at = int(abs(off).argmax())
     if abs(off[at]) > _NO_CAR:
         raise CheckFailed(f"learn-car: no car answers roads like these drives: {COORDINATES[at].replace('_', ' ')} "
                           f"would be {abs(off[at]):.1f} standard deviations from what is known before. Is "
@@ -318,10 +316,8 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
     speeds = [mph * MPH_MPS for mph in _SPEEDS_MPH]
     noise = float(np.nanmedian(problem.noise) * np.exp(car.x[-1]))
     level = float(np.exp(np.median(car.roads.level)))
-    prior = np.asarray(np.linalg.inv(knowledge.precision), dtype=np.float64)
-    now = dict(zip(speeds, map(float, iri_errors(knowledge, car.x, car.covariance, speeds, noise, level)), strict=True))
-    ever = dict(zip(speeds, map(float, iri_errors(knowledge, knowledge.mean, prior, speeds, noise, level)),
-                    strict=True))
+    now, ever = (dict(zip(speeds, map(float, iri_errors(knowledge, x, covariance, speeds, noise, level)), strict=True))
+                 for x, covariance in ((car.x, car.covariance), (knowledge.mean, knowledge.covariance)))
     mass = USUAL_MASS_KG if question.mass_kg is None else _sprung_side_kg(question.mass_kg, car.x)
     vehicle = knowledge.car(car.x, mass, "learned-car")
     history = () if kept is None else (Step("learn-car", errors["error_after"]),)
@@ -454,7 +450,7 @@ def _untold(problem: UnknownCar, car: LearnedCar, question: LearnCarQuestion) ->
                "cannot be told apart; add one at 30 and one at 90 km/h.")
     elif 3.6 * high < 60:
         yield "No drive was faster than 60 km/h: add one at 90 km/h, where springs and dampers show best."
-    prior = np.sqrt(np.diag(np.linalg.inv(problem.knowledge.precision)))
+    prior = problem.knowledge.std
     unknown = [name for at, name in enumerate(NUMBERS) if car.std[at] > 0.8 * prior[at]]
     said = {"bounce_hz": "body bounce", "damping_ratio": "damping", "hop_hz": "wheel hop",
             "unsprung_to_sprung": "unsprung mass", "dynamic_index": "dynamic index of pitch",

@@ -66,11 +66,6 @@ class DriveSpectra:
     def __len__(self) -> int:
         return len(self.speed_mps)
 
-    def part(self, which: npt.NDArray[np.bool_]) -> DriveSpectra:
-        """Some of the blocks."""
-        return DriveSpectra(self.speed_mps[which], self.spread[which], self.power[which], self.noise[which],
-                            self.stretch[which])
-
 
 def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
     """Several drives as one; their stretches stay apart."""
@@ -151,11 +146,11 @@ def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: f
         mean, spread = speeds.mean(axis=1), speeds.std(axis=1)
         good = usable[rows].all(axis=1) & (mean > SLOWEST_MPS) & (spread < STEADY * mean)
         readings = accel_mps2[rows[good]]
-        powers = scale * np.abs(np.fft.rfft((readings - readings.mean(axis=1, keepdims=True)) * taper)) ** 2
+        own = readings - readings.mean(axis=1, keepdims=True)
+        powers = scale * np.abs(np.fft.rfft(own * taper)) ** 2
         padded = np.zeros((len(powers), last + 1))
         padded[:, :min(powers.shape[1], last)] = powers[:, :last]
         power = np.add.reduceat(padded[:, :last], firsts, axis=1) / counts()
-        own = readings - readings.mean(axis=1, keepdims=True)
         square = (own**2).mean(axis=1)
         shakes = (square > 0) & ((own**4).mean(axis=1) < IMPULSIVE * square**2)
         power[:, ~passes] = np.nan

@@ -89,6 +89,16 @@ class CarKnowledge:
         whole[own:, own:] = np.diag([self.wheelbase_std**-2, self.ahead_std_m**-2, _NOISE_APART**-2])
         return whole
 
+    @cached_property
+    def covariance(self) -> Array:
+        """Of all coordinates (p, p)."""
+        return np.asarray(np.linalg.inv(self.precision))
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations of all coordinates (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
     def car(self, x: Array, sprung_mass_kg: float, name: str) -> Vehicle:
         """The half car with these coordinates (p,), its sensor where it sits."""
         own = len(NUMBERS)

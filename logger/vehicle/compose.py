@@ -230,7 +230,8 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
     inputs, _ = passage.under_wheels(structure)
     if structure.held:
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
-        return np.stack([inputs @ matrices + moved(car, passage).forces[:, 0] for _ in outputs])
+        force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
+        return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
         return _of_motion(structure, moved(car, passage), inputs, outputs)
     observe, direct = structure.output_matrices(outputs)

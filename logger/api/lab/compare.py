@@ -203,7 +203,7 @@ def headline(found: LabComparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
-    unit = plain.residuals.runs[0].facts.main.unit
+    unit = plain.residuals.unit
     lines = [f"The residual (measured - model) is {residual:.3g} {unit} r.m.s., of {measured:.3g} {unit} measured: "
              f"error {plain.error:.3f}, their ratio."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
@@ -416,7 +416,7 @@ def spectra_section(residuals: ModelResiduals) -> Html:
 
 def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     """The charts of it: of the body, and of the wheels and above."""
-    f_hz, unit = frequencies(residuals), residuals.runs[0].facts.main.unit
+    f_hz, unit = frequencies(residuals), residuals.unit
     density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
                for one in (residuals.measured, residuals.residual, residuals.model)]
 
@@ -432,7 +432,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
 def _places(standing: Standing) -> Html:
     if not standing.where.place:
         return EMPTY
-    lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.runs[0].facts.main.unit
+    lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.unit
     for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
         if len(parts) > 1:
@@ -478,7 +478,7 @@ def _alignment(found: LabComparison) -> Html:
 
 def _comparison_page_tables(found: LabComparison) -> Html:
     plain, refitted = found.plain.where, found.refitted.where
-    unit = found.plain.residuals.runs[0].facts.main.unit
+    unit = found.plain.residuals.unit
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
             + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
             + _table("By how much it moves", unit, plain.amplitude, refitted.amplitude))

@@ -27,6 +27,7 @@ CONFLICT_SIGMA = 4.0
 """A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
 as far in 1300 comparisons (normal distribution)."""
 
+
 @dataclass(frozen=True)
 class Tolerance:
     """Standard deviations of the priors.

@@ -87,6 +87,11 @@ class ModelResiduals:
     responses: Sequence[Response]
 
     @property
+    def unit(self) -> str:
+        """Of what the runs measure first, the same in all."""
+        return self.runs[0].facts.main.unit
+
+    @property
     def rate_hz(self) -> float:
         """Samples a second, the same in all runs."""
         return self.runs[0].rate_hz
