@@ -6,7 +6,7 @@ A vehicle's relations between roughness and vibration, for a person and for a pr
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -116,23 +116,22 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Calibrate
     path    of the vehicle's file, beside which they are kept; None: nowhere
     """
     try:
-        settings = CalibrationSettings(window_m=question.window_m, seed=question.seed)
+        settings = CalibrationSettings(window_m=question.window_m)
     except ValueError as error:
         raise question.wrong("window_m", f": {error}") from None
     vehicle = model.vehicle
     vehicle_file.check_on_road(vehicle)
     if any(one.file is not None for one in model.effects):
         path = None  # what is in that file may change
-    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute,
-               question.progress)
+    ask = _Ask(path, model.effects, settings, question.progress)
     plain = _answer(ask, vehicle, vehicle.name)
-    people, factor = question.passengers, question.sprung_mass_factor
-    if not people and factor == 1.0:
+    people = question.passengers
+    if not people:
         return Calibrated(vehicle, settings, plain, None)
-    heavy = loaded(vehicle, people, factor)
+    heavy = loaded(vehicle, people)
     with_load = _answer(ask, heavy, f"{vehicle.name} with its load")
     return Calibrated(vehicle, settings, plain,
-                      Load(people, factor, vehicle.sprung_mass_kg, heavy.sprung_mass_kg, with_load))
+                      Load(people, vehicle.sprung_mass_kg, heavy.sprung_mass_kg, with_load))
 
 
 @dataclass(frozen=True)
@@ -141,23 +140,22 @@ class _Ask:
 
     path: Path | None
     effects: Sequence[Chosen]
-    gain: Callable[[Array], Array]
     settings: CalibrationSettings
-    recompute: bool
     notify: Notify
 
 
 def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
     """The stored calibration of this vehicle, or a new one, which is then stored."""
     kept_in = () if ask.path is None else places(ask.path)
-    key = fingerprint(vehicle, ask.gain, ask.settings, ask.effects)
-    found = None if ask.recompute else find(kept_in, key)
+    gain = recorder_gain(None)
+    key = fingerprint(vehicle, gain, ask.settings, ask.effects)
+    found = find(kept_in, key)
     if found is not None:
         ask.notify(f"{title}: found in {found.path}")
         return found.speeds
     started_s = time.perf_counter()
     try:
-        speeds = rms_calibration.calibrate(known_vehicle(vehicle, ask.effects), ask.gain, ask.settings)
+        speeds = rms_calibration.calibrate(known_vehicle(vehicle, ask.effects), gain, ask.settings)
     except ValueError as error:
         raise BadInput(f"{vehicle.name}: {error}") from None
     took_s = time.perf_counter() - started_s
@@ -179,7 +177,6 @@ class Load:
     """A car with a load, and its lines."""
 
     passengers: int
-    sprung_mass_factor: float
     empty_kg: float
     sprung_mass_kg: float
     speeds: tuple[SpeedCalibration, ...]
@@ -209,8 +206,7 @@ def as_json(found: Calibrated) -> dict[str, Any]:
         "sprung_mass_kg": load.sprung_mass_kg if load else vehicle.sprung_mass_kg,
     }
     if load is not None:
-        result |= {"passengers": load.passengers, "sprung_mass_factor": load.sprung_mass_factor,
-                   "speeds_without_load": [row(speed) for speed in found.plain]}
+        result |= {"passengers": load.passengers, "speeds_without_load": [row(speed) for speed in found.plain]}
     return result
 
 

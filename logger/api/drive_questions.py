@@ -22,8 +22,6 @@ from logger.api.question import (
     DAILY_HOURS,
     IRI,
     LENGTH,
-    LOW_PASS,
-    MASS_FACTOR,
     MODAL_METHODS,
     MODAL_METHODS_GONE,
     MOST_ROAD_SAMPLES,
@@ -31,15 +29,14 @@ from logger.api.question import (
     PASSENGERS,
     PICTURES,
     RATE,
-    RESPONSES,
     ROAD_WAVINESS,
     ROUGHNESS,
-    SEED,
     SPACING,
     SPEED,
     WINDOW,
     Anyway,
     Argument,
+    InPython,
     Localized,
     LongQuestion,
     Option,
@@ -194,16 +191,9 @@ class CalibrateQuestion(LongQuestion):
     _: KW_ONLY
     window_m: Annotated[float, Option(
         "length of a window [m], 2 to 200 (default: 7.62, 25 ft)", metavar="M")] = WINDOW_M
-    low_pass_hz: Annotated[float | None, Option(
-        "low_pass_hz of the recorder's settings (default: none; the filters of every recorder, against gravity and "
-        "aliasing, always apply)", LOW_PASS, "HZ")] = None
     passengers: Annotated[int, Option(
         "people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a quarter car "
         "a quarter", PASSENGERS, "N")] = 0
-    sprung_mass_factor: Annotated[float, Option(
-        "so many times the body's mass, springs and inertias staying as they are", MASS_FACTOR, "X")] = 1.0
-    seed: Annotated[int, Option("another number, other roads (default: 1)", SEED, "N")] = 1
-    recompute: Annotated[bool, Option("do not look for a stored result")] = False
 
     stays: ClassVar[bool] = True
 
@@ -266,11 +256,6 @@ class ModesQuestion(Question):
         "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and place)",
         metavar="A,B,...", read=_columns)] = None
     input_column: Annotated[str | None, Option("column of the measured input", metavar="COLUMN", flag="--input")] = None
-    order: Annotated[int | None, Option(
-        "states of the model (for a free decay the most that are tried) instead of the order chosen by rule",
-        metavar="N")] = None
-    response: Annotated[str | None, Option(
-        f"{' or '.join(RESPONSES)}; without it the record is looked at", metavar="KIND", choices=RESPONSES)] = None
     from_s: Annotated[float | None, Option("leave out what is before this t_s [s]", metavar="S")] = None
     to_s: Annotated[float | None, Option("leave out what is after this t_s [s]", metavar="S")] = None
     vehicle: Annotated[Vehicle | None, Option(
@@ -283,44 +268,29 @@ class ModesQuestion(Question):
 
 @dataclass(frozen=True)
 class ModesCommand(ModesQuestion):
-    __doc__ = ModesQuestion.__doc__    # at the terminal a vehicle alone, or an example, can be asked for as well
+    __doc__ = ModesQuestion.__doc__    # at the terminal a vehicle alone can be asked for as well
 
     record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
         "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
     _: KW_ONLY
     iri_m_per_km: Annotated[float | None, Option(
         f"of a vehicle alone: road for laws that are not linear (default: {COMMON_IRI:g})", IRI, "M_PER_KM")] = None
-    example: Annotated[str | None, Option(
-        "five-storey: the model building of the reference dissertation, instead of FILE", metavar="NAME",
-        choices=("five-storey",))] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        alone = (f"`example` {self.example}" if self.example is not None else
-                 f"`vehicle` {self.vehicle}" if self.vehicle is not None and self.record is None else None)
-        if self.example is not None and self.vehicle is not None:
-            raise self.complaint(f"`vehicle` {self.vehicle}: expected no `example` with it")
-        if alone is not None:
-            if self.record is not None:
-                raise self.complaint(f"{alone}: expected no FILE with it, found {self.record}")
-            of_files = ("method", "columns", "input_column", "order", "response", "from_s", "to_s")
-            if given := [one for one in of_files if getattr(self, one) is not None]:
-                raise self.wrong(given[0], f": expected a FILE with it, not {alone}")
-        if (self.iri_m_per_km is not None and (self.vehicle is None or self.record is not None)) or (
-                self.speed_mps is not None and self.vehicle is None):
-            raise self.complaint("`iri_m_per_km` and `speed_mps`: expected `vehicle` with them"
-                                 + (", and no FILE with `iri_m_per_km`" if self.vehicle is not None else ""))
-        if alone is None and self.record is None:
+        if self.iri_m_per_km is not None and (self.vehicle is None or self.record is not None):
+            raise self.wrong("iri_m_per_km", ": expected `vehicle` with it, and no FILE")
+        if self.record is None and self.vehicle is None:
             raise self.complaint("modes: expected a FILE (try 'ridelog modes --help')")
+        if self.record is None:
+            of_files = ("method", "columns", "input_column", "from_s", "to_s")
+            if given := [one for one in of_files if getattr(self, one) is not None]:
+                raise self.wrong(given[0], f": expected a FILE with it, not `vehicle` {self.vehicle}")
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
-        """Poles and pictures are of a record alone."""
+        """Pictures are of a record alone."""
         if self.record is None and any(files.values()):
-            flag = next(flag for flag, paths in files.items() if paths)
-            raise self.complaint(f"{flag}: expected a FILE with it")
-        if files.get("--diagram") and (self.method == "decrement" or self.vehicle is not None):
-            raise self.complaint("--diagram: expected a method with poles, not "
-                                 + (f"`method` {self.method}" if self.vehicle is None else "`vehicle`"))
+            raise self.complaint("--out: expected a FILE with it")
 
 
 COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort_of", (PICTURES,))
@@ -329,9 +299,7 @@ CALIBRATE = Verb(CalibrateQuestion, "logger.api.calibration:calibration_of", (
 ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
     Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),
     Out("write the estimated profile as CSV", "--profile-out", "FILE", ("*",), many=False, is_drawn=False)))
-MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (
-    Out("write the poles of all orders, for a stabilisation diagram", "--diagram", "FILE.csv", ("*",), many=False,
-        is_drawn=False), PICTURES))
+MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (PICTURES,))
 
 
 _OBSTACLES = ("add one to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; step: "
@@ -478,30 +446,11 @@ class IriQuestion(ProfileQuestion):
 
 
 @dataclass(frozen=True)
-class IriCommand(IriQuestion):
-    __doc__ = IriQuestion.__doc__    # at the terminal the response of the IRI itself can be asked for as well
-
-    profile: Annotated[Union["Profile", Path, str, None], Argument(
-        "CSV or ERD file", metavar="PROFILE", read=Path)] = None  # type: ignore[assignment]
-    _: KW_ONLY
-    response: Annotated[bool, Option(
-        "without a profile: how strongly the IRI responds to each wavelength, as a table")] = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.response and (self.profile is not None or self.localized_m_per_km is not None):
-            raise self.wrong("response", ": expected no PROFILE and no `localized_m_per_km`, it is the response of the "
-                                         "IRI itself")
-        if not self.response and self.profile is None:
-            raise self.complaint("expected a PROFILE, or `response`")
-
-
-@dataclass(frozen=True)
 class ClassifyQuestion(ProfileQuestion):
     """Class, degree of roughness and waviness of a profile of at least 100 m (ISO 8608).
 
       ridelog road classify road.csv
-      ridelog road classify road.csv --psd spectrum.csv --out road.html
+      ridelog road classify road.csv --out road.html
 
     In Python: raises BadInput for one that is too short or too odd, and as ``read_profile``.
 
@@ -536,20 +485,20 @@ class RandomRoadQuestion(Question):
     iso_class: Annotated[str | None, Option(
         "class; the road gets the geometric mean of its degrees of roughness", metavar="A-H", read=str.upper,
         choices="ABCDEFGH", flag="--class")] = None
-    gd_n0_cm3: Annotated[float | None, Option(
-        "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS, "CM3", flag="--gd")] = None
+    gd_n0_cm3: Annotated[float | None, InPython(
+        "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS)] = None
     iri_m_per_km: Annotated[float | None, Option(
         "IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation", IRI_RANGE,
         "M_PER_KM")] = None
     length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
-    spacing_m: Annotated[float, Option("between samples [m]", SPACING, "M")] = 0.05
+    spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
     seed: Annotated[int, Option("another number, another road (default: 1)", Range(0, float("inf")), "N")] = 1
     waviness: Annotated[float, Option("w", ROAD_WAVINESS, "W")] = 2.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if sum(one is not None for one in (self.iso_class, self.gd_n0_cm3, self.iri_m_per_km)) != 1:
-            raise self.complaint("expected one of `iso_class`, `gd_n0_cm3` and `iri_m_per_km`")
+            raise self.complaint("expected one of `iso_class` and `iri_m_per_km`")
         both = f"`length_m` {self.length_m:g} `spacing_m` {self.spacing_m:g}: expected"
         if self.length_m / self.spacing_m > MOST_ROAD_SAMPLES:
             raise self.complaint(f"{both} at most {MOST_ROAD_SAMPLES} samples")
@@ -558,9 +507,8 @@ class RandomRoadQuestion(Question):
             raise self.complaint(f"{both} the last sample at {LENGTH.low:g} m or more, it lies at {last_m:g} m")
 
 
-EXACT_IRI = Verb(IriCommand, "logger.api.roads:asked_iri", (PICTURES,))
-CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (
-    Out("write the smoothed spectrum of the (left) track as CSV", "--psd", "FILE", ("*",), False, False), PICTURES))
+EXACT_IRI = Verb(IriQuestion, "logger.api.roads:iri_of", (PICTURES,))
+CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (PICTURES,))
 GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road_of")
 
 

@@ -1,7 +1,6 @@
 """The modes of the structure, or the vehicle, that a record was made on, with their words and JSON.
 
-Vibration records of many sensors; a car's modes out of a drive, from its file, its speed and the vehicle; and the model
-building of the reference dissertation, out of its matrices and of simulated records.
+Vibration records of many sensors; a car's modes out of a drive, from its file, its speed and the vehicle.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, line
 from logger.errors import BadInput
-from logger.files import write_text
 from logger.modal.mode import FoundMode, ModalResult
 from logger.printable import counted
 from logger.report.quantities import known
@@ -71,12 +69,6 @@ class Modes(CommandResult):
 
     title: ClassVar[str] = "Modes"
 
-    def write(self, path: Path, option: str = "--diagram") -> None:
-        """Write the poles of all orders as CSV."""
-        rows = [f"{order:.0f},{frequency_hz:.7g},{damping_ratio:.5g}\n"
-                for order, frequency_hz, damping_ratio in self.poles.tolist()]
-        write_text(path, "order,frequency_hz,damping_ratio\n" + "".join(rows), "ascii")
-
     def charts(self) -> Sequence[Chart]:
         """The stabilisation diagram: the poles of every order that was tried; nothing where there are none."""
         from logger.chart_data import Curves, Line
@@ -96,10 +88,7 @@ modes = function("modes", ModesQuestion, modes_of)
 
 
 def asked_modes(question: ModesCommand) -> CommandResult:
-    """What the terminal asked: modes of a record, of a vehicle alone, or of the example."""
-    if question.example is not None:
-        example = five_storey()
-        return CommandResult("\n".join(example_lines(example)), example)
+    """What the terminal asked: modes of a record, or of a vehicle alone."""
     if question.vehicle is not None and question.record is None:
         return vehicle_modes(model_of(question.vehicle), question.iri_m_per_km or COMMON_IRI,
                              question.speed_mps or COMMON_SPEED_MPS)
@@ -192,23 +181,18 @@ def _check_stands(given: record_checks.ChannelRecord | Path | str, question: Mod
     """BadInput for a drive, unless what moved it was measured, or it is said to be a free decay."""
     drives = (bool({*given.names} & {*record_checks.NOT_SENSORS}) if isinstance(given, record_checks.ChannelRecord) else
               record_checks.is_drive(given))
-    if drives and question.input_column is None and question.response != "decay":
+    if drives and question.input_column is None and question.method not in _ONLY_DECAYS:
         raise question.complaint(
             f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
             "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
-            f"looked at with `response` decay")
+            "looked at with `method` era")
 
 
 def _check(question: ModesQuestion) -> None:
     """WrongOption for an option that the method has no use for."""
     method = question.method
-    if method == "decrement" and question.order is not None:
-        raise question.wrong("order", f": expected a method with poles, not `method` {method}")
-    if question.input_column is not None:
-        if question.response is not None:
-            raise question.wrong("response", ": expected no `input_column`, which says what moves the structure")
-        if method not in (None, "n4sid"):
-            raise question.wrong("input_column", f": expected `method` n4sid with it, found {method}")
+    if question.input_column is not None and method not in (None, "n4sid"):
+        raise question.wrong("input_column", f": expected `method` n4sid with it, found {method}")
 
 
 def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion
@@ -253,30 +237,26 @@ def _picked(given: record_checks.ChannelRecord, wanted: Sequence[str]) -> Channe
 
 
 def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tuple[ModalResult, str]:
-    """What was found, and by which method. ValueError for a record that is too short or of another kind, an order that
-    it cannot carry, or an input that shows nothing."""
+    """What was found, and by which method. ValueError for a record that is too short or of another kind, or an input
+    that shows nothing."""
     from logger.modal.analysis import decays, find_modes
     from logger.modal.decay import decrement_mode
 
     method = question.method
-    decay = inputs is None and (decays(record.samples) if question.response is None else
-                                question.response == "decay")
+    decay = inputs is None and decays(record.samples)
     if method in _ONLY_DECAYS and not decay:
         raise ValueError(f"expected a free decay for `method` {method}, found a motion that goes on: `method` ssi "
-                         f"finds its modes; `response` decay if it is a decay")
+                         "finds its modes; `from_s` and `to_s` cut out a decay")
     if method == "decrement":
         if len(record.names) > 1:
             raise ValueError(f"expected one column for the decrement (`columns`), found "
                              f"{','.join(record.names)}")
         return decrement_mode(record.samples[:, 0], record.rate_hz), method
-    if question.order is not None and question.order < 2:
-        raise ValueError(f"expected an order of 2 or more, found {question.order}")
-    found = find_modes(record.samples, record.rate_hz, inputs, question.order, decay)
+    found = find_modes(record.samples, record.rate_hz, inputs, decay)
     return found, "era" if decay else "ssi" if inputs is None else "n4sid"
 
 
 METHOD = "vehicle"
-_UNUSED = ("order", "response", "input_column")
 
 
 def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -> Found:
@@ -288,9 +268,8 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
     if model.effects:
         raise BadInput(f"{model.vehicle.name}: expected a car without effects where the road was not measured, found "
                        f"{', '.join(one.effect.name for one in model.effects)}")
-    for option in _UNUSED:
-        if getattr(question, option) is not None:
-            raise question.wrong(option, ": expected a record without `vehicle`")
+    if question.input_column is not None:
+        raise question.wrong("input_column", ": expected a record without `vehicle`")
     if question.method is not None:
         raise question.wrong("method", f" {question.method}: expected none with `vehicle`, whose "
                                        "numbers are fitted to the spectrum")
@@ -484,51 +463,3 @@ def _shape_words(mode: FoundMode) -> str:
     if max(abs(part.imag) for part in mode.shape.tolist()) < _IN_STEP * len(mode.shape):
         return " ".join(f"{part.real:6.3f}" for part in mode.shape.tolist())
     return " ".join(f"{abs(part):.3f}@{degrees(phase(part)):.0f}°" for part in mode.shape.tolist())
-
-
-def five_storey() -> dict[str, Any]:
-    """What the matrices and simulated records have, beside what is printed."""
-    import numpy as np
-
-    from logger.modal import five_storey
-    from logger.modal.decay import decay_modes, proposals
-
-    building = five_storey.structure()
-    released = five_storey.released(building)
-    sensor = five_storey.SENSORS[0]
-    floors = np.stack([five_storey.recorded(released[:, floor], sensor, 10 + floor) for floor in range(5)], axis=1)
-    found = decay_modes(floors, five_storey.RATE_HZ, proposals, "free decay")
-    compared = five_storey.compare_sensors()
-    return {
-        "masses_kg": np.diag(building.mass).tolist(), "stiffness_n_per_m": -float(building.stiffness[0, 1]),
-        "frequencies_hz": five_storey.frequencies_hz(building).tolist(),
-        "printed_model_hz": list(five_storey.PRINTED_MODEL_HZ),
-        "printed_measured_hz": list(five_storey.PRINTED_MEASURED_HZ),
-        "modes": [mode_json(mode, tuple(f"floor {n}" for n in range(1, 6))) for mode in found.modes],
-        "sensors": [{"name": one.sensor.name, "rms_g": one.rms_g, "peaks_hz": list(one.peaks_hz),
-                     "damping_ratio": one.decrement.damping_ratio, "damping_std": one.decrement.damping_std}
-                    for one in compared],
-        "rms_difference": abs(compared[1].rms_g - compared[0].rms_g) / compared[0].rms_g,
-    }
-
-
-def example_lines(example: dict[str, Any]) -> list[str]:
-    """The same for a person."""
-    lines = ["Five-storey model building (section 5.3). The records were never published: simulated, 75 s at 100 Hz,",
-             f"damping 1.34 %, first peak 0.198 g at the top. Storey stiffness {example['stiffness_n_per_m']:.1f} N/m, "
-             "half way between 3 EI/h^3 and 12 EI/h^3.", "",
-             "mode  matrices Hz  printed model  printed measured   from a simulated record of five PS-2119"]
-    printed = [*zip(example["printed_model_hz"], example["printed_measured_hz"], strict=True), *[(None, None)] * 2]
-    for number, (frequency, (model, measured)) in enumerate(zip(example["frequencies_hz"], printed, strict=True), 1):
-        near = [mode for mode in example["modes"] if abs(mode["frequency_hz"] / frequency - 1) < 0.05]
-        found = "not there" if not near else (
-            f"{with_error(near[0]['frequency_hz'], near[0]['frequency_std_hz'])} Hz, "
-            f"{with_error(100 * near[0]['damping_ratio'], 100 * near[0]['damping_std'])} %")
-        texts = [f"{value:.4f}" if value else "-" for value in (model, measured)]
-        lines.append(f"{number:4}  {frequency:11.4f}  {texts[0]:>13}  {texts[1]:>16}   {found}")
-    lines += ["The printed 2.500 Hz is a misprint of 2.600: these matrices have it at 3.488 times the first whatever",
-              "the stiffness, and the other two fit.", "",
-              "sensor           r.m.s. g   FFT peaks Hz             damping by decrement %"]
-    lines += [f"{one['name']:15}  {one['rms_g']:8.4f}   {', '.join(f'{peak:.3f}' for peak in one['peaks_hz']):23}  "
-              f"{with_error(100 * one['damping_ratio'], 100 * one['damping_std'])}" for one in example["sensors"]]
-    return [*lines, f"r.m.s. differs by {example['rms_difference']:.2%} (printed: 0.0458 and 0.0445, 2.85 %; 1.34 %)"]

@@ -116,12 +116,10 @@ NOISE_MODELS = ("auto", "white", "ar", "road")
 MODAL_METHODS = ("era", "ssi", "n4sid", "decrement")
 MODAL_METHODS_GONE = {"ar": "ssi", "ssi-cov": "ssi", "fft": "ssi", "arx": "n4sid", "armax": "n4sid"}
 """Of modes: the methods, and for those that are no longer offered the one to use."""
-RESPONSES = ("decay", "random")
 COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
 """Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
-PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
-LOW_PASS = Range(1.0, 45.0, "Hz")
-"""Of a calibration: people more in the car, times the body's mass, and the recorder's low pass."""
+PASSENGERS = Range(0, 60)
+"""Of a calibration: people more in the car."""
 DAILY_HOURS = Range(0.001, 24.0, "hours")
 """Of riding, for values of health."""
 
@@ -290,6 +288,11 @@ def check_word_or_number(word: str, within: Range) -> Callable[[float | str], No
 @dataclass(frozen=True)
 class Argument(Option):
     """A field that is an argument by its place; with ``many`` one or more, or any number where it has a default."""
+
+
+@dataclass(frozen=True)
+class InPython(Option):
+    """A field that is asked for in Python alone: the terminal has no option for it."""
 
 
 @dataclass(frozen=True)

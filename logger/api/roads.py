@@ -9,17 +9,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from logger.api.drive_questions import ClassifyQuestion, IriCommand, IriQuestion, RandomRoadQuestion
+from logger.api.drive_questions import ClassifyQuestion, IriQuestion, RandomRoadQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
-from logger.files import write_text
 from logger.report.quantities import area_lines, area_values
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608
-from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, acceleration_psd, track_class
-from logger.roads.iri import Area, ProfileIri, areas, continuous_iri, profile_iri, sinusoid_iri, slope_gain
+from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, track_class
+from logger.roads.iri import Area, ProfileIri, areas, continuous_iri, profile_iri
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, iri_from_gd_n0
 from logger.roads.plausible import doubts_of, spacing_hint, unit_complaint, unit_doubt
 from logger.roads.sections import ride_words, road_kinds
@@ -166,18 +165,6 @@ def iri_of(question: IriQuestion) -> Iri:
 iri = function("iri", IriQuestion, iri_of)
 
 
-def asked_iri(question: IriCommand) -> CommandResult:
-    """What the terminal asked: the IRI of a profile, or how the IRI responds to each wavelength (Fig 2.13 of Blum
-    2015): gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
-    if not question.response:
-        return iri_of(question)
-    wavelengths_m = 100.0 / 2.0 ** (np.arange(26) / 3.0)
-    gain, iri_1_mm = slope_gain(1.0 / wavelengths_m), sinusoid_iri(0.001, 1.0 / wavelengths_m)
-    columns = {"wavelength_m": wavelengths_m, "slope_gain": gain, "iri_of_1_mm_m_per_km": iri_1_mm}
-    table = [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
-    return CommandResult("\n".join(response_screen(table)), {"response": table})
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class RoadClass(CommandResult):
     """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
@@ -198,15 +185,6 @@ class RoadClass(CommandResult):
     spectrum: BandedSpectrum
 
     title: ClassVar[str] = "Class of the road"
-
-    def write(self, path: Path, option: str = "--psd") -> None:
-        """Write the spectrum as CSV."""
-        found = self.spectrum
-        columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,
-                   acceleration_psd(found.centre_cpm, found.psd_m3), found.freedom)
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        header = "lowest_cpm,highest_cpm,displacement_psd_m3,acceleration_psd_per_m,degrees_of_freedom\n"
-        write_text(path, header + "".join(",".join(f"{value:.7g}" for value in row) + "\n" for row in rows), "ascii")
 
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""
@@ -294,17 +272,6 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
         values = "".join(f" {value:10.3f}" for value in result.row(number).values())
         printed.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
     return printed
-
-
-def response_screen(table: list[dict[str, float]]) -> list[str]:
-    """How the IRI responds to each wavelength, with bars."""
-    lines = ["IRI of a sinusoidal road by wavelength (80 km/h, 250 mm moving average)", "",
-             "wavelength  slope gain  IRI of 1 mm"]
-    for row in table:
-        bar = "#" * round(20 * row["slope_gain"])
-        figures = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
-        lines.append(f"{row['wavelength_m']:8.2f} m {figures}  {bar}")
-    return lines
 
 
 def class_json(tracks: Sequence[TrackClass]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from logger.api.question import (
     Argument,
     Asking,
+    InPython,
     LongQuestion,
     NamedEntries,
     Option,
@@ -65,7 +66,7 @@ class QuestionVerb:
 
 def declare(parser: argparse.ArgumentParser, verb: Verb) -> None:
     """The arguments of a verb: its question's, its files', and ``--json``."""
-    for one in askings(verb.question):
+    for one in _options_of(verb.question):
         _add(parser, one)
     for out in verb.outs:
         parser.add_argument(out.flag, type=Path, metavar=out.metavar, required=out.required, help=out.help,
@@ -82,6 +83,11 @@ def add_verbs(parser: argparse.ArgumentParser, dest: str, verbs: Mapping[str, tu
                                        formatter_class=parser.formatter_class)
         declare(found[name], verb)
     return found
+
+
+def _options_of(question: type[Any]) -> list[Asking]:
+    """The fields that the terminal asks for."""
+    return [one for one in askings(question) if not isinstance(one.option, InPython)]
 
 
 def _many(repeats: bool) -> dict[str, Any]:
@@ -146,7 +152,7 @@ def _number(kind: Any, option: Option) -> Callable[[str], float] | None:
 def asked(verb: Verb, args: argparse.Namespace) -> Any:
     """The question of a command line."""
     values: dict[str, Any] = {}
-    for one in askings(verb.question):
+    for one in _options_of(verb.question):
         if isinstance(one.option, NamedEntries):
             entries = {name: getattr(args, f"{one.name}.{name}") for name in one.option.by_name or {}}
             given: Any = {name: value for name, value in entries.items() if value is not None} or None

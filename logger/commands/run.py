@@ -1,7 +1,7 @@
 """Read the sensors, cut the drive into windows and write the logs: the service itself.
 
+  ridelog run
   ridelog run --config ridelog.yaml
-  ridelog run --config ridelog.yaml --verbose
 
 Exit status 0: stopped as asked; 1: the system failed it; 2: wrong settings (nothing will run until they are mended).
 systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.
@@ -24,14 +24,11 @@ PAUSE_S = 30
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog run``."""
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings (default: the machine's)")
-    parser.add_argument("--verbose", action="store_true", help="log more to stderr")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog run``."""
-    logging.basicConfig(
-        level=logging.DEBUG if args.verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s"
-    )
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     with stopped_by_signals() as stop:
         return _served(args, stop)
 

@@ -65,31 +65,27 @@ def decays(samples: Array) -> bool:
 
 
 def find_modes(
-    samples: Array, rate_hz: float, inputs: Array | None = None, order: int | None = None, decay: bool | None = None,
+    samples: Array, rate_hz: float, inputs: Array | None = None, decay: bool | None = None,
 ) -> ModalResult:
     """Modes of a record (samples, channels); inputs (samples, m) where they were measured.
 
-    order    states to use instead of the chosen ones; for a free decay the most that are tried
     decay    whether it is a free decay; None to see for oneself
 
-    ValueError for a record that is too short or a channel that never moves, an order that it cannot carry, or an input
-    that shows no mode.
+    ValueError for a record that is too short or a channel that never moves, or an input that shows no mode.
     """
     if len(samples) < SHORTEST:
         raise ValueError(f"expected at least {SHORTEST} samples, found {len(samples)}")
     if inputs is None and (decays(samples) if decay is None else decay):
         how = f"free decay: poles proposed by {METHODS['era']}, judged and refined by least squares"
-        return decay_modes(samples, rate_hz, lambda some, rate: proposals(some, rate, order), how)
+        return decay_modes(samples, rate_hz, proposals, how)
     scale = samples.std(axis=0)
     if np.linalg.eigvalsh(np.corrcoef(samples.T).reshape(2 * (samples.shape[1],))).min() < subspace.RIDGE:
         raise ValueError("expected channels that differ, found one that is a sum of others: leave it out")
     whole = samples if inputs is None else np.hstack([samples, inputs])
-    plan = _plan((whole - whole.mean(axis=0)) / whole.std(axis=0), samples.shape[1], rate_hz, order or 0)
+    plan = _plan((whole - whole.mean(axis=0)) / whole.std(axis=0), samples.shape[1], rate_hz)
     segments = segment_products(plan.data, plan.lags, min(_SEGMENTS, len(samples) // (2 * plan.lags)))
     moments = segments.whole()
-    if order is not None and order not in plan.orders:
-        raise ValueError(f"expected an order out of {plan.orders[0]} to {plan.orders[-1]} in steps of 2, found {order}")
-    chosen = plan.best(moments) if order is None else order
+    chosen = plan.best(moments)
     how = (f"response to unmeasured random forces: {METHODS['ssi']}" if inputs is None else
            f"response beside its measured input: {METHODS['n4sid']}")
     if chosen == 0:
@@ -129,13 +125,12 @@ def _without_bias(found: OrderPoles, duration_s: float) -> OrderPoles:
     return OrderPoles(found.order, poles, found.shapes)
 
 
-def _plan(data: Array, outputs: int, rate_hz: float, least: int) -> _Plan:
-    """``least`` is an order that has to be possible, as far as the record is long enough for it."""
+def _plan(data: Array, outputs: int, rate_hz: float) -> _Plan:
     channels = data.shape[1]
     longest = len(data) // (12 * channels)
     if longest < 2:
         raise ValueError(f"expected at least {24 * channels} samples for {channels} channels, found {len(data)}")
-    needed = max(_memory(data, outputs, longest), _LEAST_PAST, least // outputs + 2)
+    needed = max(_memory(data, outputs, longest), _LEAST_PAST)
     horizon = min(needed, longest, max(_MOST_PAST // channels, 30))
     most = min(_MOST_STATES + _BEYOND, (horizon - 1) * outputs) // 2 * 2
     if channels > outputs:

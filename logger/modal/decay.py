@@ -403,8 +403,8 @@ _PROPOSED_STATES = 40
 _RANK = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
 
 
-def proposals(samples: Array, rate_hz: float, most: int | None = None) -> tuple[OrderPoles, ...]:
-    """Poles of the orders 2, 4, ... ``most`` (None: 40) of a free decay (samples, channels)."""
+def proposals(samples: Array, rate_hz: float) -> tuple[OrderPoles, ...]:
+    """Poles of the orders 2, 4, ... 40 of a free decay (samples, channels)."""
     count, channels = samples.shape
     rows = max(2, min(_MOST_ROWS // channels, count // 2))
     columns = max(1, min(_MOST_COLUMNS, count - rows))
@@ -413,7 +413,7 @@ def proposals(samples: Array, rate_hz: float, most: int | None = None) -> tuple[
     early, late = whole[:, :-1], whole[:, 1:]
     squares, left = np.linalg.eigh(early @ early.T)
     sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
-    n = max(1, min(most or _PROPOSED_STATES, int((sizes > _RANK * sizes[0]).sum())))
+    n = max(1, min(_PROPOSED_STATES, int((sizes > _RANK * sizes[0]).sum())))
     left, root = left[:, :n], np.sqrt(np.maximum(sizes[:n], 1e-300))
     transition = left.T @ late @ ((left.T @ early) / sizes[:n, None]).T / np.outer(root, root)
     observe = left[:channels] * root

@@ -123,12 +123,6 @@ class Roughness:
     bands: BandedSpectrum = field(repr=False, compare=False)
 
 
-def acceleration_psd(wave_number_cpm: npt.ArrayLike, displacement_psd_m3: npt.ArrayLike) -> Array:
-    """Spectrum of the second derivative of elevation by distance [1/m2 per cycle/m] (Eq 2.3)."""
-    wave_number = np.asarray(wave_number_cpm, dtype=float)
-    return np.asarray((2 * np.pi * wave_number) ** 4 * np.asarray(displacement_psd_m3))
-
-
 def spectrum(elevation_m: npt.ArrayLike, spacing_m: float) -> Spectrum:
     """The displacement spectrum of a profile.
 

@@ -116,15 +116,6 @@ def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M)
     return np.abs(travel * np.sinc(wave_number * tire_base_m))
 
 
-def sinusoid_iri(amplitude_m: npt.ArrayLike, wave_number_cpm: npt.ArrayLike) -> Array:
-    """IRI [m/km] of an endless sinusoidal road of this amplitude [m] and wave number [cycles per metre].
-
-    The mean of a rectified sine is 2 / pi of its amplitude, and the road's slope has 2 pi n times that of its height.
-    """
-    wave_number = np.asarray(wave_number_cpm, dtype=float)
-    return 4000.0 * wave_number * np.asarray(amplitude_m, dtype=float) * slope_gain(wave_number)
-
-
 PER_KM = 1000.0
 _NEARLY = 1e-6
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ridelog
-from logger.api.drive_questions import IriCommand, IriQuestion, ModesCommand, ModesQuestion, RandomRoadQuestion
+from logger.api.drive_questions import ModesCommand, ModesQuestion, RandomRoadQuestion
 from logger.api.question import (
     Argument,
     Asking,
@@ -145,7 +145,6 @@ def test_python_names_the_function(values: tuple[Any, ...], options: dict[str, A
 
 
 def test_what_the_terminal_adds_takes_no_help_away() -> None:
-    assert help_of(IriCommand) == help_of(IriQuestion) and help_of(IriQuestion).startswith("Exact IRI")
     assert help_of(ModesCommand) == help_of(ModesQuestion) and "ridelog modes push.csv" in help_of(ModesQuestion)
     assert "default: ." not in "".join(one.help for _, one in every_option())
 

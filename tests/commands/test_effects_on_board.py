@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from logger.commands.main import main
-from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
@@ -109,11 +108,3 @@ def test_a_gain_is_in_the_calibration_and_friction_in_the_modes(
     assert reported(capsys, "modes", "--vehicle", "rav4-2009")["modes"][0]["frequency_std_hz"] is None
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["modes", "--iri", "3"], "--iri and --speed: expected --vehicle"),
-    (["modes", "--vehicle", "rav4-2009", "--order", "4"], "--order: expected a FILE with it"),
-    (["modes", "--vehicle", "rav4-2009", "--iri", "0"], "--iri 0: expected"),
-])
-def test_wrong_use(arguments: list[str], words: str) -> None:
-    with pytest.raises(BadInput, match=words):
-        main(arguments)

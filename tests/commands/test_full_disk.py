@@ -68,12 +68,12 @@ LAB = "--vehicle rav4-2009 run"
 SLOW = pytest.mark.slow
 WRITERS = {
     "road generate --out": Writer(road, "road generate --class C --length 150 --out road.csv"),
-    "road classify --psd --out": Writer(road, "road classify road.csv --psd psd.csv --out a.html"),
+    "road classify --out": Writer(road, "road classify road.csv --out a.html"),
     "simulate --out --profile-out": Writer(road, "simulate --vehicle rav4-2009 --profile road.csv --speed 15 --out "
                                            "drive.csv --profile-out profile.csv --out a.html"),
     "iri --out": Writer(road, "iri road.csv --out a.html --out a.pdf --out b.html --out a.png"),
     "comfort --out": Writer(shaken, "comfort shaken.csv --out a.html"),
-    "modes --diagram --out": Writer(shaken, "modes shaken.csv --method ssi --diagram poles.csv --out a.html"),
+    "modes --out": Writer(shaken, "modes shaken.csv --method ssi --out a.html"),
     "estimate --out --profile-out": Writer(run, "estimate run --vehicle rav4-2009 --out a.csv --out a.html "
                                            "--profile-out found.csv"),
     "calibrate --out": Writer(road, "calibrate --vehicle rav4-2009 --out speeds.csv"),
@@ -103,7 +103,7 @@ OTHERS = {
     "install --root": "steps, each as replace_bytes does it", "uninstall --root": "removes",
 }
 """Options that ask for what is written, of commands that are judged beside their own tests, and why."""
-WRITE = {"--out", "--profile-out", "--psd", "--diagram", "--page", "--visit", "--to", "--note", "--root"}
+WRITE = {"--out", "--profile-out", "--page", "--visit", "--to", "--note", "--root"}
 READ = {"--config", "--from", "--base", "--route", "--roads", "--smoothness", "--profile", "--location", "--csv",
         "--compare", "--excitation", "--speed-file", "--log", "--unmounted", "--led", "--effect-file"}
 

@@ -147,28 +147,6 @@ def test_an_erd_file_is_recognised_by_its_first_line(
     assert as_json(capsys, path, "--resample", "0.1")["resampled_to_m"] == 0.1
 
 
-def test_the_response_to_wavelengths_peaks_where_body_and_wheel_do(capsys: pytest.CaptureFixture[str]) -> None:
-    """Fig 2.13: gain peaks near 0.065 and 0.42 cycle/m, that is 15 m and 2.4 m."""
-    assert main(["iri", "--response", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)["response"]
-    gain = {row["wavelength_m"]: row["slope_gain"] for row in rows}
-    peaks = [b for a, b, c in zip(gain, list(gain)[1:], list(gain)[2:], strict=False) if gain[a] < gain[b] > gain[c]]
-    assert [round(peak, 1) for peak in peaks] == pytest.approx([15.4, 2.4], rel=0.15)
-    assert main(["iri", "--response"]) == 0
-    assert "wavelength" in capsys.readouterr().out
-
-
-def test_neither_profile_nor_response_is_refused() -> None:
-    with pytest.raises(BadInput, match="expected a PROFILE"):
-        main(["iri"])
-
-
-@pytest.mark.parametrize("more", [["road.csv"], ["--localized", "2"]])
-def test_the_response_takes_no_road(more: list[str]) -> None:
-    with pytest.raises(BadInput, match="--response: expected no PROFILE"):
-        main(["iri", "--response", *more])
-
-
 @pytest.mark.parametrize("length", ["0", "-1", "nan"])
 def test_a_window_that_has_no_length_is_refused_by_its_name(road: tuple[Path, np.ndarray], length: str) -> None:
     with pytest.raises(BadInput, match=r"^--window .*: expected a length above 0 m"):

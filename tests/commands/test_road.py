@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ridelog
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.roads import iso8608
@@ -28,19 +29,19 @@ def classify(path: Path, capsys: pytest.CaptureFixture[str], *arguments: str) ->
 
 def test_a_road_is_written_as_a_profile(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "road.csv"
-    generate(path, "--class", "b", "--length", "120", "--spacing", "0.1", "--seed", "7", "--waviness", "2.5")
+    generate(path, "--class", "b", "--length", "120", "--seed", "7", "--waviness", "2.5")
     profile = read_profile(path)
-    assert profile.spacing_m == pytest.approx(0.1)
-    assert profile.elevation_m == pytest.approx(iso8608.generate(64, 120, 0.1, 7, 2.5), abs=0.51e-7)
+    assert profile.spacing_m == pytest.approx(0.05)
+    assert profile.elevation_m == pytest.approx(iso8608.generate(64, 120, 0.05, 7, 2.5), abs=0.51e-7)
     output = capsys.readouterr()
     assert output.out == ""
-    assert "120 m in 1201 samples, class B, Gd(n0) 64 cm3, waviness 2.5, seed 7" in output.err
+    assert "120 m in 2401 samples, class B, Gd(n0) 64 cm3, waviness 2.5, seed 7" in output.err
 
 
 def test_without_a_file_it_goes_to_stdout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    generate(tmp_path / "road.csv", "--gd", "100", "--length", "20")
+    generate(tmp_path / "road.csv", "--class", "C", "--length", "20")
     capsys.readouterr()
-    assert main(["road", "generate", "--gd", "100", "--length", "20"]) == 0
+    assert main(["road", "generate", "--class", "C", "--length", "20"]) == 0
     output = capsys.readouterr()
     assert output.out == (tmp_path / "road.csv").read_text()
     assert output.err.startswith("stdout: 20 m in 401 samples")
@@ -56,13 +57,13 @@ def test_an_iri_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str], wa
 
 
 def test_classify_prints_the_fields_of_the_contract(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    generate(tmp_path / "road.csv", "--class", "C", "--length", "600", "--spacing", "0.1")
+    generate(tmp_path / "road.csv", "--class", "C", "--length", "600")
     reported = classify(tmp_path / "road.csv", capsys)
     assert list(reported)[:4] == ["class", "gd_n0_cm3", "waviness", "iri_m_per_km"]
     assert reported["class"] == "C"
     assert reported["gd_n0_cm3"] == pytest.approx(256, abs=3 * reported["gd_n0_std_cm3"])
     assert reported["waviness"] == pytest.approx(2, abs=3 * reported["waviness_std"])
-    assert reported["iri_m_per_km"] == pytest.approx(iri(iso8608.generate(256, 600, 0.1, 1), 0.1), rel=1e-5)
+    assert reported["iri_m_per_km"] == pytest.approx(iri(iso8608.generate(256, 600, 0.05, 1), 0.05), rel=1e-5)
     assert reported["iri_m_per_km"] == pytest.approx(reported["iri_expected_m_per_km"],
                                                  abs=3 * reported["iri_expected_std_m_per_km"])
 
@@ -81,8 +82,7 @@ def test_two_tracks_are_distinguished(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_a_person_sees_errors_and_doubt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    generate(tmp_path / "road.csv", "--gd", "128", "--length", "150")
-    capsys.readouterr()
+    ridelog.write_profile(tmp_path / "road.csv", ridelog.random_road(gd_n0_cm3=128.0, length_m=150.0))
     assert main(["road", "classify", str(tmp_path / "road.csv")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "road.csv: 150.00 m, one sample every 50 mm"
@@ -92,15 +92,18 @@ def test_a_person_sees_errors_and_doubt(tmp_path: Path, capsys: pytest.CaptureFi
     assert "Eq 4.39" in lines[5]
 
 
-def test_the_smoothed_spectrum_as_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    generate(tmp_path / "road.csv", "--class", "B", "--length", "3000", "--spacing", "0.1")
-    classify(tmp_path / "road.csv", capsys, "--psd", str(tmp_path / "psd.csv"))
-    low, high, displacement, acceleration, freedom = np.loadtxt(tmp_path / "psd.csv", delimiter=",", skiprows=1).T
-    assert low[1:] == pytest.approx(high[:-1])
-    centre = np.sqrt(low * high)
-    assert np.mean(displacement / (64e-6 * (centre / 0.1) ** -2)) == pytest.approx(1, abs=0.05)
-    assert acceleration == pytest.approx(displacement * (2 * np.pi * centre) ** 4, rel=1e-5)
-    assert (freedom > 10).all()
+def test_the_smoothed_spectrum() -> None:
+    found = ridelog.classify(ridelog.random_road(iso_class="B", length_m=3000.0, spacing_m=0.1)).spectrum
+    assert np.mean(found.psd_m3 / (64e-6 * (found.centre_cpm / 0.1) ** -2)) == pytest.approx(1, abs=0.05)
+    assert (found.freedom > 10).all()
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"spacing_m": 0.0}, "spacing_m 0: expected 0.001 to 0.3 m"), ({"gd_n0_cm3": -1.0}, "gd_n0_cm3 -1: expected 0.001"),
+    ({"iri_m_per_km": 1.0, "length_m": 1e6, "spacing_m": 0.01}, "at most 20000000 samples")])
+def test_a_road_that_python_cannot_make(options: dict[str, float], message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        ridelog.random_road(**options)
 
 
 def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,14 +121,11 @@ def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.Captu
 @pytest.mark.parametrize(("arguments", "message"), [
     (["--class", "A", "--length", "5"], "--length 5: expected 11 to 1000000 m"),
     (["--class", "A", "--length", "nan"], "--length nan"),
-    (["--class", "A", "--spacing", "0"], "--spacing 0: expected 0.001 to 0.3 m"),
     (["--class", "A", "--waviness", "4"], "--waviness 4: expected 1.5 to 3"),
-    (["--gd", "-1"], "--gd -1: expected 0.001"),
     (["--iri", "inf"], "--iri inf: expected 0.01 to 1000 m/km"),
-    (["--gd", "1", "--seed", "-1"], "--seed -1: expected 0 or more"),
-    (["--gd", "1", "--length", "1e6", "--spacing", "0.01"], "at most 20000000 samples"),
-    (["--gd", "1", "--json"], "--json: expected --out FILE"), ([], "expected one of --class, --gd and --iri"),
-    (["--class", "A", "--iri", "2"], "expected one of --class, --gd and --iri"),
+    (["--iri", "1", "--seed", "-1"], "--seed -1: expected 0 or more"),
+    (["--iri", "1", "--json"], "--json: expected --out FILE"), ([], "expected one of --class and --iri"),
+    (["--class", "A", "--iri", "2"], "expected one of --class and --iri"),
     (["--class", "J"], "--class J: expected one of A, B"),
 ])
 def test_a_road_that_cannot_be_made(arguments: list[str], message: str) -> None:

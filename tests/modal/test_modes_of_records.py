@@ -178,12 +178,8 @@ def test_what_kind_of_record_it_is() -> None:
     assert not any(decays(random_record(masses, 60.0, seed)) for seed in range(5))
 
 
-@pytest.mark.slow
-def test_an_order_that_cannot_be() -> None:
+def test_a_record_that_is_too_short() -> None:
     record = random_record(five([0.02] * 5), 60.0, 3)
-    with pytest.raises(ValueError, match="expected an order out of 2 to 48 in steps of 2, found 7"):
-        find_modes(record, RATE_HZ, order=7)
-    assert find_modes(record, RATE_HZ, order=12).order == 12
     with pytest.raises(ValueError, match="at least 100 samples, found 99"):
         find_modes(record[:99], RATE_HZ)
 

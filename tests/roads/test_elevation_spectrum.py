@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.roads import iso8608
-from logger.roads.elevation_spectrum import Spectrum, acceleration_psd, band_edges, classify, smooth, spectrum
+from logger.roads.elevation_spectrum import Spectrum, band_edges, classify, smooth, spectrum
 
 
 def random_walk(gd_n0_cm3: float, length_m: float, spacing_m: float, seed: int) -> np.ndarray:
@@ -39,10 +39,6 @@ def test_a_cosine_holds_half_its_amplitude_squared() -> None:
     found = spectrum(0.01 * np.cos(2 * np.pi * 0.37 * x) + 0.003 * x, 0.05)
     near = np.abs(found.wave_number_cpm - 0.37) < 0.05
     assert found.psd_m3[near].sum() * found.step_cpm == pytest.approx(0.01**2 / 2, rel=1e-3)
-
-
-def test_equation_2_3() -> None:
-    assert acceleration_psd(0.5, 3.0) == pytest.approx(3.0 * np.pi**4)
 
 
 def test_a_tilt_or_a_hill_changes_nothing() -> None:

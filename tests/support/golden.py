@@ -22,7 +22,7 @@ FILE = Path(__file__).with_name("golden.json")
 MADE = ("road generate --class C --length 200 --seed 3 --out road.csv --json",
         "simulate --vehicle rav4-2009 --profile road.csv --speed 12 --noise 0.05 --out drive.csv --json")
 """What the others read."""
-ASKED = ("iri road.csv --window 50 --json", "iri --response --json", "road classify road.csv --json",
+ASKED = ("iri road.csv --window 50 --json", "road classify road.csv --json",
          "comfort drive.csv --json", "comfort drive.csv --weighting wb --daily-hours 2 --json",
          "modes --vehicle rav4-2009 --json", "simulate --list-effects --json")
 _FEW = 4
