@@ -44,7 +44,7 @@ def left_out_json(found: Iterable[LeftOut]) -> dict[str, list[dict[str, Any]]]:
 def left_out_lines(found: Iterable[LeftOut]) -> list[str]:
     """One line, or none where all was used."""
     there = counting(found)
-    return [f"Left out: {'; '.join(one.words for one in there)}."] if there else []
+    return [f"Not used: {'; '.join(one.words for one in there)}."] if there else []
 
 
 def left_out_paragraph(found: Iterable[LeftOut]) -> list[str]:

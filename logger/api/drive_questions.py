@@ -420,11 +420,12 @@ class ProfileQuestion(Question):
 class IriQuestion(ProfileQuestion):
     """Exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
 
-      ridelog iri road.csv --window 160.9344
+      ridelog iri road.csv --window 0.1mi
       ridelog iri road.csv --localized 2.5 --out iri.html
 
-    PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]) or ERD, evenly spaced by 300 mm or less and at least
-    11 m long. With two wheelpaths: the IRI of each, their mean (MRI) and that of the half car on both (HRI).
+    PROFILE is CSV (distance_m,elevation_m[,elevation_right_m]; other units by name: distance_ft,elevation_in) or ERD,
+    evenly spaced by 300 mm or less and at least 11 m long. With two wheelpaths: the IRI of each, their mean (MRI) and
+    that of the half car on both (HRI).
 
     In Python: raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
 
@@ -434,8 +435,8 @@ class IriQuestion(ProfileQuestion):
     """
 
     window_m: Annotated[float, Option(
-        "length of a window [m] (default: 100, as road agencies report; a tenth of a mile is 160.9344, the service's "
-        "25 ft are 7.62)", metavar="M")] = 100.0
+        "length of a window [m], or with its unit, such as 0.1mi or 25ft (default: 100, as road agencies report)",
+        metavar="M")] = 100.0
     resample_m: ResampleM = None
     localized_m_per_km: Localized = None
 

@@ -12,11 +12,10 @@ from typing import Annotated
 
 from drivers.catalogue import names
 from logger.api.question import LIMIT, Argument, Localized, Option, Out, Question, Range, Verb, limit_of
-from logger.units import FOOT_M, MILE_M
+from logger.units import FOOT_M, LENGTH_UNITS_M
 
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
 SYSTEMS = ("si", "us")
-_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
 FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
 
 
@@ -25,7 +24,7 @@ def length_of(length: str | float) -> float:
     text = length if isinstance(length, str) else f"{length:f}m"
     found = fullmatch(r"([0-9.]+)\s*(m|km|mi|ft)", text.strip())
     try:
-        length_m = float(found[1]) * _UNITS_M[found[2]] if found else 0.0
+        length_m = float(found[1]) * LENGTH_UNITS_M[found[2]] if found else 0.0
     except ValueError:
         length_m = 0.0
     if not LEAST_M <= length_m <= MOST_M:

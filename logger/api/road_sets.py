@@ -297,11 +297,11 @@ def verdict_of(parts: list[Compared], refused: list[str], repeat: str) -> str:
         found = agreement(*(np.concatenate([getattr(one, name) for one in chosen]) for name in (
             "iri_m_per_km", "iri_std_m_per_km", "reference_m_per_km")))
         if found is not None:
-            words.append(f"All roads, {window_m:g} m: R2 {found.r2:.2f}, off by {found.mae_m_per_km:.2f} m/km on the "
-                         f"mean, bias {found.bias:+.0%}, {found.within_two:.0%} within two standard errors.")
+            words.append(f"All roads, {window_m:g} m: R2 {found.r2:.2f}, off by {found.mae_m_per_km:.2f} m/km on "
+                         f"average, bias {found.bias:+.0%}, {found.within_two:.0%} within two standard errors.")
     if not words:
         words.append("Too few windows lie on the profiled roads for a figure.")
     words.append(repeat)
     if refused:
-        words.append(f"Left out: {len(refused)}, the first {refused[0]}".rstrip(".") + ".")
+        words.append(f"Not used: {len(refused)}, the first {refused[0]}".rstrip(".") + ".")
     return " ".join(words)

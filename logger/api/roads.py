@@ -23,7 +23,7 @@ from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, ir
 from logger.roads.plausible import doubts_of, spacing_hint, unit_complaint, unit_doubt
 from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
-from logger.units import WINDOW_M
+from logger.units import INCH_PER_MILE_M_PER_KM, WINDOW_M
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -262,7 +262,8 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     if profile.widest_step_m is not None:
         printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
     printed += [
-        "", ", ".join(f"{_HEADS[key]} {value:.3f}" for key, value in whole.items()) + " m/km",
+        "", ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"
+                      for key, value in whole.items()),
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
         f"Ride: {ride_words(roughness)}", "", *_cut_short(result),
         f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + "  m/km",

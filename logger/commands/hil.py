@@ -38,7 +38,7 @@ from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
 from logger.service.learning import DELAY, NOISE, KnownNoise, read_delay
 
 LATE_MS = 50.0
-LATE_WHY = "the service itself waits as long between two looks at a port"
+LATE_WHY = "the service reads its ports as often"
 WRITTEN_S = 2.0
 _MOVED_M = 1.0
 
@@ -106,8 +106,8 @@ class PlayedDrive:
             size = ", ".join(f"{count} bytes of {source}" for source, count in self.sent.size_bytes.items())
             half, most, longest = self.sent.late_ms
             lines += [f"Sent {self.sent.duration_s:.0f} s: {size}.",
-                      f"  late: {half:.1f} ms in the middle, {most:.1f} ms in 99 of 100, {longest:.1f} ms at most "
-                      f"(99 of 100 may be late by {LATE_MS:g} ms: {LATE_WHY}){'' if self.in_time else '  TOO LATE'}"]
+                      f"  late: median {half:.1f} ms, 99th percentile {most:.1f} ms ({LATE_MS:g} allowed: {LATE_WHY}), "
+                      f"largest {longest:.1f} ms{'' if self.in_time else '  TOO LATE'}"]
         if self.agreement is not None:
             lines += _agreement_text(self.agreement)
             lines.append("The log AGREES with the replay." if self.agreement.ok else
@@ -126,7 +126,8 @@ def _bridged(args: argparse.Namespace) -> str:
 def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
     """What the service should log; fails before anything is played when the comparison could not be made."""
     if not args.log.is_dir():
-        raise BadInput(f"{args.log}: expected the folder of the service's logs")
+        raise BadInput(f"{args.log}: expected the folder of the service's logs; the service makes it when it starts: "
+                       "ridelog run")
     if args.nmea_port is not None and not list(args.log.glob("*.csv.part")):
         raise BadInput(f"{args.log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
     with open_dump(args.dump) as reader:
@@ -209,8 +210,8 @@ def _number(value: float) -> float | None:
 
 def _agreement_text(agreement: LogAgreement) -> list[str]:
     if agreement.session is None:
-        return [f"No row of this drive is in the log: {agreement.expected} were expected.",
-                "  Is the service up, are its ports the other ends of the wires, and is TX on RX?"]
+        return [f"No row of this drive is in the log, of {agreement.expected} expected.",
+                "  Check that the service runs, that its ports are the other ends of the wires, and that TX is on RX."]
     lines = [f"Session {agreement.session:05d}: {agreement.matched} of {agreement.expected} expected rows found, "
              f"{len(agreement.missing)} missing, {agreement.pending} not written yet, {len(agreement.surplus)} not "
              f"expected, {agreement.repeated} twice, {agreement.flags_differ} with other flags."]
@@ -220,13 +221,13 @@ def _agreement_text(agreement: LogAgreement) -> list[str]:
     for words, segments in (("missing", agreement.missing), ("not expected", agreement.surplus)):
         if segments:
             lines.append(f"  {words}: segments {', '.join(map(str, segments[:10]))}{' ...' if segments[10:] else ''}")
-    lines.append(f"  {'':9} {'95 of 100':>9} {'largest':>8}         {'outside':>7}   may be")
+    lines.append(f"  {'':14} {'95th perc.':>10} {'largest':>8}         {'outside':>7}   allowed")
     return lines + [_difference_text(difference) for difference in agreement.differences]
 
 
 def _difference_text(difference: Difference) -> str:
     tolerance = difference.tolerance
     share = f" or {tolerance.share:.0%} of {tolerance.of}" if tolerance.of else ""
-    return (f"  {tolerance.quantity:9} {difference.p95:9.3f} {difference.largest:8.3f} {tolerance.unit:7} "
+    return (f"  {tolerance.quantity:14} {difference.p95:10.3f} {difference.largest:8.3f} {tolerance.unit:7} "
             f"{difference.outside:7d}   {tolerance.least:g}{share}: {tolerance.why}"
             f"{'' if difference.ok else '  TOO MANY OUTSIDE'}")

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING
 from pathlib import Path
+from re import fullmatch
 from types import NoneType
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -42,6 +43,7 @@ from logger.files import together, write_file
 from logger.printable import printable, word
 from logger.report.drawing import ENDINGS
 from logger.report.quantities import WIDTH
+from logger.units import LENGTH_UNITS_M
 
 if TYPE_CHECKING:
     from logger.api.shown import CommandResult
@@ -137,9 +139,13 @@ def _number(kind: Any, option: Option) -> Callable[[str], float] | None:
     if kind not in (int, float):
         return None
     unit = option.range.unit if option.range else ""
+    in_metres = kind is float and option.metavar == "M"
 
     def number(text: str) -> float:
+        found = fullmatch(r"([0-9.]+)(m|km|mi|ft)", text) if in_metres else None
         try:
+            if found:
+                return float(found[1]) * LENGTH_UNITS_M[found[2]]
             return float(text) if kind is float else int(text)
         except ValueError:
             without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""

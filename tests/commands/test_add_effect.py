@@ -47,7 +47,7 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert [one.effect.name for one in model.effects] == ["dry_friction"]
     assert model.effects[0].values == reported["parameters"]
     assert model.effects[0].standard_errors == reported["standard_errors"]
-    assert [step.step for step in model.history] == ["as it was given", "numbers refitted", "added dry_friction"]
+    assert [step.step for step in model.history] == ["as it was given", "parameters refitted", "added dry_friction"]
     assert model.history[-1].error == reported["error_after"]
     mass = next(one for one in reported["numbers"] if one["name"] == "sprung_mass_kg")
     assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["written"]
@@ -70,7 +70,7 @@ def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest
     assert add(str(own), out, out, *runs) == 0  # over the old file, as it was asked for
     reported = capsys.readouterr().out
     assert reported.startswith("long_bracket: offset_m 0.")
-    for words in ("It helps", "Error before: ", "Error after: ", "distances as recorded: where compare begins with it",
+    for words in ("It helps", "Before ", "After ", "Noise floor ", "new file and distances as they are",
                   "sprung_mass_kg", "Shift"):
         assert words in reported
     model = read_model(out)

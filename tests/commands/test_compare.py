@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,8 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     reported = capsys.readouterr().out
     lines = reported.splitlines()
     assert lines[0] == "rav4-2009 on 2 runs, 24 s"
-    assert lines[2].startswith("The residual (measured - model) is ")
+    assert lines[2].startswith("The model lacks something: ")
+    assert re.search(r"NRMSE 0\.\d{3} \(residual over measured\): [\d.]+ of [\d.]+ m/s2 r\.m\.s\.", " ".join(lines))
     assert "Next: ridelog diagnose" in " ".join(reported.split())
     assert all(len(line) <= 100 for line in lines)
     assert "wheel hop" in reported and "run1, " in reported

@@ -49,7 +49,7 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
     assert best["p_value"] < 1e-6 and best["confused_with"] == []
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= best.keys()
     assert [one["p_value"] for one in others] == sorted(one["p_value"] for one in others)
-    assert reported["judged_on"] == "stretches that no fit saw"
+    assert reported["judged_on"] == "held-out stretches"
     refitted = reported["steps"][1]["error"]
     assert best["error"] < min([refitted, *(one["error"] for one in others)])
     assert reported["no_better_than_refitted"]
@@ -71,7 +71,7 @@ def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert lines[0] == "rav4-2009 on 2 runs, 36 s. 4 effects are known."
     assert lines[2].startswith("Nothing is missing")
     assert "Next: nothing" in reported
-    assert "roll: could not be tried" in reported
+    assert "roll: not tried" in reported
     assert all(len(line) <= 100 for line in lines)
 
 
@@ -103,7 +103,7 @@ def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys
     assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["unseen_noise_floor_error"] == reported["noise_floor_error"]
-    assert reported["judged_on"] == "stretches that no fit saw"
+    assert reported["judged_on"] == "held-out stretches"
     assert reported["steps"][-1]["error"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
 
 

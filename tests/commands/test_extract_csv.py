@@ -269,7 +269,7 @@ def test_places_that_are_repeated_while_the_car_drives_on_are_no_fix_and_are_cou
     (lost,) = found["left_out"]
     assert (lost["unit"], lost["why"]) == ("s", "without a fix for more than 10 s, or at an end")
     assert lost["amount"] == pytest.approx(16.0, abs=2.0)
-    assert "Left out: 1" in called("extract", "--csv", log, *words).stdout
+    assert "Not used: 1" in called("extract", "--csv", log, *words).stdout
 
 
 @pytest.mark.parametrize(("still", "runs"), [((1000, 2000), 2), ((0, 1000), 1), ((2500, 4000), 1)])

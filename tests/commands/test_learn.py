@@ -43,5 +43,5 @@ def test_where_nothing_is_missing_nothing_is_written(plain_run: Path, tmp_path: 
     assert main(["learn", "--json", "--vehicle", "rav4-2009", "--out", str(law), str(plain_run)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["law"] is None and found["family"] is None and not law.exists()
-    assert found["words"] == "nothing is missing; no law is learned" and found["verdict"] == []
+    assert found["words"] == "nothing is missing, so there is no law to learn" and found["verdict"] == []
     assert found["error_after"] == pytest.approx(found["noise_floor_error"], rel=0.1)

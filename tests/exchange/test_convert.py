@@ -187,7 +187,7 @@ def test_what_it_says(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(logs, drive(eastwards(1.0, 1.0, 1)), "00003-001.csv", "torn,line\n")
     assert main(["convert", str(logs), str(logs / "00001-001.csv"), "--to", str(out)]) == 0
     assert capsys.readouterr().out == (f"{out}: 11 windows, 1 of them without a position\n"
-                                       "Left out: 1 damaged line ('ridelog verify' lists them).\n")
+                                       "Not used: 1 damaged line ('ridelog verify' lists them).\n")
     assert main(["convert", str(logs), "--to", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "file": str(out), "format": "geojson", "rows": 11, "placed": 10, "damaged_lines": 1,

@@ -53,7 +53,7 @@ def test_commands_on_logs_count_what_they_leave_out(
     assert by_fleet["row without a place or a direction"] >= 3
     for words in (("sections", logs), ("passes", logs), ("report", logs, "--out", tmp_path / "a.html")):
         assert main(list(map(str, words))) == 0
-        assert "Left out: 1 damaged line ('ridelog verify' lists them)" in capsys.readouterr().out
+        assert "Not used: 1 damaged line ('ridelog verify' lists them)" in capsys.readouterr().out
 
 
 def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
@@ -74,6 +74,6 @@ def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
 def test_one_form() -> None:
     several = [LeftOut(3, "row", "without a place"), LeftOut(0, "row", "torn"), LeftOut(1.2, "s", "at an end"),
                LeftOut(4, "row", "without a place"), LeftOut(12.34, "s", "without a fix")]
-    assert left_out_lines(several) == ["Left out: 7 rows without a place; 12.3 s without a fix."]
+    assert left_out_lines(several) == ["Not used: 7 rows without a place; 12.3 s without a fix."]
     assert left_out_json(several)["left_out"][0] == {"amount": 7, "unit": "row", "why": "without a place"}
     assert counting([]) == () and left_out_lines([]) == []

@@ -116,7 +116,7 @@ def test_hostile_logs_are_refused_row_by_row_and_counted(tmp_path: Path, capsys:
         (tmp_path / f"{number + 1:05d}-001.csv").write_bytes(log_of([*ROWS[:9], line, *ROWS[9:]]))
     expected = [by_row(path.read_bytes()) for path in sorted(tmp_path.glob("*.csv"))]
     assert main(["fleet", "ingest", str(tmp_path), "--to", str(tmp_path / "town"), "--car", "a"]) == 0
-    assert f"Left out: {sum(damaged for _, damaged in expected)} damaged lines" in capsys.readouterr().out
+    assert f"Not used: {sum(damaged for _, damaged in expected)} damaged lines" in capsys.readouterr().out
     assert Dataset(tmp_path / "town").manifest.rows == sum(len({row[0] for row in rows}) for rows, _ in expected)
 
 

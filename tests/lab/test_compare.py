@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.api.lab.compare import comparison_json, conclusion, evidence, headline
+from logger.api.lab.compare import comparison_json, conclusion, evidence, headline, next_step
 from logger.lab.compare import Comparison, compare
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
@@ -52,14 +52,14 @@ def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     assert not mistaken.far
     assert mistaken.moves["sprung_mass_kg"] == pytest.approx(1 / 1.04 - 1, abs=0.03)
     assert evidence(mistaken) == ["No test finds more than noise in the residual."]
-    assert "Nothing here asks for another effect" in conclusion(mistaken)
+    assert "The model lacks nothing" in conclusion(mistaken) and next_step(mistaken).startswith("Next: nothing.")
 
 
 def test_missing_friction_is_physics(lacking: Comparison) -> None:
     assert lacking.missing
     names = [test.name for test in lacking.tests.found]
     assert "force by rate" in names and "direction" not in names
-    assert "ridelog diagnose" in conclusion(lacking)
+    assert "ridelog diagnose" in next_step(lacking)
     assert f"error {lacking.plain.error:.3f}" in headline(lacking)[0]
 
 

@@ -113,7 +113,7 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: Diagnosis)
 
 def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
     words = [step.words for step in offset.steps]
-    assert words == ["the vehicle as its file says", "its numbers refitted", "with sensor_offset"]
+    assert words == ["the vehicle as its file says", "its parameters refitted", "with sensor_offset"]
     before, refitted, after = (step.error for step in offset.steps)
     assert before == pytest.approx(offset.baseline_error, rel=1e-4)  # which is simulated finely
     assert before > refitted > 2 * after

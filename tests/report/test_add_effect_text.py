@@ -37,8 +37,8 @@ FOUND = AddedEffects(
 def test_the_errors_are_distinguished_from_the_file_as_it_was_to_the_noise() -> None:
     reported = errors(FOUND)
     assert [error for _, error, _ in reported] == [0.47, 0.43, 0.153, 0.154, 0.15]
-    assert [which for which, _, _ in reported] == ["before", "", "after", "", "of noise"]
-    assert "with dry_friction, all refitted" in reported[2][2]
+    assert [which for which, _, _ in reported] == ["Before", "", "After", "", "Noise floor"]
+    assert "refitted with dry_friction, on held-out stretches" in reported[2][2]
     both = errors(replace(FOUND, names=("dry_friction", "sensor_gain")))
     assert "with dry_friction and sensor_gain" in both[2][2]
 
@@ -52,7 +52,7 @@ def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
 def test_what_is_removed_is_said_before_the_effect() -> None:
     drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
     found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
-    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). That has nothing to do")
+    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). The drift has nothing ")
     assert addition_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
@@ -71,8 +71,8 @@ def test_a_number_at_its_bound_was_not_measured() -> None:
     asymmetry = EFFECTS["damper_asymmetry"]
     (ratio,) = asymmetry.parameters
     bound = replace(FOUND, effects=(chosen(asymmetry, {ratio.name: ratio.high}),), names=("damper_asymmetry",))
-    assert judgement(bound)[1] == (f"At its bound: {ratio.name}. That is where the fit was stopped, not what was "
-                                   "measured.")
+    assert judgement(bound)[1] == (f"At its bound: {ratio.name}. The bound stopped the fit there; it is not a "
+                                   "measured value.")
     assert not any("bound" in one for one in judgement(FOUND))
 
 
@@ -83,9 +83,8 @@ def test_distances_that_are_off_are_reported() -> None:
 
 def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> None:
     said = bias(FOUND.names, FOUND.moved)
-    assert said == ("Without dry_friction these were biased: rear.tire_stiffness_n_per_m, sprung_mass_kg. "
-                    "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors away from what it is "
-                    "with it.")
+    assert said == ("Without dry_friction the refit biased rear.tire_stiffness_n_per_m, sprung_mass_kg. "
+                    "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors from its value with it.")
     low = bias(("dry_friction", "sensor_gain"), [MASS])
     assert "Without dry_friction and sensor_gain" in low and "3.4% too low" in low and low.endswith("with them.")
     many = [replace(MASS, name=f"number{i}") for i in range(6)]
@@ -94,7 +93,7 @@ def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> 
 
 def test_where_nothing_was_biased_that_is_said() -> None:
     assert bias(FOUND.names, [STILL]) == (
-        "No number of the car moved by more than 2 standard errors when dry_friction was added.")
+        "dry_friction moved no parameter of the car by more than 2 standard errors.")
 
 
 def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:

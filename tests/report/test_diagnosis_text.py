@@ -17,7 +17,7 @@ from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
-from logger.lab.selection.error_scale import JUDGED_ON, Step
+from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, Step
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -35,14 +35,14 @@ AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.151)
 NOTHING = Diagnosis(
     runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=Noise(0.05, 0.001),
     noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, beyond={}, in_conflict=False,
-    steps=(Step("the vehicle as its file says", 0.31), Step("its numbers refitted", 0.152)), effects=(),
+    steps=(Step(AS_FILED, 0.31), Step(REFITTED, 0.152)), effects=(),
     undetectable=(), shape=None, removed=AS_USUAL)
 FRICTION = candidate("dry_friction", 1e-12, 500.0, friction_force_n=84.7)
 FOUND = replace(
     NOTHING, candidates=(FRICTION, *OTHERS), verdict=("dry_friction",),
     effects=(chosen(EFFECTS["dry_friction"], FRICTION.values, standard_errors={
         "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")}),),
-    steps=(NOTHING.steps[0], Step("its numbers refitted", 0.25), Step("with dry_friction", 0.153)))
+    steps=(NOTHING.steps[0], Step(REFITTED, 0.25), Step("with dry_friction", 0.153)))
 
 
 @pytest.fixture(scope="module")
@@ -63,35 +63,34 @@ def shape() -> Shape:
 def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
     nothing, errors = diagnosis_summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
-    assert errors == ("Error on stretches that no fit saw: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit "
-                      "84.8 %) with its numbers refitted. The sensor's noise alone makes about 0.150 (fit 85.0 %).")
+    assert errors == ("NRMSE on held-out stretches: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit 84.8 %) "
+                      "with its parameters refitted. Noise floor: about 0.150 (fit 85.0 %).")
     assert looks_like(NOTHING) == untested(NOTHING) == []
 
 
 def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() -> None:
     missing, errors = diagnosis_summary(FOUND)
     assert missing == (f"dry_friction is missing ({EFFECTS['dry_friction'].title}): friction_force_n 85 ± 4 N, "
-                       "transition_velocity_m_per_s 0 m/s. The probability that noise alone looks like this, all "
-                       "candidates together: below 1e-9.")
-    assert errors.endswith("0.153 (fit 84.7 %) with dry_friction. The sensor's noise alone makes about 0.150 (fit "
-                           "85.0 %).")
+                       "transition_velocity_m_per_s 0 m/s. p-value (probability that noise alone looks like any known "
+                       "effect): below 1e-9.")
+    assert errors.endswith("0.153 (fit 84.7 %) with dry_friction. Noise floor: about 0.150 (fit 85.0 %).")
 
 
 def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
     missing, left, *_ = diagnosis_summary(replace(FOUND, excess=0.5))
-    assert "dry_friction would explain part of what is missing, or imitates something else" in missing
-    assert left == ("Something more is missing that no candidate explains: in the worst run the residual is 1.5 times "
-                    "the sensor's noise.")
+    assert "dry_friction explains part of the residual, or imitates something else" in missing
+    assert left == ("Something more is missing that no known effect explains: in the worst run the residual is 1.5 "
+                    "times the sensor's noise.")
 
 
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
     found = replace(NOTHING, excess=2.0)
     left, _ = diagnosis_summary(found)
-    assert left == ("Something is missing that no candidate explains: in the worst run the residual is 3 times the "
+    assert left == ("Something is missing that no known effect explains: in the worst run the residual is 3 times the "
                     "sensor's noise.")
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
     _, imitation, _ = diagnosis_summary(imitating)
-    assert imitation.startswith("Candidates that improve the fit by less than 10% of what a full explanation would")
+    assert imitation.startswith("Effects that improve the fit by less than 10% of a full explanation are not named")
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
@@ -99,7 +98,7 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
                     in_conflict=True)
     conflict, _ = diagnosis_summary(found)
     assert found.unexplained and not found.exceeds_noise
-    assert conflict.startswith("These numbers of the vehicle's file are beyond their tolerance: "
+    assert conflict.startswith("Parameters beyond their tolerance: "
                                "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
 
 
@@ -115,15 +114,15 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
     found = replace(NOTHING, moved={"sprung_mass_kg": (0.104, 0.014)}, as_moved=chosen(
         EFFECTS["payload"], {"mass_kg": 108.05}))
     _, moved, same, _ = diagnosis_summary(found)
-    assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "can be measured" in moved
-    assert same.startswith("All of this move together is what payload does") and "mass_kg 108 kg" in same
+    assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure one of them" in moved
+    assert same.startswith("payload (") and "mass_kg 108 kg) would move all of them in this way" in same
     assert diagnosis_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
     assert diagnosis_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
 
 
 def test_distances_that_are_off_are_reported() -> None:
     off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
-    assert any("up to 0.34 m. That makes 40% of" in one for one in diagnosis_summary(off))
+    assert any("by up to 0.34 m, more than usual. This causes 40% of" in one for one in diagnosis_summary(off))
 
 
 def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them() -> None:
@@ -131,8 +130,8 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
     found = replace(FOUND, candidates=(alike, *OTHERS))
     verdict, drives, *_ = diagnosis_summary(found)
     assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
-                              "distinguish them. The numbers are for dry_friction (")
-    assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain about as much of the residual as ")
+                              "distinguish them. If dry_friction (")
+    assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain the residual about equally well. ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives
     assert diagnosis_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
@@ -142,16 +141,16 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
 def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> None:
     near = candidate("sensor_gain", 0.008, 15.6)
     *_, said = diagnosis_summary(replace(NOTHING, candidates=(near, OTHERS[0])))
-    assert said == ("sensor_gain comes near to being named: noise alone would look like it in 0.8% of such searches, "
-                    f"and 0.1% is the most that is allowed. To know: {EFFECTS['sensor_gain'].shown_by}.")
-    assert not any("comes near" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
+    assert said == ("sensor_gain is nearly named: noise alone looks like it in 0.8% of such searches (0.1% allowed). "
+                    f"To tell: {EFFECTS['sensor_gain'].shown_by}.")
+    assert not any("nearly named" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:
     steps = (*FOUND.steps[:2], Step("with tire_damping", 0.2), *FOUND.steps[2:])
     assert diagnosis_summary(replace(FOUND, steps=steps))[-1] == (
-        "Added during the search and dropped again, because the others explain it: tire_damping.")
-    assert not any("dropped again" in one for one in diagnosis_summary(FOUND))
+        "Tried and dropped: tire_damping (the others explain the same).")
+    assert not any("dropped" in one for one in diagnosis_summary(FOUND))
 
 
 def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
@@ -160,10 +159,10 @@ def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
     found = replace(NOTHING, undetectable=hidden, obstacles={
         "roll": "one track is known", "dry_friction": ALREADY_PRESENT})
     obstacle, first, *more = untested(found)
-    assert obstacle == "roll: could not be tried, one track is known."
-    assert first == ("wheel_lift: these runs could miss it. At its usual strength it stands out by 0.0 standard "
-                     f"deviations, and 6 are needed. To see it: {EFFECTS['wheel_lift'].shown_by}.")
-    assert len(more) == 6 and more[-1] == "These runs could also miss: cg_shift, tire_damping."
+    assert obstacle == "roll: not tried; one track is known."
+    assert first == f"wheel_lift: detectability 0.0 (6 needed). To see it: {EFFECTS['wheel_lift'].shown_by}."
+    assert len(more) == 7 and more[-2] == "Detectability too low as well: cg_shift, tire_damping."
+    assert more[-1].startswith("Detectability: standard deviations by which")
 
 
 def test_what_it_looks_like_is_said_where_something_is_left(shape: Shape) -> None:

@@ -171,7 +171,7 @@ class Bench:
         history = self.model.history
         if not history:
             history = (Step("as it was given", found.error_before, found.noise_floor_error),
-                       Step("numbers refitted", found.error_refitted, found.noise_floor_error))
+                       Step("parameters refitted", found.error_refitted, found.noise_floor_error))
         step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
         return Model(found.vehicle, found.effects, (*history, step),
                      self.model.given or self.model.vehicle, found.errors, self.model.known)

@@ -148,8 +148,8 @@ class AddedEffect(CommandResult):
 
     def figures(self) -> list[Html]:
         """How the error fell."""
-        return [falling("How the error fell", [
-            ("as it was given", self.error_before), ("numbers refitted", self.error_refitted),
+        return [falling("NRMSE, model by model", [
+            ("as filed", self.error_before), ("parameters refitted", self.error_refitted),
             (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
 
 
@@ -204,36 +204,35 @@ def headline(found: LabComparison) -> list[str]:
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
     unit = plain.residuals.unit
-    lines = [f"The residual (measured - model) is {residual:.3g} {unit} r.m.s., of {measured:.3g} {unit} measured: "
-             f"error {plain.error:.3f}, their ratio."]
-    refit = "with masses, springs, dampers and distances refitted within their tolerance"
+    lines = [f"NRMSE {plain.error:.3f} (residual over measured): {residual:.3g} of {measured:.3g} {unit} r.m.s."]
+    refit = "A refit of masses, springs, dampers and distances within their tolerance"
     if any(one.effect.parameters for one in found.effects):
-        refit += " (and the numbers of its effects)"
+        refit += ", and of the effects' parameters,"
     before, after = (one.error for one in found.steps)
     if after < _HELPS * before:
-        lines.append(f"{refit.capitalize()}, the error is {after:.3f}: the refit removes {1 - (after / before)**2:.0%} "
-                     "of the residual's power.")
+        lines.append(f"{refit} lowers it to {after:.3f} and removes {1 - (after / before)**2:.0%} of the residual's "
+                     "power.")
     else:
-        lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {after:.3f}.")
+        lines.append(f"{refit} leaves it at {after:.3f}: small errors in the parameters are not the cause.")
     lines += error_words(found.steps, found.floor)
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
     lines += removed_words(found.removed, found.band)
     if found.repeats is not None:
         apart = found.repeats.deviation_mps2
-        lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} {unit} r.m.s. "
-                     f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
+        lines.append(f"{' and '.join(found.repeats.names)} are repeats and differ by {apart:.2g} {unit} r.m.s. from "
+                     f"their mean: no model can reach an NRMSE below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
-        lines.append(f"The refit moved numbers beyond their tolerance: {named}. Measure them: the vehicle's file is "
-                     "wrong there, or an effect that the model lacks biases them.")
+        lines.append(f"The refit moved parameters beyond their tolerance: {named}. Measure them: either the vehicle's "
+                     "file is wrong there, or an effect that the model lacks biases them.")
     return lines
 
 
 def evidence(found: LabComparison) -> list[str]:
     """What speaks for a missing effect, or against one."""
     if not found.exceeds_discrepancy:
-        return ["The residual is smaller than the difference between two correct simulations of one car: it is no "
+        return ["The residual is smaller than the difference between two correct simulations of one car, so it is no "
                 "evidence."]
     if not found.tests_found:
         return ["No test finds more than noise in the residual."]
@@ -241,22 +240,29 @@ def evidence(found: LabComparison) -> list[str]:
 
 
 def conclusion(found: LabComparison) -> str:
-    """What it comes to, and what to do next."""
+    """The answer: whether the model lacks something."""
     if found.missing and not any(test.road for test in found.tests_found):
-        return ("The residual is hardly more than noise, but only with numbers far from those of the vehicle's file. "
-                "Either the file is wrong, or such numbers imitate an effect that is missing. Next: ridelog diagnose "
-                f"with the same arguments; where it finds none, ridelog identify --free {','.join(found.far)} with "
-                "them finds the numbers from the runs alone.")
+        return ("The model fits, but only with parameters far from those of the vehicle's file. Either the file is "
+                "wrong, or these parameters imitate a missing effect.")
     if found.missing:
-        return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
-                "diagnose with the same arguments says which physical effect would explain it.")
+        return ("The model lacks something: after a refit, the residual (measured - model) still depends on the road "
+                "and the car's motion.")
     if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
-        return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
-                "Nothing here asks for another effect of the car.")
-    if found.removed.drifting_sensors or found.removed.distance_error_m > 0:
-        return ("Nothing else is missing: apart from what is removed above, the residual asks for no effect of the "
-                "car. Rougher roads or other speeds would test the model harder.")
-    return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
+        return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
+                "looks like coloured noise of the sensor or the engine.")
+    removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
+    beside = " beside what is removed below" * bool(removed)
+    return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
+
+
+def next_step(found: LabComparison) -> str:
+    """What to do now."""
+    if not found.missing:
+        return "Next: nothing. Rougher roads or other speeds would test the model harder."
+    if any(test.road for test in found.tests_found):
+        return "Next: ridelog diagnose with the same arguments finds the physical effect that explains the residual."
+    return (f"Next: ridelog diagnose with the same arguments. If it finds nothing, ridelog identify --free "
+            f"{','.join(found.far)} with them fits these parameters to the runs alone.")
 
 
 # --- for a program ---
@@ -266,7 +272,7 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
     """The comparison as one JSON object; error and where are of the model as it stands."""
     return {
         **_standing_json(found.plain), **left_out_json(runs_left_out(found.plain.residuals.runs)),
-        "evidence": [*headline(found), *evidence(found), conclusion(found)],
+        "evidence": [conclusion(found), *headline(found), *evidence(found), next_step(found)],
         "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
         **errors_json(found.steps, found.floor),
         "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
@@ -317,15 +323,15 @@ def comparison_lines(found: LabComparison) -> list[str]:
     seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
     return [
         f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
-        wrapped(headline(found)), "", "After the refit:", wrapped(evidence(found), "- "), "",
-        wrapped([conclusion(found)]), "",
+        wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- "), "",
+        wrapped([next_step(found)]), "",
         *_comparison_tables(found), *left_out_paragraph(runs_left_out(residuals.runs)),
     ]
 
 
 def _comparison_tables(found: LabComparison) -> list[str]:
     """Where the residual is, before any fit and after the refit."""
-    lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
+    lines = [f"{'Where':46}{'share of residual':>13}{'NRMSE':>12}", f"{'':44}{'filed':>8}{'refit':>7}{'filed':>8}"
                                                                     f"{'refit':>8}"]
     plain, refitted = found.plain.where, found.refitted.where
     for title, unit, one, other in (
@@ -359,10 +365,11 @@ _WORST = 8
 def page(found: LabComparison) -> Html:
     """The comparison as one HTML document."""
     residuals = found.refitted.residuals
-    title = f"{found.vehicle}: model against measurement"
+    title = f"{found.vehicle}: model and measurement"
     return document(title, [
-        heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found), paragraphs(headline(found)),
-        section("After the refit", bullets(evidence(found)) + paragraphs([conclusion(found)])),
+        heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found),
+        paragraphs([conclusion(found), *headline(found)]),
+        section("After the refit", bullets(evidence(found)) + paragraphs([next_step(found)])),
         removed_section(found.removed, found.band),
         whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals),
         _comparison_page_tables(found),
@@ -373,10 +380,10 @@ def page(found: LabComparison) -> Html:
 
 def _tiles(found: LabComparison) -> Html:
     residuals = found.plain.residuals
-    return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
-                  ("Error after the refit", f"{found.steps[-1].error:.3f}", ""),
+    return tiles([("NRMSE as filed", f"{found.plain.error:.3f}", ""),
+                  ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
                   *drift_tile(found.removed),
-                  ("Tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
+                  ("Residual tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
                   ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
 
 
@@ -395,8 +402,8 @@ def whole_drives(residuals: ModelResiduals) -> Html:
         time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
         lines = tuple(line(word, time_s, values[index]) for word, values in (
             ("measured", residuals.measured), ("residual", residuals.residual)))
-        drawn.append(chart(Curves(names[run.name], "time in the run [s]", _axis(run), lines)))
-    return section("The whole drive", concatenated(drawn))
+        drawn.append(chart(Curves(names[run.name], "time [s]", _axis(run), lines)))
+    return section("Each run", concatenated(drawn))
 
 
 def _worst_place(standing: Standing) -> Html:
@@ -405,7 +412,7 @@ def _worst_place(standing: Standing) -> Html:
     time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
         ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
-    drawn = Curves(worst.words, "time in the run [s]", _axis(residuals.runs[index]), lines)
+    drawn = Curves(worst.words, "time [s]", _axis(residuals.runs[index]), lines)
     return section("The worst place", chart(drawn))
 
 
@@ -422,7 +429,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
 
     def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
-        return Curves(title, "frequency [Hz]", f"power [dB of ({unit})2/Hz]", tuple(
+        return Curves(title, "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", tuple(
             Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
             for name, one in zip(("measured", "residual", "model"), density, strict=True)))
 
@@ -438,11 +445,11 @@ def _places(standing: Standing) -> Html:
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
                               np.array([part.residual_mps2 for part in parts])))
-    along = Curves("Residual along the road", "distance [m]", f"r.m.s. [{unit}]", tuple(lines))
+    along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
              error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
-        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "Error"), rows))
+        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows))
 
 
 def forces_section(forces: ForceMap) -> Html:
@@ -451,12 +458,12 @@ def forces_section(forces: ForceMap) -> Html:
         chart(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
                                                          errors=curve.error_n),), (0.0, "nothing missing")))
         for title, x_name, curve, factor in (
-            (_titled("By speed of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
+            (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
             (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
     return section("The missing force", drawn + hint(
-        "The force in each suspension that would explain the residual, with its standard error, in addition to a "
-        "linear spring or damper. Above 0 it pulls body and wheel together; compression is on the left, extension on "
-        "the right. Do not believe a curve that explains little of the residual."))
+        "The force in each suspension, in addition to a linear spring or damper, that would explain the residual, with "
+        "its standard error. A positive force pulls body and wheel together; compression is left, extension right. "
+        "Distrust a curve that explains little of the residual."))
 
 
 def _alignment(found: LabComparison) -> Html:
@@ -466,11 +473,10 @@ def _alignment(found: LabComparison) -> Html:
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
     if not lines or all(run.timed for run in runs):
         return EMPTY
-    drawn = chart(Curves("How far the model runs ahead of the measurement", "way into the run [m]", "time [ms]",
+    drawn = chart(Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]",
                            tuple(lines), (0.0, "together")))
     return section("Alignment", drawn + hint(
-        "The same everywhere: a clock or a place that is off. Growing along the way: a wrong speed. As the model "
-        "stands, before the refit."))
+        "Constant: a clock or a position is off. Growing with distance: the speed is wrong. Before the refit."))
 
 
 # --- tables ---
@@ -481,7 +487,7 @@ def _comparison_page_tables(found: LabComparison) -> Html:
     unit = found.plain.residuals.unit
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
             + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
-            + _table("By how much it moves", unit, plain.amplitude, refitted.amplitude))
+            + _table("By amplitude", unit, plain.amplitude, refitted.amplitude))
 
 
 def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> Html:
@@ -497,8 +503,8 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
                 + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
 
     heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
-             + Html("<th>Share of the residual</th><th></th><th class=n>Error</th>")
-             + (Html("<th class=n>Before the refit</th>") if stands else EMPTY))
+             + Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
+             + (Html("<th class=n>NRMSE as filed</th>") if stands else EMPTY))
     rows = concatenated(html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
     return section(title, html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
 
@@ -508,17 +514,17 @@ def _tests(found: LabComparison) -> Html:
              "found" if test in found.tests_found else "") for test in found.tests.tests]
     return section("All tests of the residual", grid(("Test", "Value", "Standard error", "p-value", ""), rows,
                                                                 words=(0, 4))
-                   + hint("A test is found when it is improbable in noise and large enough to matter."))
+                   + hint("Found: improbable in noise, and large enough to matter."))
 
 
 def _numbers(found: LabComparison) -> Html:
-    rows = [(name, f"{move:+.1%}", "farther than usual" if name in found.far else "")
+    rows = [(name, f"{move:+.1%}", "beyond its tolerance" if name in found.far else "")
             for name, move in found.moves.items()]
-    return section("What the refit moved", grid(("Number", "By", ""), rows, words=(0, 2)))
+    return section("What the refit moved", grid(("Parameter", "By", ""), rows, words=(0, 2)))
 
 
 def _titled(title: str, curve: Curve) -> str:
-    return f"{title}: would explain {curve.share:.0%} of the residual"
+    return f"{title}: explains {curve.share:.0%} of the residual"
 
 
 def _measured(value: float | None, unit: str = "1") -> str:
@@ -572,11 +578,11 @@ _NAMED = 4
 def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
     """The error before, after and of the noise: which of them, the error, and what it is of."""
     return [
-        ("before", found.error_before, "as the file says, distances as recorded: where ridelog compare begins"),
-        ("", found.error_refitted, f"its numbers and the distances refitted within their tolerance, on {JUDGED_ON}"),
-        ("after", found.error_after, f"with {' and '.join(found.names)}, all refitted and judged in the same way"),
-        ("", found.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
-        ("of noise", found.noise_floor_error, "about, from the sensor's noise alone"),
+        ("Before", found.error_before, "vehicle's file and distances as they are"),
+        ("", found.error_refitted, f"parameters and distances refitted, on {JUDGED_ON}"),
+        ("After", found.error_after, f"refitted with {' and '.join(found.names)}, on {JUDGED_ON}"),
+        ("", found.error_as_written, "new file and distances as they are"),
+        ("Noise floor", found.noise_floor_error, "about; the sensor's noise alone"),
     ]
 
 
@@ -585,20 +591,20 @@ def judgement(found: AddedEffects) -> list[str]:
     lines = [*removed_words(found.removed, found.band)]
     lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
-                           "{} refitted without it, {} with it, its noise alone about {}")
+                           "{} refitted without it, {} with it, noise floor about {}")
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
               and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
                       if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
         if at:
-            lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
+            lines.append(f"At its bound: {', '.join(at)}. The bound stopped the fit there; it is not a measured value.")
     if found.helps:
         lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
         lines += error_words(found.steps, found.noise_floor_error)[1:]
     elif found.gains:
-        lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but on stretches "
-                     f"that no fit saw the error rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and "
-                     "so does what is weighed by its noise: it imitates something else.")
+        lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but the NRMSE on "
+                     f"{JUDGED_ON} rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and so does the "
+                     "residual weighed by its noise: the effect imitates something else.")
     else:
         lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
                      f"{chance(found.p_value)}; these runs are no reason to keep it.")
@@ -610,12 +616,12 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
     together = " and ".join(names)
     biased = [one for one in moved if one.biased]
     if not biased:
-        return f"No number of the car moved by more than {BIAS_SIGMA:g} standard errors when {together} was added."
+        return f"{together} moved no parameter of the car by more than {BIAS_SIGMA:g} standard errors."
     listed = ", ".join(one.name for one in biased[:_NAMED])
     more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
     worst = biased[0]
-    return (f"Without {together} these were biased: {listed}{more}. {worst.name} came out {_too_much(worst)}, "
-            f"{abs(worst.shift):.1f} standard errors away from what it is with {'it' if len(names) == 1 else 'them'}.")
+    return (f"Without {together} the refit biased {listed}{more}. {worst.name} came out {_too_much(worst)}, "
+            f"{abs(worst.shift):.1f} standard errors from its value with {'it' if len(names) == 1 else 'them'}.")
 
 
 def _too_much(one: Number) -> str:
@@ -623,10 +629,10 @@ def _too_much(one: Number) -> str:
     return f"{abs(one.without / one.found - 1):.1%} too {'high' if one.without > one.found else 'low'}"
 
 
-MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Without, With: refitted without and with the effect, as a difference from the given value, ± "
-              "standard error. Now: the value in the new file. Shift: from Without to With, "
-              "in standard errors; above two the number was biased because the effect was missing.")
+MOVED_HEADS = ("Parameter", "Now", "Without", "With", "Shift", "")
+MOVED_HINT = ("Now: the value in the new file. Without, With: refitted without and with the effect, relative to the "
+              "given value, ± standard error. Shift: from Without to With in standard errors; beyond two, the missing "
+              "effect had biased the parameter.")
 
 
 def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, str, str]]:
@@ -664,8 +670,8 @@ def addition_json(found: AddedEffects) -> dict[str, Any]:
 
 def addition_lines(found: AddedEffects) -> list[str]:
     """What a person reads of an effect that was added."""
-    rows = [("", "Error", "Fit", "")]
-    rows += [(f"Error {which}:" if which else "", f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
+    rows = [("", "NRMSE", "Fit", "")]
+    rows += [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
              for which, error, what in errors(found)]
     return [
         wrapped(judgement(found)), "", *columns(rows), "",

@@ -119,7 +119,7 @@ class Diagnosis(CommandResult):
 
     def figures(self) -> list[Html]:
         """How the error fell."""
-        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
 
     def as_page(self, of: str) -> Html:
         """The diagnosis as one HTML document."""
@@ -334,6 +334,7 @@ def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuesti
 
 
 _MOST_HIDDEN, _MOST_MOVED = 6, 3
+P_VALUE = "p-value (probability that noise alone looks like any known effect):"
 _SUSPECT = 0.1
 """An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
 
@@ -342,42 +343,43 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = [*removed_words(found.removed, found.band)]
     if found.contradicted:
-        lines.append(f"The runs contradict the vehicle's file, by {enumerated(found.contradicted, 'and')}: its numbers "
-                     "were taken to be unknown, but for those of which it says how well they are known.")
+        lines.append(f"The runs contradict the vehicle's file, by {enumerated(found.contradicted, 'and')}. The search "
+                     "therefore took its parameters as unknown, except those with a stated tolerance.")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
-        lines.append(f"{what} is missing: with the car's numbers refitted{how}, the residual is hardly more than the "
-                     "sensor's noise.")
+        lines.append(f"{what} is missing: with the car's parameters refitted{how}, the residual is hardly more than "
+                     "the sensor's noise.")
     if found.coloured and not found.exceeds_noise:
-        lines.append("The sensor's noise is louder at some frequencies than at others: it is as loud where the car is "
-                     "shaken little as where it is shaken much, and has nothing to do with the road.")
+        lines.append("The sensor's noise is coloured (louder at some frequencies). It is as loud when the car shakes "
+                     "little as when it shakes much, so it does not come from the road.")
     if found.exceeds_noise:
-        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
+        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
                      f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
-            lines.append(f"Candidates that improve the fit by less than {IMITATION:.0%} of what a full explanation "
-                         "would are not named: they may only imitate what is missing.")
+            lines.append(f"Effects that improve the fit by less than {IMITATION:.0%} of a full explanation are not "
+                         "named: they may only imitate what is missing.")
     if found.beyond:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
-        lines.append(f"These numbers of the vehicle's file are beyond their tolerance: {off}. Measure them: the file "
-                     "is wrong there, or an effect is missing that no candidate explains.")
+        lines.append(f"Parameters beyond their tolerance: {off}. Measure them: either the vehicle's file is wrong "
+                     "there, or an unknown effect is missing.")
     if found.moved:
         lines.append(_moved(found))
     if found.as_moved is not None:
         one = found.as_moved
-        lines.append(f"All of this move together is what {one.effect.name} does ({one.effect.title}): "
-                     f"{numbers_of(one)}. To know: {one.effect.shown_by}.")
+        lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would move all of them in this way. "
+                     f"To tell: {one.effect.shown_by}.")
     lines += error_words(found.steps, found.noise_floor_error)
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
-                           "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
+                           "{} as the vehicle's file says, {} in the end, noise floor about {}")
     lines += _faint(found)
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
-        why = "because the others explain it" if found.verdict else "at an end of its range, or where it does nothing"
-        lines.append(f"Added during the search and dropped again, {why}: {', '.join(dropped)}.")
+        why = ("the others explain the same" if found.verdict else
+               "it ended at the end of its range, or where it does nothing")
+        lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}).")
     return lines
 
 
@@ -388,13 +390,14 @@ def looks_like(found: LabDiagnosis) -> list[str]:
 
 def untested(found: LabDiagnosis) -> list[str]:
     """Effects that these runs cannot show, and which drive would."""
-    lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
-    lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
-              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed{_alike(one)}. To see it: "
-              f"{one.effect.shown_by}."
+    lines = [f"{name}: not tried; {why}." for name, why in found.not_tried.items()]
+    lines += [f"{one.effect.name}: detectability {one.deviations:.1f} ({DETECTABLE_SIGMA:g} needed){_alike(one)}. "
+              f"To see it: {one.effect.shown_by}."
               for one in found.undetectable[:_MOST_HIDDEN]]
     if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
-        lines.append(f"These runs could also miss: {', '.join(rest)}.")
+        lines.append(f"Detectability too low as well: {', '.join(rest)}.")
+    if found.undetectable:
+        lines.append("Detectability: standard deviations by which an effect of usual strength would stand out.")
     return lines
 
 
@@ -404,14 +407,14 @@ def _moved(found: LabDiagnosis) -> str:
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
     rest = len(found.moved) - len(shown)
     more = f", and {rest} more" * bool(rest)
-    return ("The runs move numbers of the vehicle's file (masses, springs and dampers against each other, as no run "
-            f"shows a factor that all share): {', '.join(shown)}{more}. If one of them can be measured, put it into "
-            "the file: an effect that does the same would then show.")
+    return (f"The refit moved parameters of the vehicle's file: {', '.join(shown)}{more}. (Masses, springs and dampers "
+            "are relative to each other: no run shows a factor common to all.) Measure one of them and put it into the "
+            "file; an effect that does the same would then show.")
 
 
 def _alike(one: Undetectable) -> str:
     """What of the car hides an effect."""
-    return f": {one.alike}, within its tolerance, does nearly the same" if one.alike else ""
+    return f"; {one.alike} does nearly the same within its tolerance" if one.alike else ""
 
 
 def groups(found: LabDiagnosis) -> list[list[str]]:
@@ -422,15 +425,15 @@ def groups(found: LabDiagnosis) -> list[list[str]]:
 def _missing(found: LabDiagnosis, one: Chosen) -> str:
     name, numbers = one.effect.name, f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(name)
-    likely = f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}."
+    likely = f"{P_VALUE} {chance(candidate.p_value)}."
     if name in found.ends:
         there, count = found.ends[name]
-        likely += f" The car's numbers were not known: {there} of {count} starts ended there."
-    says = "would explain part of what is missing, or imitates something else" if found.unexplained else "is missing"
+        likely += f" The car's parameters were unknown; {there} of {count} starts ended there."
+    says = "explains part of the residual, or imitates something else" if found.unexplained else "is missing"
     if candidate.confused_with:
         group = enumerated([name, *candidate.confused_with], "or")
-        return (f"One of {group} {says}; these runs cannot distinguish them. The numbers are for {name} "
-                f"({one.effect.title}){numbers}. {likely}")
+        return (f"One of {group} {says}; these runs cannot distinguish them. If {name} ({one.effect.title})"
+                f"{numbers}. {likely}")
     return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
 
 
@@ -440,16 +443,15 @@ def _faint(found: LabDiagnosis) -> list[str]:
     nearest = min(others, key=lambda one: one.p_value, default=None)
     if found.unexplained or nearest is None or not FALSE_ALARM <= nearest.p_value < _SUSPECT:
         return []
-    return [f"{nearest.effect.name} comes near to being named: noise alone would look like it in "
-            f"{percent(nearest.p_value)} of such searches, and {percent(FALSE_ALARM)} is the most that is allowed. To "
-            f"know: {nearest.effect.shown_by}."]
+    return [f"{nearest.effect.name} is nearly named: noise alone looks like it in {percent(nearest.p_value)} of such "
+            f"searches ({percent(FALSE_ALARM)} allowed). To tell: {nearest.effect.shown_by}."]
 
 
 def _confusion(names: list[str], found: LabDiagnosis) -> str:
     """Which drive would separate effects that explain alike."""
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
-    return (f"{enumerated(names, 'and')} explain about as much of the residual as each other. Drives that would "
-            f"separate them: {'; '.join(drives)}. ridelog plan says beforehand whether a drive would.")
+    return (f"{enumerated(names, 'and')} explain the residual about equally well. Drives that would distinguish them: "
+            f"{'; '.join(drives)}. ridelog plan tells beforehand whether a drive would.")
 
 
 def _on_the_way(found: LabDiagnosis) -> list[str]:
@@ -519,35 +521,35 @@ def diagnosis_lines(found: LabDiagnosis, most: int | None) -> list[str]:
     shown = [wrapped(diagnosis_summary(found))]
     if described := looks_like(found):
         shown += ["", "What it looks like:", wrapped(described, "- ")]
-    rows = [("Effect", "Error", "p-value", "Numbers"), *table(found, most)]
+    rows = [_HEADS, *table(found, most)]
     more = len(found.candidates) - len(rows) + 1
     if len(rows) > 1:
-        shown += ["", "One effect at a time on the refitted model, those of the verdict first; p-values are for all",
-                  "candidates together:", *columns(rows)]
+        shown += ["", "One effect at a time on the refitted model; p-values account for all of them:", *columns(rows)]
     if more > 0:
         shown.append(f"and {more} more (ridelog diagnose --all)")
     if found.no_better:
-        shown.append(wrapped([f"No better than the numbers refitted: {', '.join(found.no_better)}."]))
+        shown.append(wrapped([f"No better than the refit alone: {', '.join(found.no_better)}."]))
     if hidden := untested(found):
         shown += ["", "What these runs cannot tell:", wrapped(hidden, "- ")]
     return shown
 
 
+_HEADS = ("Effect", "NRMSE", "p-value", "Parameters")
 _LEAST_SHARE, _MOST_BARS = 0.01, 12
 _MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
 
 
 def page(found: LabDiagnosis, vehicle: str) -> Html:
     """The diagnosis as one HTML document."""
-    title = f"{vehicle}: which effect is missing"
+    title = f"{vehicle}: which effect is missing?"
     return document(title, [
         heading(title, ", ".join(found.runs)),
         _tiles(found), paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
         shape_sections(found),
-        section("How the error fell", _diagnosis_steps(found)), car_sections(found),
+        section("NRMSE, model by model", _diagnosis_steps(found)), car_sections(found),
         section("All candidates", _candidates(found)),
         section("What these runs cannot tell", bullets(untested(found))),
-        section("Where this is from", bullets(sources(found))),
+        section("Sources", bullets(sources(found))),
     ])
 
 
@@ -561,7 +563,7 @@ def shape_sections(found: LabDiagnosis) -> Html:
     if found.shape is None:
         return EMPTY
     return (section("What no effect explains", bullets(looks_like(found)))
-            + section("Where it sits", _where(found.shape)) + spectra_section(found.shape.residuals)
+            + section("By frequency and distance", _where(found.shape)) + spectra_section(found.shape.residuals)
             + _forces(found.shape))
 
 
@@ -570,7 +572,7 @@ def _forces(shape: Shape) -> Html:
     forces = shape.tests.forces
     if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
         return section("The missing force", paragraphs([
-            "No force in the suspensions that goes with their speed or travel would explain it: it comes from "
+            "No force in the suspensions that depends on their rate or travel would explain it: it comes from "
             "elsewhere."]))
     return forces_section(forces)
 
@@ -580,63 +582,62 @@ def _tiles(found: LabDiagnosis) -> Html:
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
     return tiles([
-        ("Error of the model as it stands", f"{found.baseline_error:.3f}", "as recorded"),
-        ("With what is missing" if missing else "With its numbers refitted", f"{found.final_error:.3f}", "refitted"),
-        *drift_tile(found.removed),
-        ("The sensor's noise alone", f"{found.noise_floor_error:.3f}", ""),
         ("Missing", unknown if found.unexplained else count, ""),
+        ("NRMSE as filed", f"{found.baseline_error:.3f}", "as recorded"),
+        ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
+        *drift_tile(found.removed),
+        ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),
     ])
 
 
 def _diagnosis_steps(found: LabDiagnosis) -> Html:
-    drawn = falling(f"Error on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
+    drawn = falling(f"NRMSE on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
                     found.noise_floor_error)
     rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(found.steps)]
-    return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
+    return drawn + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
 
 
 def _candidates(found: LabDiagnosis) -> Html:
-    bars = Bars("The error with each candidate", "error", tuple(
+    bars = Bars("NRMSE with each effect", "NRMSE", tuple(
         (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
-        (found.baseline_error, "as it stands"))
-    return (chart(bars) + grid(("Effect", "Error", "p-value", "Numbers"), table(found), words=(0, 3))
-            + hint("One effect at a time on the refitted model, those that are missing first, then by p-value: how "
-                   "probable it is that noise looks like any of the candidates. The error is on "
-                   f"{JUDGED_ON}."))
+        (found.baseline_error, "as filed"))
+    return (chart(bars) + grid(_HEADS, table(found), words=(0, 3))
+            + hint("One effect at a time on the refitted model: first those that are missing, then by p-value, the "
+                   f"probability that noise alone looks like any of them. NRMSE on {JUDGED_ON}."))
 
 
 def car_sections(found: LabDiagnosis) -> Html:
     """How far the car's numbers moved, as bars, and the forces of its springs and dampers as fitted, as curves."""
     if found.car is None:
         return EMPTY
-    bars = Bars("How far each number was refitted", "% of the file's value", tuple(
+    bars = Bars("Shift of each parameter by the refit", "% of the file's value", tuple(
         (name, 100 * share) for name, (share, _) in found.car.moved.items()))
-    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "more than it should" if name in found.beyond else "")
+    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "beyond it" if name in found.beyond else "")
             for name, (share, tolerance) in found.car.moved.items()]
-    numbers = chart(bars) + grid(("Number", "Refitted by", "Usual", ""), rows, words=(0, 3)) + hint(
-        "A number that has to move far may stand in for an effect that is not among the candidates.")
+    numbers = chart(bars) + grid(("Parameter", "Shift", "Tolerance", ""), rows, words=(0, 3)) + hint(
+        "A parameter that moves far may stand in for an effect that ridelog does not know.")
     curves = concatenated(map(_force, found.car.curves))
-    said = hint("Over what the model's suspensions reach in these runs, but for 0.1 % of the time. Forces with a "
-                "memory are not in it.") if curves else EMPTY
-    return (section("The car's own numbers", numbers if rows else EMPTY)
+    said = hint("Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "
+                "memory.") if curves else EMPTY
+    return (section("The car's parameters", numbers if rows else EMPTY)
             + section("Its springs and dampers", curves + said))
 
 
 def _force(one: ForceCurve) -> Html:
     return chart(Curves(
-        f"{one.axle.capitalize()} suspension by its {one.motion}",
+        f"{one.axle.capitalize()} suspension: force by {one.motion}",
         f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
-        (Line("as fitted", one.at, one.after_n), Line("as the file says", one.at, one.before_n))))
+        (Line("refitted", one.at, one.after_n), Line("as filed", one.at, one.before_n))))
 
 
 def _where(shape: Shape) -> Html:
     """By frequency, and along the way."""
     rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", error_text(part, 2))
             for part in shape.where.frequency]
-    drawn = grid(("Band", "Hz", "Share of the residual", "Error"), rows)
+    drawn = grid(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)
     if shape.line is not None and shape.line.found:
-        drawn += chart(Curves(f"What repeats along the way, in {shape.line.run}", "times per metre",
-                                "power over its mean", (Line("residual", shape.line.per_m, shape.line.power),)))
+        drawn += chart(Curves(f"What repeats along the road, in {shape.line.run}", "spatial frequency [1/m]",
+                                "power over its mean [1]", (Line("residual", shape.line.per_m, shape.line.power),)))
     return drawn
 
 
@@ -646,65 +647,62 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
     for one in found.missing:
         candidate = next(other for other in found.candidates if other.name == one.effect.name)
         numbers = f": {numbers_of(one)}" if one.values else ""
-        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
-                     f"looks like this, all candidates together: {chance(candidate.p_value)}.")
+        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. {P_VALUE} "
+                     f"{chance(candidate.p_value)}.")
         if candidate.confused_with:
             names = enumerated([one.effect.name, *candidate.confused_with], "and")
-            lines.append(f"{names} explain about as much as each other: these drives cannot distinguish them.")
+            lines.append(f"{names} explain the residual about equally well; these drives cannot distinguish them.")
         if candidate.stands_in:
-            lines.append(f"{one.effect.name} bends the laws of the car: in each drive over each stretch of road the "
-                         "linear car that comes nearest stood in for it, which its numbers are as right as.")
+            lines.append(f"{one.effect.name} is nonlinear. The search replaced it, in each drive and stretch of road, "
+                         "by the linear car nearest to it; its parameters are as accurate as that.")
     if found.undecided:
         names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
-        lines.append(f"Not decided: {names} would explain a little, more than noise would, but less than a tenth of "
-                     f"what no road explains. {'They' if them else 'It'} may only imitate something else that is "
-                     "missing.")
+        lines.append(f"Undecided: {names}. {'They explain' if them else 'It explains'} more than noise would, but less "
+                     "than a tenth of what no road explains, and may only imitate something else that is missing.")
     elif not lines:
-        lines.append("None of the effects that can be tried without a profile is missing.")
+        lines.append("Nothing is missing, of the effects that can be tried without a profile.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
                for index, (words, error) in enumerate(_same_road_steps(found))]
-    lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
-                 f"noise alone makes {found.floor_error:.3f}.")
+    lines.append(f"NRMSE of each drive over the road estimated from the others: {', '.join(by_step)}. Noise floor: "
+                 f"{found.floor_error:.3f}.")
     if found.unexplained:
-        cause = ("something else is missing, maybe" if found.exact_places else
-                 "the distances of these drives, by a receiver, are off within seconds, or something is missing, maybe")
-        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: {cause} one of the "
+        cause = ("Something else is missing, perhaps" if found.exact_places else
+                 "Either the GPS distances of these drives drift within seconds, or something else is missing, perhaps")
+        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise. {cause} one of the "
                      "effects that only a measured road can show.")
     return lines
 
 
 def _same_road_steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
     """Models on the way, each with its error."""
-    words = ["the vehicle as its file says", "its numbers refitted within their tolerance",
+    words = ["the vehicle as its file says", "its parameters refitted within their tolerance",
              *(f"with {one.effect.name}" for one in found.missing)]
     return list(zip(words, found.errors, strict=True))
 
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     """What these drives cannot show or identify, in sentences."""
-    lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
-             "noise." for one, other in found.doubtful]
+    lines = [f"Whether {one} and {other} follow one road: too little of their records there is above the noise."
+             for one, other in found.doubtful]
     if found.absorbed_by_road:
-        lines.append(f"{', '.join(found.absorbed_by_road)}: a road of another shape, which nobody measured, would look "
-                     "the same.")
-    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
+        lines.append(f"{', '.join(found.absorbed_by_road)}: another road, as nobody measured it, would look the same.")
+    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: not tried; {why}."
               for why in dict.fromkeys(found.untried.values())]
-    lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
-              "deviations."
+    lines += [f"{name}: detectability {deviations:.1f} ({DETECTABLE_SIGMA:g} needed)."
               for name, deviations in found.hidden.items()]
-    return [*lines, *(f"The car's numbers: {one.words}" for one in found.confounded)]
+    return [*lines, *(f"The car's parameters: {one.words}" for one in found.confounded)]
 
 
 def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
     """What a person reads; ``most`` so many candidates, None: all."""
-    rows = [("Effect", "Error", "p-value", "Numbers")]
+    rows = [_HEADS]
     rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
               numbers_of(one.one)) for one in found.candidates[:most]]
-    by_run = [("Run", "Error before", "after"),
+    by_run = [("Run", "NRMSE before", "after"),
               *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
                 zip(runs, found.by_run, strict=True))]
     return [wrapped(same_road_summary(found)), "",
-            "One effect at a time, those that are missing first; p-values are for all candidates together:",
+            "One effect at a time on the refitted model; p-values account for all of them:",
             *columns(rows), "", *columns(by_run), "",
             "What these drives cannot tell:", wrapped(cannot_tell(found), "- ")]
 

@@ -26,7 +26,7 @@ from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
 from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects, add
-from logger.lab.selection.error_scale import Step
+from logger.lab.selection.error_scale import JUDGED_ON, Step
 from logger.plugins import catalogue
 from logger.report.charts import chart
 from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
@@ -80,7 +80,7 @@ class LearnedLaw(CommandResult):
 
     def figures(self) -> list[Html]:
         """How the error fell, and the law."""
-        return [falling("How the error fell", self.steps, self.noise_floor_error),
+        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error),
                 *super().figures()]
 
     def write(self, path: Path | str, option: str = "--out") -> None:
@@ -155,7 +155,7 @@ def picture_of(found: LearnedModel) -> Curves | None:
     return picture(draft, one, addition.errors, found.learning.context)
 
 
-NOTHING = "nothing is missing; no law is learned"
+NOTHING = "nothing is missing, so there is no law to learn"
 
 
 def words(law: Law, addition: AddedEffects) -> str:
@@ -183,18 +183,18 @@ def why_none(found: Learning) -> str:
     if not found.verdict and not found.unexplained:
         return NOTHING
     if not found.verdict:
-        return "something is missing that no known effect and no law of these families explains; no law is learned"
+        return "no law learned: something is missing, but no known effect and no law of these families explains it"
     names = " and ".join(found.verdict)
     many = len(found.verdict) > 1
     if found.unexplained:
-        return (f"no law is learned: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
+        return (f"no law learned: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
                 "families explains it better")
-    return f"no law is learned: {names} explain{'s' * (not many)} it"
+    return f"no law learned: {names} explain{'s' * (not many)} the residual"
 
 
 def _refused(one: Refusal) -> str:
     add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
-    return f"{one.title} would explain it best, but {one.why}{add}; no law is learned"
+    return f"no law learned: {one.title} would explain the residual best, but {one.why}{add}"
 
 
 def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
@@ -219,30 +219,30 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     if law.effects:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
-                     + ". The law was fitted with these: they belong in the vehicle as well.")
+                     + ". The law was fitted together with these; add them to the vehicle as well.")
     share = max(law.listed, 0.0) / law.with_law
-    lines.append(f"The known effects alone explain {share:.0%} of what the model with the law does (2 ln of the "
-                 f"evidence {law.listed:.0f} of {law.with_law:.0f}).")
+    lines.append(f"Known effects alone reach {share:.0%} of the evidence of the model with the law (2 ln of the "
+                 f"evidence: {law.listed:.0f} of {law.with_law:.0f}).")
     lines += _nearest(law.nearest, law)
     if law.rivals:
         others = [f"{one.draft.title}: {one.family.shown_by}" for one in law.rivals]
         lines.append(f"These runs cannot distinguish it from {' or '.join(one.draft.title for one in law.rivals)}: "
-                     "each explains about as much of the residual. Drives that would: "
+                     "each explains the residual about equally well. Drives that would distinguish them: "
                      + "; ".join([f"{law.draft.title}: {law.family.shown_by}", *others]) + ".")
     return lines
 
 
 def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
     if nearest is None:
-        return ["No known effect of its kind explains any part of it."]
+        return ["No known effect of its kind explains any of it."]
     name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
     numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
     if nearest.as_good:
-        return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
-                f"runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
-                f"ridelog add-effect {name}."]
-    return [f"The known effect that comes nearest is {name}{numbers}: in its place it explains {nearest.share:.0%} of "
-            f"what it does (2 ln of the evidence {gap:.0f} less)."]
+        return [f"It is nearly a known effect: {name}{numbers} explains {nearest.share:.1%} of what the law does, and "
+                f"these runs cannot distinguish the two (2 ln of the evidence differs by {gap:+.0f}). Prefer the known "
+                f"one: ridelog add-effect {name}."]
+    return [f"The nearest known effect, {name}{numbers}, explains {nearest.share:.0%} of what the law does (2 ln of "
+            f"the evidence {gap:.0f} less)."]
 
 
 def _errors(addition: AddedEffects) -> str:
@@ -264,7 +264,7 @@ def source_of(found: Learning, addition: AddedEffects | None) -> str:
     count = len(found.context.runs)
     head = [f"{said[0].upper()}{said[1:]}.",
             f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
-            "Its numbers begin where that fit ended: ridelog add-effect with this file fits them again, with the car."]
+            "Its parameters begin where that fit ended; ridelog add-effect with this file fits them and the car anew."]
     return law.draft.text(law_learned(law, addition).values, head)
 
 
@@ -315,17 +315,17 @@ def _nearest_json(one: Nearest | None) -> dict[str, Any] | None:
 
 def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
     """How the error fell."""
-    return [("as it was given", addition.error_before), ("numbers refitted", addition.error_refitted),
+    return [("as filed", addition.error_before), ("parameters refitted", addition.error_refitted),
             (f"with {' and '.join([*(one.effect.name for one in law.effects), law.draft.title])}",
              addition.error_after)]
 
 
-_BAND = "The band is one standard error either way; the curve ends where the runs' motions do."
+_BAND = "Band: one standard error either way. The curve covers the motions of the runs."
 
 
 def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, vehicle: str, file: str) -> Html:
     """What was learned as one HTML document; ``file``: of the law."""
-    title = f"{vehicle}: a law out of the data"
+    title = f"{vehicle}: a law learned from runs"
     runs = ", ".join(run.name for run in found.context.runs)
     summary = as_json(found, addition, file)
     law = found.law
@@ -337,10 +337,10 @@ def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, ve
     return document(title, [
         heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)),
         *law_sections(law, addition, drawn),
-        section("How the error fell", falling("Error on all samples", steps_of(law, addition),
-                                              addition.noise_floor_error)),
-        section("Where it is", paragraphs([f"{file}: an effect of your own, which compare, simulate, add-effect and "
-                                           "diagnose --effect-file take.", law.draft.source]))])
+        section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps_of(law, addition),
+                                                 addition.noise_floor_error)),
+        section("The law's file", paragraphs([f"{file} is an effect of your own: compare, simulate, add-effect and "
+                                              "diagnose --effect-file read it.", law.draft.source]))])
 
 
 def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[Html]:
@@ -348,7 +348,7 @@ def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[
     one = law_learned(law, addition)
     numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
                for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
-    table = section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3)))
+    table = section("Its parameters", grid(("Parameter", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3)))
     if drawn is None:
         return [table]
     return [section("The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY)), table]
@@ -359,7 +359,6 @@ def _tiles(summary: dict[str, object]) -> Html:
         value = summary[key]
         return f"{value:.3f}" if isinstance(value, float) else "not known"
 
-    return tiles([("Error of the model as it stands", error("error_before"), "as recorded"),
-                  ("As it ends", error("error_after"), "refitted"),
-                  ("On what no fit saw", error("error_after_unseen"), ""),
-                  ("The sensor's noise alone", error("noise_floor_error"), "")])
+    return tiles([("NRMSE as filed", error("error_before"), "as recorded"),
+                  ("NRMSE in the end", error("error_after_unseen"), JUDGED_ON),
+                  ("Noise floor", error("noise_floor_error"), "NRMSE")])

@@ -52,6 +52,7 @@ from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.lab.selection.add_effect import AddedEffects
+from logger.lab.selection.error_scale import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
 from logger.report.charts import chart
 from logger.report.document import (
@@ -120,7 +121,7 @@ class LabStory(CommandResult):
 
     def figures(self) -> list[Html]:
         """How the error fell."""
-        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
 
 
 def story_of(question: LabLoopQuestion) -> LabStory:
@@ -314,15 +315,14 @@ def chapter(title: str, explained: str = "") -> list[str]:
 
 
 def _comparison_lines(found: compare.Comparison) -> list[str]:
-    return [wrapped(headline(found)), "", "After the refit:", wrapped(evidence(found), "- "), "",
-            wrapped([conclusion(found).partition(" Next: ")[0]])]
+    return [wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- ")]
 
 
 def steps(story: Story) -> list[tuple[str, float]]:
     """Models on the way, each with its error on what no fit saw."""
     start = story.rounds[0].addition if story.rounds else None
     return [("as its file says", start.error_before if start else story.first.plain.error),
-            ("numbers refitted", start.error_refitted if start else story.first.steps[-1].error),
+            ("parameters refitted", start.error_refitted if start else story.first.steps[-1].error),
             *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
 
 
@@ -332,24 +332,24 @@ def ending(story: Story) -> list[str]:
     with_what = [bias(story.added, story.moved)] if story.added else []
     lines = []
     if story.added:
-        lines.append(f"{' and '.join(story.added)} reduced the error from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
-                     "both with the car's numbers and the distances refitted within their tolerance. With the last "
-                     f"file as it is, and the distances as recorded, the error is {story.last.plain.error:.3f}.")
-    lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
+        lines.append(f"{' and '.join(story.added)} reduced the NRMSE from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
+                     "both refitted. With the last file and the distances as they are, the NRMSE is "
+                     f"{story.last.plain.error:.3f}.")
+    lines.append(f"Noise floor: about {story.floor:.3f}.")
     if story.refused:
-        lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
+        lines.append(f"Missing, but not added as you wished: {', '.join(story.refused)}.")
     if story.not_added:
-        lines.append(f"Found missing and not added: {', '.join(story.not_added)}. Go on with the last file.")
+        lines.append(f"Missing, but not added: {', '.join(story.not_added)}. Go on with the last file.")
     if story.refused or story.not_added:
         return [*lines, *with_what]
     if diagnosis.beyond and not diagnosis.exceeds_noise:
-        lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
+        lines.append("Parameters of the vehicle's file are beyond their tolerance: check them.")
     elif diagnosis.unexplained and story.law is None:
-        lines.append("Something is missing still that no effect explains: ridelog learn may find a law, or an effect "
-                     "of your own may do it.")
+        lines.append("Something is still missing that no known effect explains. Next: ridelog learn, or an effect of "
+                     "your own.")
     elif diagnosis.unexplained:
-        lines.append("Something is missing still that no effect and no law out of the data explains: an effect of your "
-                     "own may do it.")
+        lines.append("Something is still missing that no known effect and no learned law explains. Next: an effect of "
+                     "your own.")
     else:
         lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
     return [*lines, *with_what]
@@ -370,49 +370,50 @@ def as_json(story: Story) -> dict[str, Any]:
     }
 
 
-STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
-              "the files are written, and on the distances as recorded, errors are larger.")
+STEPS_HINT = ("From step 1 on, the car's parameters and the distances are refitted within their tolerance. With the "
+              "files and distances as they are, the NRMSE is larger.")
 _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
 
 
 def story_page(story: Story) -> Html:
     """The story as one HTML document."""
-    title = f"{story.first.vehicle}: from the first comparison to the last effect"
+    title = f"{story.first.vehicle}: what the model lacked"
     runs = story.first.plain.residuals.runs
     last = story.diagnoses[-1]
     at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
     before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
     return document(title, [
         heading(title, ", ".join(run.name for run in runs)),
-        _story_tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
-        section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
+        _story_tiles(story), paragraphs(ending(story)), section("NRMSE, model by model", _steps(story)),
+        section("Initially", paragraphs([conclusion(story.first), *headline(story.first)])
+                + bullets(evidence(story.first))),
         section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in before)),
         *_law(story), *map(_added, story.rounds),
         section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
-        section("What the car's numbers had been taken for", _moved(story)),
-        section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))
+        section("What the missing effects had biased", _moved(story)),
+        section("Finally", paragraphs([conclusion(story.last), *headline(story.last)]) + bullets(evidence(story.last))
                 + concatenated(paragraphs(diagnosis_summary(one)) for one in at_last)) if story.rounds else "",
         shape_sections(last),
         section("What these runs cannot tell, and which drive would", bullets(untested(last))),
-        section("Where the effects are from", bullets(
+        section("Sources", bullets(
             f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects)),
     ])
 
 
 def _story_tiles(story: Story) -> Html:
     return tiles([
-        ("Error as the file says", f"{steps(story)[0][1]:.3f}", "as recorded"),
-        ("Error at last", f"{steps(story)[-1][1]:.3f}", "refitted"),
-        ("The sensor's noise alone", f"{story.floor:.3f}", ""),
+        ("NRMSE as filed", f"{steps(story)[0][1]:.3f}", "as recorded"),
+        ("NRMSE finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
+        ("Noise floor", f"{story.floor:.3f}", "NRMSE"),
         ("Effects added", f"{len(story.added)}", ""),
     ])
 
 
 def _steps(story: Story) -> Html:
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
-    return (falling("Error of each model, on all samples", steps(story), story.floor)
-            + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + hint(STEPS_HINT))
+    return (falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
+            + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1)) + hint(STEPS_HINT))
 
 
 def _law(story: Story) -> list[Html]:
@@ -422,18 +423,18 @@ def _law(story: Story) -> list[Html]:
         return []
     if sought.learning.law is None or sought.addition is None:
         said = why_none(sought.learning)
-        return [section("A law out of the data", paragraphs([f"{said[0].upper()}{said[1:]}."]))]
-    return [section("A law out of the data", paragraphs(
+        return [section("A law learned from the runs", paragraphs([f"{said[0].upper()}{said[1:]}."]))]
+    return [section("A law learned from the runs", paragraphs(
         [*sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."])),
         *law_sections(sought.learning.law, sought.addition, sought.picture)]
 
 
 def _added(one: Round) -> Html:
-    effects = [f"It leaves: {new.effect.signature}." for new in one.addition.new]
+    effects = [f"Signature: {new.effect.signature}." for new in one.addition.new]
     rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.addition)]
     said = paragraphs([*judgement(one.addition), *effects, f"Written to {one.file}."])
     return section(f"Added: {' and '.join(one.addition.names)}",
-                   said + grid(("Error", "", "of"), rows, words=(0, 2)))
+                   said + grid(("", "NRMSE", ""), rows, words=(0, 2)))
 
 
 def _moved(story: Story) -> Html:
@@ -453,9 +454,10 @@ def residual_spectra(story: Story) -> Html:
         power = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / f_hz[1]
         return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
 
-    lines = (line("measured", before, True), line("residual at first", before, False),
-             line("residual at last", after, False))
-    return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", lines))
+    lines = (line("measured", before, True), line("residual initially", before, False),
+             line("residual finally", after, False))
+    unit = before.unit
+    return chart(Curves("By frequency", "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", lines))
 
 
 def _place(story: Story) -> Html:
@@ -466,15 +468,15 @@ def _place(story: Story) -> Html:
     residual = residuals.residual[index]
     time_s = (residuals.runs[index].first + np.arange(len(residual)))[part] / residuals.rate_hz
     lines = (Line("measured", time_s, residuals.measured[index][part]),
-             Line("residual at first", time_s, residual[part]),
-             Line("residual at last", time_s, after.residuals.residual[index][part]))
-    return chart(Curves(f"Where it was worst at first: {worst.words}", "time in the run [s]",
-                          "acceleration [m/s2]", lines))
+             Line("residual initially", time_s, residual[part]),
+             Line("residual finally", time_s, after.residuals.residual[index][part]))
+    main = residuals.runs[index].facts.main
+    title = f"The worst place initially: {worst.words}"
+    return chart(Curves(title, "time [s]", f"{main.measures} [{main.unit}]", lines))
 
 
 HEADS = ("IRI", "Mean [m/km]", "Bias", "R2", "Within 1", "Within 2")
-IN_HINT = ("Within 1 and 2: the share of windows whose truth lies within one and two standard errors of the estimate "
-           "(right: 68 % and 95 %).")
+IN_HINT = "Within 1, 2: share of windows with the truth within one, two standard errors (ideal: 68 %, 95 %)."
 
 
 def figures_of(found: Assessment) -> dict[str, Any]:
@@ -484,9 +486,10 @@ def figures_of(found: Assessment) -> dict[str, Any]:
 
 def rows(before: Assessment, after: Assessment) -> list[tuple[str, ...]]:
     """The table of ``HEADS``: by the file as it was given, by the last one, and the truth."""
-    estimated = [_row("by the file as it was", figures_of(before)), _row("by the last file", figures_of(after))]
+    estimated = [_row("estimated with the first file", figures_of(before)),
+                 _row("estimated with the last file", figures_of(after))]
     known = after.exact_m_per_km[np.isfinite(after.exact_m_per_km)]
-    return [*estimated, ("as it was measured", f"{known.mean():.2f}", "", "", "", "")]
+    return [*estimated, ("measured", f"{known.mean():.2f}", "", "", "", "")]
 
 
 def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
@@ -508,8 +511,8 @@ def field_page(title: str, about: Sequence[str], measured: Sequence[MapWay], dri
         heading(title, ", ".join(one.name for one in driven)),
         _field_tiles(story, before, after), paragraphs(about),
         section("The drives", ways_map(measured, driven) + hint(
-            "Wide: what was measured. Dots: where the receiver saw the car, once a second.")),
-        section("How the error fell", falling("Error of each model, on all samples", steps(story), story.floor)
+            "Wide: the measured lines. Dots: the car's GPS positions, one a second.")),
+        section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
                 + paragraphs(ending(story))),
         section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in story.diagnoses[:1])),
         section("Before and after", residual_spectra(story)) if story.rounds else "",
@@ -522,18 +525,18 @@ def field_page(title: str, about: Sequence[str], measured: Sequence[MapWay], dri
 def _field_tiles(story: Story, before: Assessment, after: Assessment) -> Html:
     first, last = (figures_of(one)["comparison"] for one in (before, after))
     return tiles([
-        ("IRI is off by, at first", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
-        ("At last", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
-        ("Error of the model, at first", f"{steps(story)[0][1]:.3f}", "as its file says"),
-        ("At last", f"{steps(story)[-1][1]:.3f}", "refitted"),
+        ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
+        ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
+        ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "as filed"),
+        ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
     ])
 
 
 def _iri(before: Assessment, after: Assessment) -> Html:
     exact = np.isfinite(after.exact_m_per_km)
-    lines = (_line("at last", after, True), _line("at first", before, False),
+    lines = (_line("finally", after, True), _line("initially", before, False),
              Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]))
-    return chart(Curves(f"In windows of {after.window_m:.4g} m, at last with its standard error",
+    return chart(Curves(f"IRI over {after.window_m:.4g} m, finally with its standard error",
                         "distance along the line [m]", "IRI [m/km]", lines))
 
 

@@ -154,10 +154,10 @@ def _longest_road(bench: Bench | None) -> Track | None:
 
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
-HEADS = ("Effect", "Stands out by", "Separated by", "Most like", "")
-GAIN_HINT = "Effects more: how many more could be named, in expectation."
-SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
-               "gyroscope to 0.001 rad/s.")
+HEADS = ("Effect", "Detectability", "Isolability", "Most like", "")
+GAIN_HINT = "More named: the expected number of further effects that diagnose would name."
+SENSOR_HINT = ("Assumed noise: a second accelerometer as the first one, a travel sensor 0.5 mm, a gyroscope "
+               "0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
               "plate": "a plank {height_m:g} m high and {length_m:g} m long"}
 _SENSES = {"acceleration": "an accelerometer on", "travel": "a travel sensor at", "pitch_rate": "a pitch gyroscope on"}
@@ -170,15 +170,15 @@ def summary(found: LabPlan) -> list[str]:
     chances = found.now.chances
     named = int((chances > 0.5).sum())
     from_where = ("as in the runs" if found.measured else "as given or usual")
-    lines = [f"{count} drive{'s' * (count != 1)}, {seconds:.0f} s; noise {found.noise.variance**0.5:.3g} m/s2 r.m.s., "
-             f"{from_where}. Of {len(found.names)} effects at their usual strength, each by itself, "
-             f"ridelog diagnose would name {named}."]
+    lines = [f"ridelog diagnose would name {named} of {len(found.names)} effects, each alone and of usual strength, "
+             f"from {count} drive{'s' * (count != 1)} of {seconds:.0f} s in all with noise of "
+             f"{found.noise.variance**0.5:.3g} m/s2 r.m.s. ({from_where})."]
     if found.groups:
-        lines.append("Detected, but not separable: " + "; ".join(", ".join(one) for one in found.groups) + ".")
+        lines.append("Detected, but not distinguished: " + "; ".join(", ".join(one) for one in found.groups) + ".")
     hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
-        lines.append(f"Too faint to be seen in these drives: {', '.join(hidden)}.")
-    lines += [f"{name} is left out: {why}." for name, why in found.obstacles.items()]
+        lines.append(f"Too faint in these drives: {', '.join(hidden)}.")
+    lines += [f"{name}: not tried; {why}." for name, why in found.obstacles.items()]
     return lines
 
 
@@ -197,7 +197,7 @@ def rows(found: LabPlan) -> list[tuple[str, str, str, str, str]]:
 def _judged(alone: float, apart: float) -> str:
     if alone < DETECTABLE_SIGMA:
         return "too faint"
-    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be separated"
+    return "can be named" if apart >= ISOLABLE_SIGMA else "not distinguished"
 
 
 def number(deviations: float) -> str:
@@ -207,21 +207,20 @@ def number(deviations: float) -> str:
 
 def meaning() -> str:
     """What the numbers are."""
-    return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is detected from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
-            "remain when that one is fitted in its place.")
+    return (f"Detectability: by how many standard deviations the effect would stand out after a refit of the car and "
+            f"the distances; {DETECTABLE_SIGMA:g} needed. Isolability: how many remain when the most similar effect is "
+            f"fitted in its place; {ISOLABLE_SIGMA:.1f} needed.")
 
 
 def plan_lines(found: LabPlan) -> list[str]:
     """What a person reads of a plan."""
     lines = [wrapped(summary(found)), "", *columns([HEADS, *rows(found)]), "", wrapped([meaning()])]
     if found.next:
-        lines += ["", "Next, the drive that adds most first:"]
+        lines += ["", "Drives that would add most:"]
         lines += [wrapped([f"{number}. {next_words(one)}"]) for number, one in enumerate(found.next[:_MOST_NEXT], 1)]
         lines.append(wrapped([SENSOR_HINT]))
     else:
-        lines += ["", wrapped(["No next drive can be proposed: the road is too short, or too rough to be driven at "
-                                  "these speeds."])]
+        lines += ["", wrapped(["No further drive to propose: the road is too short, or too rough for these speeds."])]
     return lines
 
 
@@ -245,9 +244,10 @@ def next_words(one: LabNextDrive) -> str:
         return f"{do_words(one.option)}: adds next to nothing."
     shown = _most(one.gains)
     more = len(one.gains) - len(shown)
-    gains = ", ".join(f"{name} by {number(each)}" for name, each in shown.items())
-    count = f"{one.more_named:.1f} effects more could be named" if one.more_named >= 0.05 else "no more can be named"
-    return f"{do_words(one.option)}: {count}. Better separated: {gains}{f' and {more} more' if more else ''}."
+    gains = ", ".join(f"{name} {number(each)}" for name, each in shown.items())
+    count = f"names {one.more_named:.1f} effects more" if one.more_named >= 0.05 else "names no effect more"
+    return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}"
+            f"{f' and {more} more' if more else ''}.")
 
 
 def _most(gains: Mapping[str, float]) -> dict[str, float]:
@@ -275,19 +275,19 @@ _FULL = 100.0  # deviations that are drawn as dark as any
 
 def page(found: LabPlan, vehicle: str) -> Html:
     """The plan as one HTML document."""
-    title = f"{vehicle}: what these drives could show"
+    title = f"{vehicle}: which effects could these drives show?"
     chances = found.now.chances
     return document(title, [
         heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
         tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
                ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
-               ("Groups that cannot be separated", f"{len(found.groups)}", ""),
-               ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2")]),
+               ("Groups not distinguished", f"{len(found.groups)}", ""),
+               ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2 r.m.s.")]),
         paragraphs(summary(found)),
-        section("What remains of one effect when another is fitted", figure(found) + hint(meaning())),
+        section("Which effects are distinguished", figure(found) + hint(meaning())),
         section("Each effect", grid(HEADS, rows(found), words=(0, 3, 4))),
-        section("What a next drive would add", _next(found)),
-        section("Where this is from", bullets([
+        section("What another drive would add", _next(found)),
+        section("Sources", bullets([
             "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected "
             "to be found, from one data set without noise."])),
     ])
@@ -297,8 +297,8 @@ def figure(found: LabPlan) -> Html:
     """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
     when that one is fitted in its place. Those that stand out most first."""
     order = np.argsort(-found.now.detectability, kind="stable")
-    return heat_map("Standard deviations that remain of the effect of a row when that of a column is fitted in its "
-                    "place; framed: by how much it stands out",
+    return heat_map("Standard deviations that remain of a row's effect when the column's effect is fitted in its "
+                    "place; framed: its detectability",
                     [found.names[one] for one in order], found.now.pairwise[np.ix_(order, order)],
                     ISOLABLE_SIGMA, _FULL)
 
@@ -307,7 +307,7 @@ def _next(found: LabPlan) -> Html:
     """Nothing where there is none."""
     if not found.next:
         return EMPTY
-    drawn = grid(("Drive", "Effects more", "Better separated, in standard deviations"), [
+    drawn = grid(("Drive", "More named", "Standard deviations gained"), [
         (do_words(one.option), f"{one.more_named:.1f}",
          ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
         words=(0, 2))

@@ -62,9 +62,9 @@ class CompareQuestion(LabQuestion):
       ridelog compare --vehicle mycar.yaml run1 run2
       ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
 
-    The error is rms(measured - model) / rms(measured), the first 2 s of each run left out. Then the car's numbers and
-    the distances are refitted within their usual errors, and the residual is analysed: only that is evidence of physics
-    that the model lacks. ridelog diagnose says which.
+    NRMSE is rms(measured - model) / rms(measured) after the first 2 s of each run. Then compare refits the car's
+    parameters and the distances within their usual errors and analyses the residual: only what is left then is evidence
+    of physics that the model lacks. ridelog diagnose finds which.
 
     In Python: raises BadInput where these do not fit together, and as ``read_vehicle`` and ``read_run``.
 
@@ -86,16 +86,14 @@ class DiagnoseQuestion(LabQuestion):
       ridelog diagnose --vehicle mycar.yaml run1 run2
       ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html
 
-    Errors are rms(measured - model) / rms(measured), on stretches that no fit saw: three sets of them are held out in
-    turn. The car's numbers may be off (--tolerance) and the distances by as much as the runs show: both are refitted
-    first, so that no small mistake passes for an effect. It takes from seconds to minutes, and the compiler of the
-    ``lab`` extra.
+    NRMSE is rms(measured - model) / rms(measured) on held-out stretches: diagnose holds out three sets in turn. It
+    first refits the car's parameters (within --tolerance) and the distances (as far as the runs show them to be off),
+    so that no small mistake passes for an effect. It takes seconds to minutes, and the compiler of the ``lab`` extra.
 
-    With --same-road each RUN is a drive.csv, or a folder with one; a profile.csv in it is not read. The runs are drives
-    over the same road at different speeds, their distances counted from the same place (to about 3 m); those that were
-    extracted without a profile count from where each began, and are laid on one distance by their positions. Drives
-    that are plainly over two roads are refused. An error is then that of each drive over the road that the other drives
-    tell.
+    With --same-road each RUN is a drive.csv, or a folder with one; diagnose does not read a profile.csv in it. The runs
+    are drives over the same road at different speeds, with distances counted from the same place (to about 3 m). Runs
+    extracted without a profile count from where each began; diagnose aligns them by their positions. It refuses drives
+    over two roads. NRMSE is then that of each drive over the road estimated from the other drives.
 
     In Python: raises BadInput as ``compare``, for effects that there are not, and where the compiler is missing.
 
@@ -113,8 +111,8 @@ class DiagnoseQuestion(LabQuestion):
     effect_files: EffectFiles = ()
     list_all: Annotated[bool, Option("list all candidates, not the first 8", flag="--all")] = False
     same_road: Annotated[bool, Option(
-        "no profile is known: two runs or more (folders, or drive.csv files) over one road, at different speeds; what "
-        "bends its laws is tried by linear stand-ins")] = False
+        "without a profile: two runs or more (folders, or drive.csv files) over one road at different speeds; "
+        "nonlinear effects are tried in linearised form")] = False
 
 
 @dataclass(frozen=True)
@@ -125,9 +123,9 @@ class AddEffectQuestion(LabQuestion):
       ridelog add-effect sensor_bandwidth:order=2,cutoff_hz=20 --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect ./my_effect.py --vehicle mycar.yaml --out mycar-2.yaml run1 run2
 
-    What is said of the effect's numbers is where the fit begins; the rest is searched for. The new vehicle file holds
-    the effects with their standard errors, the car's refitted numbers, and the history of the model. The old one stays
-    as it is unless --out names it.
+    The fit begins at the parameters that you give (PARAM=VALUE) and searches for the others. The new vehicle file holds
+    the effects with their standard errors, the car's refitted parameters and the history of the model. The old file
+    stays as it is unless --out names it.
 
     In Python: raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot
     be there.
@@ -156,16 +154,16 @@ class AddEffectQuestion(LabQuestion):
 
 @dataclass(frozen=True)
 class LearnQuestion(LabQuestion):
-    """Learn a law out of the data, where no known effect explains what a vehicle's model lacks.
+    """Learn a law (a force characteristic) from runs that no known effect explains.
 
       ridelog learn --vehicle mycar.yaml --out law.py run1 run2
       ridelog learn --vehicle mycar.yaml --out law.py run1 run2 --page law.html
 
-    First every known effect is tried, as ridelog diagnose does. Where these explain all, or nothing is missing, no law
-    is learned and nothing is written. Otherwise families of laws are tried (forces by travel and rate, of the tires,
-    with a memory, a mass on a spring, ...), by the same evidence, in which every number counts. The law is written as
-    an effect of your own: one Python file, which compare, simulate, diagnose --effect-file and add-effect take. It
-    takes minutes, and the compiler of the ``lab`` extra:
+    First learn tries every known effect, as ridelog diagnose does. If these explain the residual, or nothing is
+    missing, it learns and writes nothing. Otherwise it tries families of laws (forces by travel and rate, of the tires,
+    with a memory, a mass on a spring, ...) by the same evidence, in which every parameter counts. It writes the law as
+    an effect of your own: one Python file that compare, simulate, diagnose --effect-file and add-effect read. It takes
+    minutes, and the compiler of the ``lab`` extra:
 
       ridelog add-effect ./law.py --vehicle mycar.yaml --out with-law.yaml run1 run2
 
@@ -192,9 +190,9 @@ class PlanQuestion(LabQuestion):
       ridelog plan --vehicle mycar.yaml --profile road.csv --speed 8 --speed 15
       ridelog plan --vehicle mycar.yaml run1 run2 --out plan.html
 
-    Numbers are standard deviations of each effect at its usual strength, the car's numbers and the distances being free
-    within their tolerance. Next drives are tried over the known road: other speeds, a speed bump or a plank on it, a
-    second sensor. It takes the compiler of the ``lab`` extra.
+    Detectability and isolability are in standard deviations, for each effect at its usual strength, with the car's
+    parameters and the distances free within their tolerance. plan also tries further drives over the known road: other
+    speeds, a speed bump or a plank, a second sensor. It takes the compiler of the ``lab`` extra.
 
     In Python: raises BadInput as ``diagnose``, where there is neither a run nor a planned drive, and for a drive that
     is shorter than 5 s.
@@ -239,10 +237,10 @@ class LabLoopQuestion(LabQuestion):
       ridelog lab --vehicle mycar.yaml run1 run2
       ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
 
-    Before an effect is added it asks: yes, no, or the name of another one; six effects are added at most. Where no
-    effect explains what is missing it offers to learn a law out of the data, as ridelog learn does. DIR gets a vehicle
-    file for each step (vehicle-1.yaml ...), the law (law.py), and story.html, the page of all of it. It takes minutes,
-    and the compiler of the ``lab`` extra.
+    lab asks before it adds an effect: yes, no, or the name of another one; it adds six at most. If no effect explains
+    the residual, it offers to learn a law, as ridelog learn does. DIR gets a vehicle file for each step (vehicle-1.yaml
+    ...), the law (law.py), and story.html with the whole story. It takes minutes, and the compiler of the ``lab``
+    extra.
 
     In Python: raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer
     that is no effect; OSError for files that cannot be written.

@@ -30,20 +30,19 @@ def looks_like(shape: Shape) -> list[str]:
     """What a residual that no candidate explains looks like."""
     turns = [line_sentence(shape.line)] if shape.line is not None and shape.line.found else []
     found = turns + [test.sentence for test in shape.tests.found]
-    return found or ["No test says more: it is spread over all frequencies, speeds and places."]
+    return found or ["No test says more: the residual is spread over all frequencies, speeds and places."]
 
 
 def line_sentence(line: SpatialLine) -> str:
     """What repeats along the way, and what may do so."""
     every_m = 1 / line.at_per_m
     if line.steady:
-        return (f"It repeats every {every_m:.2f} m of the way or {line.at_per_m * line.speed_mps:.1f} times a second: "
-                f"at a steady speed that is the same (clearest in {line.run}). A drive at another speed would show "
-                "which.")
+        return (f"It repeats every {every_m:.2f} m of road or {line.at_per_m * line.speed_mps:.1f} times a second; at "
+                f"a steady speed these are the same (clearest in {line.run}). A drive at another speed would tell.")
     radius_m = 1 / (2 * np.pi * line.at_per_m)
-    wheel = (f" A wheel of {radius_m:.2f} m radius turns at that rate: look at its balance and roundness."
+    wheel = (f" A wheel of {radius_m:.2f} m radius turns at that rate: check its balance and roundness."
              if _WHEEL_RADII_M[0] < radius_m < _WHEEL_RADII_M[1] else "")
-    return f"It repeats every {every_m:.2f} m of the way, at any speed (clearest in {line.run}).{wheel}"
+    return f"It repeats every {every_m:.2f} m of road at any speed (clearest in {line.run}).{wheel}"
 
 
 def error_text(part: Part, digits: int) -> str:
@@ -76,15 +75,15 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
     of what is no more than usual."""
     lines = band_words(band)
     if found.filter_share > 0 and lines:
-        lines[0] += (f" Outside of that lies {percent(found.filter_share)} of the power of their difference.")
+        lines[0] += f" {percent(found.filter_share)} of the residual's power lies outside that band."
     if found.distance_error_m > 0:
-        lines.append(f"The distances of these runs are off by more than usual: up to {found.distance_error_m:.2g} m. "
-                     f"That makes {percent(found.distance_share)} of the residual's power before any fit; the fits "
-                     "take it into account.")
+        lines.append(f"The distances of these runs are off by up to {found.distance_error_m:.2g} m, more than usual. "
+                     f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
+                     "correct it.")
     if found.drifting_sensors:
-        lines.append(f"The sensor drifts ({drift_words(found)}). That has nothing to do with the car, and makes "
-                     f"{percent(found.drift_share)} of the residual's power before any fit. Below {LOWEST_HZ:g} Hz "
-                     f"nothing is judged; without the drift the error of the refitted model is {found.error:.3f}.")
+        lines.append(f"The sensor drifts ({drift_words(found)}). The drift has nothing to do with the car and causes "
+                     f"{percent(found.drift_share)} of the residual's power before any fit. The lab judges nothing "
+                     f"below {LOWEST_HZ:g} Hz; without the drift, the refitted model's NRMSE is {found.error:.3f}.")
     return lines
 
 
@@ -122,14 +121,14 @@ def removed_section(found: Removed, band: ComparedBand | None) -> Html:
         return EMPTY
     rows = []
     if found.drifting_sensors:
-        rows.append(("drift of the sensor", percent(found.drift_share), drift_words(found)))
+        rows.append(("sensor drift", percent(found.drift_share), drift_words(found)))
     if found.distance_error_m > 0:
         rows.append(("wrong distances", percent(found.distance_share), f"up to {found.distance_error_m:.2g} m"))
     if band is not None:
-        rows.append(("outside of the pass band", percent(found.filter_share),
+        rows.append(("outside the pass band", percent(found.filter_share),
                      f"compared from {band.low_hz:.3g} to {band.high_hz:.3g} Hz"))
-    return section("What is removed before anything is judged", grid(HEADS, rows, words=(0, 2)) + _picture(found)
-                   + hint("Shares are of the power by which the model as it stands and the record differ."))
+    return section("Removed before judging", grid(HEADS, rows, words=(0, 2)) + _picture(found)
+                   + hint("Shares of the residual's power with the vehicle's file as it is."))
 
 
 def drift_tile(found: Removed) -> list[tuple[str, str, str]]:
@@ -143,7 +142,7 @@ def _picture(found: Removed) -> Html:
     names = shortened([one.run for one in found.drifts])
     lines = tuple(Line(names[one.run], np.arange(len(one.curve_mps2)) / one.rate_hz, one.curve_mps2)
                   for one in found.drifting_sensors[:2 * _MOST])
-    return chart(Curves("The drift of the sensor", "time in the run [s]", "acceleration [m/s2]", lines))
+    return chart(Curves("Sensor drift", "time [s]", "acceleration [m/s2]", lines))
 
 
 def _said(one: Drift) -> str:
@@ -156,17 +155,17 @@ def _alike(one: Drift, other: Drift) -> bool:
         a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
 
 
-_ERROR_WORDS = {AS_FILED: "as the vehicle's file says", REFITTED: "with its numbers refitted"}
+_ERROR_WORDS = {AS_FILED: "as the vehicle's file says", REFITTED: "with its parameters refitted"}
 
 
 def error_words(steps: Sequence[Step], floor: float) -> list[str]:
     """The errors of each step and of the noise alone, and why one rises."""
     each = ", ".join(f"{error_and_fit(one.error)} {_ERROR_WORDS.get(one.words, one.words)}" for one in steps)
-    lines = [f"Error on {JUDGED_ON}: {each}. The sensor's noise alone makes about {error_and_fit(floor)}."]
+    lines = [f"NRMSE on {JUDGED_ON}: {each}. Noise floor: about {error_and_fit(floor)}."]
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
-        lines.append(f"It rises {said}: the error counts all frequencies alike, and a fit weighs each by its noise. It "
-                     "gains where there is little noise, and loses where there is much.")
+        lines.append(f"It rises {said}: the NRMSE counts all frequencies alike, while a fit weighs each by its noise. "
+                     "The fit gains where there is little noise and loses where there is much.")
     return lines
 
 
@@ -185,14 +184,11 @@ def band_words(band: ComparedBand | None) -> list[str]:
     """Which frequencies were compared, and why; nothing where all were."""
     if band is None:
         return []
-    errors = "errors compare measurement and model below that"
-    if band.low_hz > 0:
-        errors = f"nor below {band.low_hz:.3g} Hz; errors compare measurement and model in between"
+    inside = (f"from {band.low_hz:.3g} " if band.low_hz > 0 else "up ") + f"to {band.high_hz:.3g} Hz"
     if band.cutoff_hz is None:
-        return [f"Above {band.high_hz:.3g} Hz nothing is compared, as was asked or as run.yaml says; {errors}."]
-    which = "Some of the records were" if band.some else "The record was"
-    return [f"{which} low-passed at about {band.cutoff_hz:.2g} Hz: above {band.high_hz:.3g} Hz nothing is compared; "
-            f"{errors}."]
+        return [f"You asked, or run.yaml says, to compare {inside}."]
+    which = "Some recorders" if band.some else "The recorder"
+    return [f"{which} low-passed at about {band.cutoff_hz:.2g} Hz, so measurement and model are compared {inside}."]
 
 
 def band_json(band: ComparedBand | None) -> dict[str, Any]:
@@ -204,4 +200,4 @@ def band_json(band: ComparedBand | None) -> dict[str, Any]:
 
 def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Html:
     """The error of each step as a falling curve, down to the noise."""
-    return steps_figure(Steps(title, "error", tuple(steps), (floor, "noise alone")))
+    return steps_figure(Steps(title, "NRMSE", tuple(steps), (floor, "noise floor")))

@@ -30,7 +30,7 @@ class DriftTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Which way, and how far in the longest run."""
         return (f"The model runs {'ahead' if found.value > 0 else 'behind'} by {abs(found.value) * 100:.2g} m in each "
-                f"100 m of the way, {found.figures['in_all_m']:.2g} m in the longest run: the recorded speed has a "
+                f"100 m of road, {found.figures['in_all_m']:.2g} m in the longest run: the recorded speed has a "
                 "scale error. All other findings may come from that alone.")
 
 

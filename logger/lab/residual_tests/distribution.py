@@ -74,9 +74,9 @@ class FrequencyTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Where the power lies."""
         part = found.figures["part"]
-        error = f"; the error there is {part.error:.2f}" if np.isfinite(part.error) else ""
+        error = f"; NRMSE there {part.error:.2f}" if np.isfinite(part.error) else ""
         return (f"{percent(found.value)} of the residual's power lies {BANDS[part.name]} ({part.low:.2g} to "
-                f"{part.high:.2g} Hz), where white noise would have {percent(found.figures['white_share'])}{error}.")
+                f"{part.high:.2g} Hz), against {percent(found.figures['white_share'])} for white noise{error}.")
 
 
 class SkewnessTest(ResidualTest):
@@ -97,8 +97,8 @@ class SkewnessTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Which way."""
         way = "up" if found.value > 0 else "down"
-        return (f"The residual has its sharp peaks {way}ward (skewness {found.value:.1f}): something pushes the body "
-                f"{way} in short blows.")
+        return (f"The residual's sharp peaks point {way} (skewness {found.value:.1f}): something pushes the body {way} "
+                "in short blows.")
 
 
 class ToneTest(ResidualTest):

@@ -36,8 +36,8 @@ class CoherenceTest(ResidualTest):
 
     def sentence(self, found: ResidualTestResult) -> str:
         """How much, and where."""
-        return (f"At least {percent(found.value)} of the residual is coherent with the road, most of it "
-                f"{BANDS[found.figures['band']]}. This part is not noise; a linear effect could cause it.")
+        return (f"At least {percent(found.value)} of the residual is coherent with the road, mostly "
+                f"{BANDS[found.figures['band']]}: not noise, and a linear effect could cause it.")
 
 
 class GainTest(ResidualTest):
@@ -58,8 +58,8 @@ class GainTest(ResidualTest):
 
     def sentence(self, found: ResidualTestResult) -> str:
         """The gain with its standard error."""
-        return (f"Where both agree in shape, the measurement is {found.value:.3g} times the model (standard error "
-                f"{found.standard_error:.1g}).")
+        return (f"Where their shapes agree, the measurement is {found.value:.3g} ± {found.standard_error:.1g} times "
+                "the model.")
 
 
 class ProportionTest(ResidualTest):
@@ -84,8 +84,8 @@ class ProportionTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Both gains."""
         weak, strong = found.figures["weak"], found.figures["strong"]
-        return (f"The response is not proportional to the road: {BANDS[found.figures['band']]} the measurement is "
-                f"{weak:.2f} of the model at small motion and {strong:.2f} at large motion.")
+        return (f"The response is nonlinear: {BANDS[found.figures['band']]}, the measurement is {weak:.2f} of the "
+                f"model at small motion and {strong:.2f} at large motion.")
 
 
 def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tuple[float, float, float, float] | None:

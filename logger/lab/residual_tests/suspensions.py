@@ -46,7 +46,7 @@ class ForceByTest(ResidualTest):
             of, part, ends = "travel", "springs", _ends(curve, 1000, "mm")
             both = f"like a spring that {'softens' if less else 'hardens'} far from its rest"
         return (f"A force in the suspensions that depends on their {of}, {_side(curve, both)}, would explain "
-                f"{percent(curve.share)} of the residual. In addition to linear {part}: {ends}.")
+                f"{percent(curve.share)} of the residual. Beside linear {part}: {ends}.")
 
 
 class DirectionTest(ResidualTest):
@@ -65,8 +65,8 @@ class DirectionTest(ResidualTest):
         damping = found.figures["damping"]
         more, less = ("rebound", "bump") if found.value > 0 else ("bump", "rebound")
         ratio = f", by {percent(2 * abs(found.value) / damping)} of the model's damping" if damping > 0 else ""
-        return (f"The residual depends on the direction: the suspensions seem to resist {more} more than {less}{ratio} "
-                f"(this would explain {percent(found.figures['share'])}).")
+        return (f"The residual depends on the direction: the suspensions resist {more} more than {less}{ratio}, which "
+                f"would explain {percent(found.figures['share'])} of it.")
 
 
 def _side(curve: Curve, both: str) -> str:

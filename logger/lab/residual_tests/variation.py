@@ -36,8 +36,8 @@ class ExcitationTest(ResidualTest):
         """The residual at small and at large motion."""
         low, high, unit = (found.figures[key] for key in ("low", "high", "motion_unit"))
         return (f"The residual {'grows' if found.value > 0 else 'shrinks'} with the motion: "
-                f"{low.residual_mps2:.2g} {unit} where the model has up to {low.high:.2g} {unit}, "
-                f"{high.residual_mps2:.2g} where it has {high.low:.2g} and more.")
+                f"{low.residual_mps2:.2g} {unit} where the model moves by up to {low.high:.2g} {unit}, "
+                f"{high.residual_mps2:.2g} {unit} beyond {high.low:.2g} {unit}.")
 
 
 class SpeedTest(ResidualTest):

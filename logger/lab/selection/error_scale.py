@@ -15,9 +15,9 @@ from itertools import pairwise
 
 from logger.lab.selection.holdout import ROUNDING
 
-JUDGED_ON = "stretches that no fit saw"
+JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
-AS_FILED, REFITTED = "the vehicle as its file says", "its numbers refitted"
+AS_FILED, REFITTED = "the vehicle as its file says", "its parameters refitted"
 
 
 def fit_percent(error: float) -> float:

@@ -98,7 +98,8 @@ def parse_table(data: bytes, file: str) -> tuple[Array, str]:
         units = {name.rpartition("_")[2] for name in numbers}
         return numbers if in_metres in (COLUMNS[:2], COLUMNS) and units <= set(UNITS_M) else None
 
-    names, values, named = parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")
+    names, values, named = parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}] "
+                                         "(other units by name: distance_ft,elevation_in)")
     return values * [UNITS_M[name.rpartition("_")[2]] for name in names], named
 
 

@@ -22,8 +22,8 @@ class BumpStop(ForceEffect):
         Parameter("stop_stiffness_n_per_m", 1e5, 0.0, 2e6, 0.0, Scale.LINEAR, (1e5,), "of the stop alone"),
     )
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), 5.3: additional springs"
-    signature = "short hard blows upward where the suspension is pressed most; all else is as in the model"
-    shown_by = "drive over a large bump so fast that the suspension comes to its end"
+    signature = "short hard blows upward where the suspension is most compressed; elsewhere the model fits"
+    shown_by = "drive over a large bump fast enough for the suspension to bottom out"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
         return laws.with_spring(lambda travel_m: p.stop_stiffness_n_per_m * np.minimum(travel_m + p.clearance_m, 0.0))

@@ -15,14 +15,14 @@ from logger.vehicle.vehicle import Vehicle
 
 class CgShift(VehicleEffect):
     name = "cg_shift"
-    title = "the centre of gravity sits ahead of where the model puts it, or behind"
+    title = "the centre of gravity is ahead of the model's, or behind it"
     parameters = (
         Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, -0.03, 0.03, 0.15),
                   "ahead positive, behind negative", step=1e-3),
     )
     needs_wheel = True
     source = "rigid-body mechanics (Eq 4.12 of Blum 2015 with other distances)"
-    signature = "one axle is heard more than the model says, the other one less"
+    signature = "the record shows one axle more than the model does, and the other one less"
     shown_by = "drive one bump at two speeds, or weigh the axles"
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

@@ -14,13 +14,13 @@ from logger.vehicle.vehicle import Vehicle
 
 class ConstantForce(ForceEffect):
     name = "constant_force"
-    title = "a force that pushes all the time on what moves without a spring"
+    title = "a constant force on a part that no spring holds"
     parameters = (
         Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),
     )
     source = "A. Janot, M. Gautier, M. Brunot, EMPS, Workshop on Nonlinear System Identification Benchmarks (2019)"
-    signature = "the motion drifts, one way as on the way back"
-    shown_by = "push the axis forth and back for as long as it has way"
+    signature = "the motion drifts, in the same direction forth and back"
+    shown_by = "push the axis forth and back over its whole travel"
     sought = Sought.ON_RIGS
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

@@ -25,7 +25,7 @@ class DamperAsymmetry(ForceEffect):
                   "slope of the damper in extension over that in compression; the mean of the two stays"),
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
-    signature = "the body is drawn down while it shakes: peaks up and down differ, and twice each frequency appears"
+    signature = "the body sits lower while it shakes; peaks up and down differ, and the record has twice each frequency"
     shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

@@ -22,12 +22,12 @@ class DamperBlowOff(ForceEffect):
     title = "digressive dampers: beyond a knee velocity the slope falls"
     parameters = (
         Parameter("knee_velocity_m_per_s", 0.15, 0.005, 2.0, None, Scale.LOG, (0.05, 0.12, 0.25, 0.5),
-                  "rate of the suspension from which on the slope is smaller"),
+                  "suspension rate above which the slope is smaller"),
         Parameter("slope_ratio", 0.4, 0.0, 1.0, 1.0, Scale.LINEAR, (0.4,),
                   "slope beyond the knee over that before it"),
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 6: digressive characteristics"
-    signature = "the damping falls as the road gets rougher; strong shakes ring on, weak ones are as in the model"
+    signature = "the damping falls as the road gets rougher: strong motions ring longer than in the model"
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one: the damping must differ"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

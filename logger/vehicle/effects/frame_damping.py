@@ -24,8 +24,8 @@ class FrameDamping(BodyEffect):
     )
     needs_wheel = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: drag of guides"
-    signature = "wheel hop or bounce are damped more than by the damper, as the damper is by their difference alone"
-    shown_by = "shake the rig through the bounce and through the wheel's hop, strongly enough that nothing sticks"
+    signature = "wheel hop or bounce die away faster than the damper between wheel and body allows"
+    shown_by = "shake the rig through bounce and wheel hop, strongly enough that nothing sticks"
     sought = Sought.ON_RIGS
     also_by = ("body_damping_n_s_per_m",)
 

@@ -31,7 +31,7 @@ class FrameFriction(ForceEffect):
     )
     needs_wheel = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
-    signature = "small motions of wheel and body die away at once, also those in which the suspension does not move"
+    signature = "small motions of wheel and body die away at once, even when the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
     sought = Sought.ON_RIGS
     also_by = ("body_friction_force_n",)

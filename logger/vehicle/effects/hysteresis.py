@@ -42,13 +42,13 @@ class Hysteresis(ForceEffect):
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
                   "at which each suspension slides"),
         Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
-                  "over which it would come to that at its first stiffness"),
+                  "over which the force would grow to that at its initial stiffness"),
         Parameter("sharpness_ratio", 1.0, 0.5, 10.0, None, Scale.LOG, (1.0,),
-                  "exponent of the law: the higher, the sharper the yield", default=1.0),
+                  "exponent: the higher, the sharper the yield", default=1.0),
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
               "ASCE 102 (1976) 249")
-    signature = "small motions meet a stiffer spring, larger ones friction; each turn of the motion begins stiff"
+    signature = "small motions meet a stiffer spring, larger ones friction; each reversal begins stiff"
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
     sought = Sought.NEVER
 

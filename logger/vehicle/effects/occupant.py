@@ -25,7 +25,7 @@ class Occupant(BodyEffect):
     )
     source = "M. J. Griffin, Handbook of Human Vibration (1990), chapter 9: seated people resonate at 4 to 6 Hz"
     signature = "at 3 to 6 Hz the body moves less than the model says, and a little more below"
-    shown_by = "drive with and without the people, or a road with much of its strength at 2 to 8 Hz"
+    shown_by = "drive with and without the people, or on a road that excites 2 to 8 Hz"
 
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
         if p.mass_kg == 0:

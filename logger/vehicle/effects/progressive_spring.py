@@ -19,7 +19,7 @@ class ProgressiveSpring(ForceEffect):
                   "force per cube of the travel from rest, of each suspension"),
     )
     source = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3 (the equation of Duffing)"
-    signature = "large travel meets more force: the body's bounce is quicker on bumps than on a smooth road"
+    signature = "the spring is stiffer at large travel: the body bounces faster on bumps than on a smooth road"
     shown_by = "drive slowly over large bumps or dips, so that the suspension travels several centimetres"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

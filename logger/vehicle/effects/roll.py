@@ -23,8 +23,8 @@ class Roll(VehicleEffect):
     )
     needs_wheel = True
     source = "the full car of the models; 4.1 of Blum 2015 leaves it out"
-    signature = "much of the motion has nothing to do with the left track, the more the shorter the waves are"
-    shown_by = "measure both tracks, and drive with the sensor away from the middle as well"
+    signature = "much of the motion does not follow the left track, most of all on short waves"
+    shown_by = "measure both tracks, and drive with the sensor off the centre line as well"
     needs_road = True
     stage = 9
 

@@ -38,14 +38,14 @@ class SensorBandwidth(SensorEffect):
         Parameter("cutoff_hz", 25.0, 0.5, 2000.0, float("inf"), Scale.RECIPROCAL, (15.0, 50.0, 1000.0),
                   "where its gain has fallen by 3 dB"),
         Parameter("order", 1.0, 1.0, 8.0, None, Scale.LINEAR, (1.0, 2.0),
-                  "1, or 2 to 8 for Butterworth's of that order",
+                  "1, or 2 to 8 for a Butterworth filter of that order",
                   choices=tuple(map(float, range(1, _HIGHEST + 1))), default=1.0),
         Parameter("sampled_hz", 0.0, 0.0, 1e6, None, Scale.LINEAR, (0.0,),
-                  "samples a second that a program runs it on (bilinear transform); 0: it is the sensor's own",
+                  "sample rate of a digital filter (bilinear transform); 0: an analogue one",
                   default=0.0, given=True),
     )
     source = "S. Butterworth, On the Theory of Filter Amplifiers (1930)"
-    signature = "the measurement falls behind the model more and more as the frequency rises, and comes later"
+    signature = "the measurement gets smaller and later than the model, more so at higher frequencies"
     shown_by = "drive a road with sharp edges, which excites high frequencies"
     realigns = True
     stage = 3

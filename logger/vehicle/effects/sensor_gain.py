@@ -16,7 +16,7 @@ class SensorGain(SensorEffect):
     name = "sensor_gain"
     title = "scale error of the sensor"
     parameters = (
-        Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "what is read over what there was"),
+        Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "reading over true acceleration"),
     )
     source = "data sheets of accelerometers give scale errors of some per cent"
     signature = "the measurement is the model times one factor, at every frequency, speed and strength"

@@ -24,7 +24,7 @@ class SensorMountResonance(SensorEffect):
         Parameter("damping_ratio", 0.08, 0.002, 1.5, None, Scale.LOG, (0.05, 0.25), "of the bracket"),
     )
     source = "C. M. Harris, A. G. Piersol, Shock and Vibration Handbook (2002), chapter 2: transmissibility"
-    signature = "a peak at a frequency that no part of the car has, at every speed and on every road"
+    signature = "a peak at a frequency that is no mode of the car, at every speed and on every road"
     shown_by = "drive a rough road at two speeds, and knock on the console while the car stands"
     stage = 1
 

@@ -21,8 +21,8 @@ class SensorOffset(VehicleEffect):
     )
     needs_wheel = True
     source = "rigid-body kinematics; the sensitivities of 4.4 of Blum 2015 are for a sensor at the centre of gravity"
-    signature = "pitch is heard: more motion where front and rear move against each other"
-    shown_by = "drive one bump at two speeds: the blows of the front and of the rear axle come out of proportion"
+    signature = "the record contains pitch: more motion where front and rear move against each other"
+    shown_by = "drive one bump at two speeds: the peaks of front and rear axle are out of proportion"
     stage = 2
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

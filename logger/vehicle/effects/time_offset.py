@@ -26,7 +26,7 @@ class TimeOffset(SensorEffect):
     )
     source = "the shift theorem of the Laplace transform"
     signature = "model and measurement have the same shape, shifted by the same time at every speed"
-    shown_by = "drive one bump at two speeds: the distance it seems moved by grows with the speed"
+    shown_by = "drive one bump at two speeds: its apparent shift in distance grows with speed"
     realigns, reshapes = True, False
     stage = 4
 

@@ -22,7 +22,7 @@ class TireDamping(ForceEffect):
     )
     needs_wheel = True
     source = "J. Y. Wong, Theory of Ground Vehicles (2008), chapter 7: tire damping 50 to several hundred N s/m"
-    signature = "wheel hop is weaker than in the model, and what lies above it stronger; nothing changes below 5 Hz"
+    signature = "wheel hop is weaker than in the model and higher frequencies stronger; nothing changes below 5 Hz"
     shown_by = "drive a rough, patched road at 15 to 25 m/s, where the wheels hop"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

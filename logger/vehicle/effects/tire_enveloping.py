@@ -21,7 +21,7 @@ class TireEnveloping(VehicleEffect):
     )
     needs_wheel = True
     source = "M. W. Sayers, S. M. Karamihas, The Little Book of Profiling (1998): a moving average of 0.25 m"
-    signature = "at slow speed short waves are weaker, or stronger, than the model says; at high speed nothing changes"
+    signature = "at low speed, short waves are weaker or stronger than in the model; at high speed nothing changes"
     shown_by = "drive a rough road slowly, at 4 to 8 m/s"
 
     replaces = ("contact_patch_m",)

@@ -21,7 +21,7 @@ class TopMountCompliance(ForceEffect):
                   "of the mount of each damper"),
     )
     source = "J. C. Maxwell's series of spring and damper; J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1"
-    signature = "the dampers seem weaker at wheel hop than at body bounce, and the hop sits a little higher"
+    signature = "the dampers seem weaker at wheel hop than at body bounce, and hop is at a slightly higher frequency"
     shown_by = "drive a rough road at several speeds, so that bounce and hop are both excited"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

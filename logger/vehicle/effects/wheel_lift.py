@@ -17,7 +17,7 @@ class WheelLift(ForceEffect):
     title = "a tire cannot pull: contact is lost when its force reaches zero"
     needs_wheel = True
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on wheel loads"
-    signature = "after hard edges the wheel comes down late; the body falls freely meanwhile"
+    signature = "after hard edges the wheel lands late, and the body falls freely until then"
     shown_by = "drive over a sharp bump or a rough road so fast that a wheel leaves the ground"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

@@ -206,7 +206,7 @@ def test_blows_lean_to_one_side() -> None:
 
     found = mark(marks(beside_with(plus_noise(blows))), "skewness")
     assert found.found
-    assert "upward" in found.sentence
+    assert "peaks point up (" in found.sentence
 
 
 def test_a_run_of_five_seconds_can_be_read() -> None:

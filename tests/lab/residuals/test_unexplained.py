@@ -56,7 +56,7 @@ def test_what_hums_at_a_steady_speed_may_repeat_in_time_or_along_the_way() -> No
     turns = spatial_line_of(humming([14.0], 0.0, 7.0))
     assert turns is not None and turns.found and turns.steady
     said = line_sentence(turns)
-    assert "every 2.00 m of the way or 7.0 times a second" in said and "wheel" not in said
+    assert "every 2.00 m of road or 7.0 times a second" in said and "wheel" not in said
 
 
 def test_two_steady_speeds_tell_a_wheel_from_a_hum() -> None:

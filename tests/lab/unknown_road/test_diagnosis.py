@@ -143,7 +143,7 @@ def test_what_may_only_imitate_is_not_named() -> None:
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
     reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
-    assert any(words.startswith("Not decided: tire_damping would explain a little") for words in reported["sentences"])
+    assert any(words.startswith("Undecided: tire_damping. It explains more than") for words in reported["sentences"])
 
 
 def deviance(problem: SameRoad, state: RoadFitState) -> float:
@@ -270,7 +270,7 @@ def test_what_was_not_fitted_says_so() -> None:
     reported = same_road_json(found)
     assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
     assert reported["maybe_over_two_roads"] == [["slow", "brisk"]]
-    assert any(words.startswith("Whether slow and brisk are over one road") for words in reported["sentences"])
+    assert any(words.startswith("Whether slow and brisk follow one road") for words in reported["sentences"])
 
 
 @pytest.mark.slow
