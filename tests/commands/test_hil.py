@@ -299,7 +299,7 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
         found = compare(rows, sessions, BRIDGE_S)
         assert not found.ok
         assert found.session is None
-        assert "TX on RX" in command.PlayedDrive(False, None, found).text()
+        assert "TX is on RX" in command.PlayedDrive(False, None, found).text()
 
 
 @pytest.mark.slow
