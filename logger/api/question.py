@@ -303,13 +303,6 @@ class Switches(Option):
 
 
 @dataclass(frozen=True)
-class NamedEntries(Option):
-    """A field of entries by name, each an option of that name at the terminal: metavar and help ``by_name``."""
-
-    by_name: Mapping[str, tuple[str, str]] | None = None
-
-
-@dataclass(frozen=True)
 class Asking:
     """A field of a question: its name, its type, how it is asked for, and its default (``MISSING``: none)."""
 

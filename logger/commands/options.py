@@ -26,7 +26,6 @@ from logger.api.question import (
     Asking,
     InPython,
     LongQuestion,
-    NamedEntries,
     Option,
     Out,
     Question,
@@ -101,10 +100,6 @@ def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
     if isinstance(option, Switches):
         for value, (name, words) in (option.by_value or {}).items():
             parser.add_argument(f"--{name}", dest=f"{one.name}.{value}", action="store_true", help=words)
-    elif isinstance(option, NamedEntries):
-        for name, (metavar, words) in (option.by_name or {}).items():
-            parser.add_argument(f"--{name}", dest=f"{one.name}.{name}", metavar=metavar, help=words,
-                                type=_reader(f"--{name}", option, one.kind))
     elif isinstance(option, Argument):
         is_optional = one.default is not MISSING
         nargs = ("*" if is_optional else "+") if option.many else "?" if is_optional else None
@@ -159,11 +154,8 @@ def asked(verb: Verb, args: argparse.Namespace) -> Any:
     """The question of a command line."""
     values: dict[str, Any] = {}
     for one in _options_of(verb.question):
-        if isinstance(one.option, NamedEntries):
-            entries = {name: getattr(args, f"{one.name}.{name}") for name in one.option.by_name or {}}
-            given: Any = {name: value for name, value in entries.items() if value is not None} or None
-        elif isinstance(one.option, Switches):
-            given = _switched(one, args)
+        if isinstance(one.option, Switches):
+            given: Any = _switched(one, args)
         else:
             given = getattr(args, one.name)
             given = one.option.many(given) if one.option.many and given is not None else given

@@ -5,8 +5,7 @@ the data cannot identify. Solution, in this order:
 
 1. ask whether the data could determine the numbers at all (``identifiability``), before any fit;
 2. go downhill, in the logarithm of what can only be positive, within bounds, on residuals as they are (output error),
-   from every start that was given; the best goes on; by squares, as far from the end a robust loss has hills of its
-   own;
+   from every start that was given; the best goes on;
 3. fit a noise model to the residual, weigh by it (innovations form), and repeat 2 from there, until neither moves;
 4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
    whether the model at its best has anything to do with what was measured.
@@ -47,10 +46,6 @@ from logger.vehicle.named_parameters import Coordinates, Free
 
 Array = npt.NDArray[np.float64]
 
-HUBER = 1.345
-"""Residuals beyond so many deviations count by their size and no longer by their square (P. J. Huber 1964)."""
-_MAD_TO_DEVIATION = 1.4826
-_TAME = 4.0
 _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
 _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
@@ -95,7 +90,6 @@ class FitOptions:
     rate_hz        of all records
     low_pass_hz    leave out what lies above [Hz]
     noise          candidates; the best by Schwarz's criterion is taken
-    robust         Huber's loss: single wild residuals count less
     starts         further starts, values by name; what they do not name starts as in ``Free``
     most_steps     of one descent
     refuse         raise NotIdentifiable; otherwise ``Fit.verdict`` says it
@@ -104,7 +98,6 @@ class FitOptions:
     rate_hz: float = 100.0
     low_pass_hz: float | None = None
     noise: Sequence[Noise] = (White(), Autoregressive())
-    robust: bool = False
     starts: Sequence[Mapping[str, float]] = ()
     most_steps: int = 100
     refuse: bool = True
@@ -129,7 +122,7 @@ class Fit:
     verdict            what the data cannot identify; empty when all is well
     converged          whether steps and noise model came to rest
     iterations         steps taken in all
-    cost               half the sum of squares of ``white``, or Huber's
+    cost               half the sum of squares of ``white``
     at_bound           names that ended at a bound
     ends               where each start had come to before the noise model: (starts, p)
     """
@@ -165,7 +158,7 @@ def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None 
     findings = problem.structural_findings(problem.beside(starts[0]))
     if findings and problem.options.refuse:
         raise NotIdentifiable(findings)
-    descents = [_descend(problem, start, problem.plain, robust=False) for start in starts]
+    descents = [_descend(problem, start, problem.plain) for start in starts]
     best = descents[int(np.argmin([one.at.cost for one in descents]))]
     iterations = sum(one.rounds for one in descents)
     noise, point, rounds, settled = _innovations(problem, best.at)
@@ -203,12 +196,11 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A place, and what the residuals are there: white (N,), weights (N,), and as they are, per record."""
+    """A place, and what the residuals are there: white (N,), and as they are, per record."""
 
     x: Array
     cost: float
     white: Array
-    weights: Array
     plain: list[Array]
 
 
@@ -254,16 +246,12 @@ class _FitProblem:
                 raise ValueError("expected every start between its bounds")
         return starts
 
-    def at(self, x: Array, noise: Whitening, deviation: float | None) -> _Point:
-        """The residuals at a place, weighed by a noise model; by Huber's loss if they have a deviation."""
+    def at(self, x: Array, noise: Whitening) -> _Point:
+        """The residuals at a place, weighed by a noise model."""
         predictions = self.linearised(x).predictions if self.exact else self._behind(self._predicted(x))
         plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
-        if deviation is None:
-            return _Point(x, 0.5 * float(white @ white), white, np.ones_like(white), plain)
-        size = np.abs(white) / (HUBER * deviation)
-        loss = np.where(size <= 1, 0.5 * white**2, (HUBER * deviation) ** 2 * (size - 0.5))
-        return _Point(x, float(loss.sum()), white, 1 / np.maximum(size, 1.0), plain)
+        return _Point(x, 0.5 * float(white @ white), white, plain)
 
     def linearised(self, x: Array) -> _Linearised:
         """Predictions and derivatives at a place; of the one that was asked for last they are known."""
@@ -314,30 +302,22 @@ class _FitProblem:
                           NOTHING_EXACT if self.exact else NOTHING_BY_DIFFERENCES)
 
 
-def robust_deviation(white: Array) -> float:
-    """Deviation of the bulk of samples (N,), by the median of their sizes."""
-    return float(_MAD_TO_DEVIATION * np.median(np.abs(white)))
-
-
 # --- descent ---
 
 
-def _descend(problem: _FitProblem, start: Array, noise: Whitening, robust: bool) -> Minimum[_Point]:
-    """The nearest minimum: by squares, or by Huber's loss with the deviation that residuals have at the start."""
-    deviation = None
-    if robust:
-        deviation = robust_deviation(problem.at(np.clip(start, problem.low, problem.high), noise, None).white)
+def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_Point]:
+    """The nearest minimum of the sum of squares."""
     slopes = np.empty((0, 0))
 
     def normal_equations(x: Array, point: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal slopes
         if fresh:
             slopes = noise(problem.linearised(x).slopes)
-        return slopes.T @ (point.weights * point.white), slopes.T @ (point.weights[:, None] * slopes)
+        return slopes.T @ point.white, slopes.T @ slopes
 
     # A step of so small a share of a standard error gains half its square in units of the residuals' variance.
     close = _CLOSE_SIMULATED if problem.simulated else _CLOSE
-    return minimise(start, lambda x: problem.at(x, noise, deviation), normal_equations,
+    return minimise(start, lambda x: problem.at(x, noise), normal_equations,
                     small_gain=lambda point: close**2 * point.cost / len(point.white),
                     most_rounds=problem.options.most_steps, keep_derivatives=problem.simulated,
                     low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
@@ -348,16 +328,13 @@ def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point
     kinds, steps = list(problem.options.noise), 0
     for _ in range(_MOST_NOISE_ROUNDS):
         values, residuals = problem.coordinates.values(point.x), point.plain
-        if problem.options.robust:
-            most = _TAME * robust_deviation(np.concatenate(residuals))
-            residuals = [np.clip(one, -most, most) for one in residuals]
         fitted = [kind.fitted(residuals, values, problem.low_pass, problem.floor) for kind in kinds]
         best = int(np.argmin([one.criterion(len(point.white)) for one in fitted]))
         noise = fitted[best]
         kinds = [kinds[best]]
         if noise.name == "ar":
             kinds = [Autoregressive(int(noise.levels["order"]))]
-        found = _descend(problem, point.x, noise, problem.options.robust)
+        found = _descend(problem, point.x, noise)
         steps += found.rounds
         moved = found.x - point.x
         point = found.at
@@ -410,9 +387,4 @@ def _covariance(problem: _FitProblem, point: _Point, slopes: Array) -> Array:
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15, hermitian=True) * np.outer(scale, scale)
     variance = float(point.white @ point.white) / max(count - p, 1)
-    if problem.options.robust:
-        deviation = robust_deviation(point.white)
-        pull = point.white * point.weights
-        steady = float((np.abs(point.white) <= HUBER * deviation).mean())
-        variance = float(pull @ pull) / max(count - p, 1) / steady**2
     return np.asarray(inverse * variance)

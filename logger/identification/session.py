@@ -143,7 +143,7 @@ def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequenc
     return VehicleModel(vehicle, parameters, records, road)
 
 
-def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> FitOptions:
+def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries: int) -> FitOptions:
     """How to fit a model of records at one rate.
 
     noise          noise model: white, ar, road, or auto, the likeliest of them
@@ -161,7 +161,7 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     if any(record.timed for record in model.records):
         del kinds["road"]
-    return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
+    return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
                    starts=[*model.trials(), *spread_starts(model.parameters, tries)])
 

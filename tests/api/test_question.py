@@ -16,7 +16,6 @@ from logger.api.drive_questions import ModesCommand, ModesQuestion, RandomRoadQu
 from logger.api.question import (
     Argument,
     Asking,
-    NamedEntries,
     Notify,
     Option,
     Question,
@@ -56,8 +55,6 @@ class Ask(Question):
     speeds_mps: Annotated[list[float] | tuple[float, ...], Option(
         "of a drive; may repeat", Range(1, 50, "m/s"), "MPS", read=float, many=list, flag="--speed")] = ()
     start: Annotated[Mapping[str, float] | None, Option("from where", read=_pair, many=dict)] = None
-    lies: Annotated[Mapping[str, Any] | None, NamedEntries("what lies there", read=_pair, by_name={
-        "bump": ("N=M", "a bump"), "hole": ("N=M", "a hole")})] = None
     surface: Annotated[str, Switches("of what it is", choices=("dry", "wet", "icy"), by_value={
         "wet": ("wet-road", "it rains"), "icy": ("ice", "it is cold")})] = "dry"
     kind: Annotated[str, Option("of model", choices=("ar", "ma"))] = "ar"
@@ -76,9 +73,9 @@ def asked(*words: str) -> Question:
 def test_a_command_line_makes_the_question_that_python_makes() -> None:
     assert asked("a.csv") == Ask(Path("a.csv"))
     assert asked("a.csv", "--rate", "50", "--tries", "3", "--speed", "10", "--speed", "20", "--start", "m=3",
-                 "--start", "k=4", "--bump", "h=1", "--ice", "--kind", "ma", "--quick") == Ask(
+                 "--start", "k=4", "--ice", "--kind", "ma", "--quick") == Ask(
         Path("a.csv"), rate_hz=50.0, tries=3, speeds_mps=[10.0, 20.0], start={"m": 3.0, "k": 4.0},
-        lies={"bump": ("h", 1.0)}, surface="icy", kind="ma", quick=True)
+        surface="icy", kind="ma", quick=True)
 
 
 @pytest.mark.parametrize(("words", "values", "complaint"), [

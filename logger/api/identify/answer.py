@@ -150,15 +150,15 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
     from logger.identification.session import LEAST_SAMPLES, UnusableRun, check_records, off_rate
     from logger.profiles.track import Track
 
-    records, skip_s = [], SKIP_S if question.skip_s is None else question.skip_s
+    records = []
     for drive in drives:
         lasts_s = len(drive.time_s) / drive.rate_hz
-        if not 0 <= skip_s < lasts_s - LEAST_SAMPLES / drive.rate_hz:
-            raise question.wrong("skip_s", f" {skip_s:g}: expected a beginning that leaves {LEAST_SAMPLES} samples or "
-                                           f"more of {drive.path}, which lasts {lasts_s:g} s")
+        if not lasts_s - LEAST_SAMPLES / drive.rate_hz > SKIP_S:
+            raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {SKIP_S:g} s, "
+                           f"which are left out, found a drive of {lasts_s:g} s")
         samples = drive.accel_z_mps2 - (0.0 if drive.facts.main.has_zero else drive.accel_z_mps2.mean())
         records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, skip_s,
+                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, SKIP_S,
                               replace(drive.facts, signals=()), drive.marks()))
     try:
         check_records(records)
@@ -258,11 +258,12 @@ def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
             raise BadInput(f"obstacle {name}: expected {' or '.join(kinds)}")
         needed, said = OBSTACLES[name], ",".join(f"{key}={value:g}" for key, value in numbers.items())
         if not set(needed) <= set(numbers) <= {"start_m", *needed}:
-            raise question.wrong(name, f" {said}: expected [start_m=M,]{','.join(f'{one}=M' for one in needed)}")
+            raise question.wrong("obstacles", f" {name}:{said}: expected [start_m=M,]"
+                                              f"{','.join(f'{one}=M' for one in needed)}")
         try:
             found[name] = kinds[name](**{"start_m": 0.0, **numbers})
         except ValueError as error:
-            raise question.wrong(name, f" {said}: {error}") from None
+            raise question.wrong("obstacles", f" {name}:{said}: {error}") from None
     return RoadInput(**found), [name for name, one in (question.obstacles or {}).items() if "start_m" not in one]
 
 
@@ -274,7 +275,7 @@ def _drive_model(given: vehicle_file.Model, records: list[Record], road: RoadInp
         starts = obstacle_starts(given.vehicle, records, road, unplaced)
     except ValueError as error:
         obstacle, _, words = str(error).partition(":")
-        raise question.wrong(obstacle, f":{words}") from None
+        raise question.wrong("obstacles", f" {obstacle}:{words}") from None
     parameters = _free(given, road, starts, len(records), question)
     try:
         return drive_model(given.vehicle, given.effects, parameters, records, road)
@@ -328,7 +329,7 @@ def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
     half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
         raise question.wrong("low_pass_hz", f" {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz")
-    return fit_options(model, question.noise, low_pass_hz, question.robust, question.tries)
+    return fit_options(model, question.noise, low_pass_hz, question.tries)
 
 
 def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_file.Model:
@@ -404,8 +405,8 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
     """How to fit, and the question without what is not the car's. BadInput for what needs a known road."""
     from logger.identification.unknown_road.marginal_likelihood import Options
 
-    unused = {**(question.obstacles or {}), "low_pass_hz": question.low_pass_hz, "robust": question.robust,
-              "tries": question.tries, "noise": question.noise != "auto"}
+    unused = {"obstacles": question.obstacles, "low_pass_hz": question.low_pass_hz, "tries": question.tries,
+              "noise": question.noise != "auto"}
     if given := [option for option, value in unused.items() if value]:
         raise question.wrong(given[0], ": expected a road whose profile is known, found one that was not measured")
     names = [name for name in question.free if name != _FREE_WAVINESS]

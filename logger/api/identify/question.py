@@ -12,14 +12,15 @@ from logger.api.question import (
     WAVINESS,
     Anyway,
     Argument,
+    InPython,
     LongQuestion,
-    NamedEntries,
     Option,
     Out,
     Runs,
     Switches,
     VehicleName,
     Verb,
+    named_numbers,
     names_of,
 )
 
@@ -49,8 +50,8 @@ def _numbers(text: str, count: int) -> tuple[str, list[float]]:
     return name, values
 
 
-def _obstacle(text: str) -> dict[str, float]:
-    return dict(map(_number, text.split(",")))
+def _obstacle(text: str) -> tuple[str, dict[str, float]]:
+    return named_numbers(text, "--obstacle")
 
 
 @dataclass(frozen=True)
@@ -75,12 +76,13 @@ class IdentifyQuestion(LongQuestion):
     and its start is looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a
     single run, NAME).
 
-      ridelog identify drive.csv --vehicle rav4-2009 --bump height_m=0.15,width_m=2.6 --free bump.height_m
-      ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
+      ridelog identify drive.csv --vehicle rav4-2009 --obstacle bump:height_m=0.15,width_m=2.6 --free bump.height_m
+      ridelog identify drive.csv --vehicle rav4-2009 --obstacle step:start_m=50,height_m=-0.03 \\
+          --free step.height_m,speed_scale
 
     With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of
-    the waviness that is said or, with road.waviness free, found. Drives over one road at different speeds say far more
-    (--same-road).
+    waviness 2 or, with road.waviness free, of the one that is found. Drives over one road at different speeds say far
+    more (--same-road).
 
       ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
       ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
@@ -112,30 +114,25 @@ class IdentifyQuestion(LongQuestion):
     bounds: Annotated[Mapping[str, tuple[float, float]] | None, Option(
         "where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat",
         metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
-    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, NamedEntries(
-        'what lies on the road [m], such as {"bump": {"height_m": 0.1, "width_m": 3.0}}; without start_m it is '
-        "looked for", read=_obstacle, by_name={
-            "bump": ("PARAM=M,...", "a speed bump on the road: [start_m=M,]height_m=M,width_m=M; free as "
-                                    "bump.height_m ..."),
-            "step": ("PARAM=M,...", "a step, up or with a negative height down: [start_m=M,]height_m=M; free as "
-                                    "step.height_m")})] = None
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, Option(
+        "what lies on the road [m]; may repeat. bump: height_m, width_m; step, up or with a negative height down: "
+        "height_m. Without start_m it is looked for; its numbers are free as bump.height_m ... In Python: "
+        '{"bump": {"height_m": 0.1, "width_m": 3.0}}', metavar="NAME:PARAM=VALUE,...", read=_obstacle, many=dict,
+        flag="--obstacle")] = None
     noise: Annotated[str, Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=NOISE_MODELS)] = "auto"
     low_pass_hz: Annotated[float | None, Option(
         "leave out frequencies above it, for example 20; so does the pass_band_hz of a run.yaml", metavar="HZ")] = None
-    robust: Annotated[bool, Option("let single wild readings count less (Huber's loss)")] = False
     tries: Annotated[int, Option("so many further starts, spread around", TRIES, "N")] = 0
-    skip_s: Annotated[float | None, Option(
-        "beginning of each run that is left out [s] (default: 2)", metavar="S")] = None
     road: Annotated[str, Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={
             UNMEASURED: ("unmeasured-road", "the roads were not measured; each run has one of its own"),
             SAME: ("same-road", "the road was not measured; all runs are over the same one; their places may be off "
                                 "by 10 m, their distances by 1 per cent")})] = MEASURED
-    waviness: Annotated[float | None, Option(
-        "of a road that was not measured (default: 2); to find it, add road.waviness to --free", WAVINESS, "W")] = None
+    waviness: Annotated[float | None, InPython(
+        "of a road that was not measured (default: 2); to find it, add road.waviness to `free`", WAVINESS)] = None
     anyway: Anyway = False
 
     def __post_init__(self) -> None:
