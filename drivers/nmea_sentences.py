@@ -128,18 +128,6 @@ def check(sentence: bytes) -> Checksum:
     return Checksum.GOOD if exclusive_or(match[1]) == int(match[2], 16) else Checksum.BAD
 
 
-def parse_sentence(sentence: bytes) -> Sentence | None:
-    """What a sentence says, from its ``$`` to its checksum, without the line end.
-
-    None when the checksum is wrong or missing, for sentences of other kinds, and when a field is not what it should
-    be.
-    """
-    try:
-        return parse_checked(sentence) if check(sentence) is Checksum.GOOD else None
-    except MalformedError:
-        return None
-
-
 def parse_checked(sentence: bytes) -> Sentence | None:
     """What a sentence with the right checksum says; None for one of another kind.
 

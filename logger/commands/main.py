@@ -12,7 +12,8 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, NoReturn, TextIO, cast
 
@@ -105,12 +106,12 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 
 
 _SAID = (
+    (r"unrecognized arguments: (.*)", r"expected no \1"),
     (r"argument (\S+): invalid float value: '(.*)'", r"\1 \2: expected a number"),
     (r"argument (\S+): invalid int value: '(.*)'", r"\1 \2: expected a whole number"),
     (r"argument \S+\|\S+: invalid choice: '(.*)' \(choose from (.*)\)", r"expected one of \2, found '\1'"),
     (r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", r"\1 \2: expected one of \3"),
     (r"the following arguments are required: (.*)", r"expected \1"),
-    (r"unrecognized arguments: (.*)", r"expected no \1"),
 )
 """Complaints of argparse, and how all others here are worded."""
 
@@ -135,6 +136,22 @@ class _Parser(argparse.ArgumentParser):
         super().__init__(*words, **named)
         for kind in (None, "store"):
             self.register("action", kind, _Once)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse; an option that there is not is named before anything else, as the value behind it would be taken
+        for a file."""
+        known = [*self._options()]
+        names = (one.partition("=")[0] for one in takewhile("--".__ne__, args or ()) if one.startswith("--"))
+        if wrong := next((one for one in names if one not in known), None):
+            self.error(f"there is no option {wrong}{did_you_mean(wrong, known)}")
+        return super().parse_args(args, namespace)
+
+    def _options(self) -> Iterator[str]:
+        yield from self._option_string_actions
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for parser in action.choices.values():
+                    yield from parser._option_string_actions
 
     def error(self, message: str) -> NoReturn:
         for theirs, ours in _SAID:

@@ -139,13 +139,3 @@ def body_and_wheels_hz(structure: Structure) -> tuple[Array, Array]:
     wheels = 0 if structure.on_base else len(structure.wheels)
     body = every[:len(every) - wheels]
     return body[body > 0], every[len(every) - wheels:]
-
-
-def one_at_a_time(structure: Structure) -> tuple[Array, Array]:
-    """Frequency (n,) [Hz] and damping ratio (n,) of each coordinate while the others are held still.
-
-    sqrt(k / m) / 2 pi and c / 2 sqrt(k m), with k, c, m from the diagonals of K, C, M: for Table 4.2 these are the
-    quoted 1.16 Hz and 0.28 of the body and 10.97 Hz of the wheels.
-    """
-    m, c, k = (np.diag(matrix) for matrix in (structure.mass, structure.damping, structure.stiffness))
-    return np.sqrt(k / m) / (2 * np.pi), c / (2 * np.sqrt(k * m))

@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from logger.store.export import manifest
-from logger.store.export.manifest import Manifest, format_manifest
+from logger.store.export.manifest import Manifest, manifest_blocks
 
 from .figures import Figures
 
@@ -69,7 +69,7 @@ def main() -> int:
 def _hostile(own: Path) -> None:
     """A whole manifest of 63 MB in the logger's folder on a stick, and 300,000 long names beside it."""
     listed = {f"{number:05d}-00000.csv": "0" * 64 for number in range(760_000)}
-    (own / manifest.NAME).write_bytes(format_manifest(Manifest(own.name, listed)))
+    (own / manifest.NAME).write_bytes(b"".join(manifest_blocks(Manifest(own.name, listed))))
     for number in range(300_000):
         (own / f"{number:06d}-{'x' * 240}").touch()
 

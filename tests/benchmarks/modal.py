@@ -18,8 +18,8 @@ import numpy as np
 from logger.modal import five_storey
 from logger.modal.analysis import find_modes
 from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
-from logger.modal.mode import mac
 
+from ..support.shapes import mac
 from .figures import Figures
 
 RATE_HZ = 100.0

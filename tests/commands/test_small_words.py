@@ -29,7 +29,11 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize(("arguments", "said"), [
-    (["iri", "p.csv", "--windows", "3"], "expected no --windows 3 (try"),
+    (["iri", "p.csv", "--windows", "3"], "there is no option --windows; did you mean --window? (try"),
+    (["iri", "--wnidow", "5", "p.csv"], "there is no option --wnidow; did you mean --window? (try"),
+    (["identify", "run", "--fre=x"], "there is no option --fre; did you mean --free? (try"),
+    (["road", "generate", "--clas", "B"], "there is no option --clas; did you mean --class? (try"),
+    (["iri", "p.csv", "q.csv"], "expected no q.csv (try"),
     (["fleet", "frob"], "expected one of 'ingest', 'summarise', 'report', found 'frob' (try"),
     (["convert", "logs"], "expected --to (try"),
 ])

@@ -10,10 +10,30 @@ from hypothesis import strategies as st
 from pynmeagps import NMEAReader
 
 from drivers.nmea import NmeaDecoder
-from drivers.nmea_sentences import KMH_MPS, KNOT_MPS, Checksum, Gga, Gsa, Rmc, Vtg, Zda, check, parse_sentence
+from drivers.nmea_sentences import (
+    KMH_MPS,
+    KNOT_MPS,
+    Checksum,
+    Gga,
+    Gsa,
+    MalformedError,
+    Rmc,
+    Vtg,
+    Zda,
+    check,
+    parse_checked,
+)
 
 TALKERS = ["GP", "GL", "GA", "GB", "BD", "GQ", "QZ", "GI", "GN"]
 DAY_US = 86_400_000_000
+
+
+def parse_sentence(data):
+    """What a sentence says, from its ``$`` to its checksum; None where that is wrong or a field is malformed."""
+    try:
+        return parse_checked(data) if check(data) is Checksum.GOOD else None
+    except MalformedError:
+        return None
 
 
 def sentence(text, lower=False):

@@ -7,8 +7,9 @@ import pytest
 
 from logger.modal.analysis import decays, find_modes
 from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
-from logger.modal.mode import FoundMode, mac
+from logger.modal.mode import FoundMode
 
+from ..support.shapes import mac
 from ..support.slow import slow
 
 RATE_HZ = 100.0

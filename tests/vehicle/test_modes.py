@@ -9,12 +9,20 @@ from scipy.linalg import eig, eigh, expm
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
-from logger.vehicle.modes import modes, one_at_a_time, undamped_frequencies_hz
+from logger.vehicle.modes import modes, undamped_frequencies_hz
+from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Axle, Vehicle
 
 GOLDEN = quarter_car(GOLDEN_CAR)
 SHIPPED = {name: structure_of(read_vehicle(vehicle_file(name))) for name in vehicle_names()}
 RAV4 = SHIPPED["rav4-2009"]
+
+
+def one_at_a_time(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency (n,) [Hz] and damping ratio (n,) of each coordinate while the others are held still: sqrt(k / m) / 2 pi
+    and c / 2 sqrt(k m), with k, c, m from the diagonals of K, C, M."""
+    m, c, k = (np.diag(matrix) for matrix in (structure.mass, structure.damping, structure.stiffness))
+    return np.sqrt(k / m) / (2 * np.pi), c / (2 * np.sqrt(k * m))
 
 
 def test_golden_car_of_table_4_1_has_1_2_and_11_hz_and_damping_0_40() -> None:

@@ -109,11 +109,6 @@ def is_of_export(folder: Path) -> bool:
     return folder.parent.name == FOLDER and _IDENTITY.fullmatch(folder.name) is not None
 
 
-def format_manifest(manifest: Manifest) -> bytes:
-    """The text of the file."""
-    return b"".join(manifest_blocks(manifest))
-
-
 def manifest_blocks(manifest: Manifest) -> Iterator[bytes]:
     """The text of the file, in blocks."""
     entries = (f"{manifest.files[name]}  {name}" for name in sorted(manifest.files))

@@ -16,7 +16,7 @@ from logger.errors import BadInput
 from logger.store.export import directory_handle, manifest
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.export import MARKS_NAME, Progress, export, exported_names, finished_files
-from logger.store.export.manifest import Manifest, format_manifest, read_manifest
+from logger.store.export.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.integrity import FileCheck, verify
 
 from ...support.faults.sticks import (
@@ -189,7 +189,7 @@ def most_memory_bytes(act: Callable[[], object]) -> int:
 def a_manifest(logs: Path, stick: Path, files: int) -> bytes:
     run(logs, stick)
     listed = {f"{number:05d}-{'0' * 40}.csv": "0" * 64 for number in range(files)}
-    return format_manifest(Manifest(own(logs, stick).name, listed))
+    return b"".join(manifest_blocks(Manifest(own(logs, stick).name, listed)))
 
 
 @pytest.mark.slow
