@@ -119,12 +119,12 @@ class UnknownNumbers(MeasuredRoad):
     """The likelihood of drives over a measured road, of a car whose numbers are not known.
 
     draws     cars that are drawn for each effect
-    starts    so many of them, the best, are improved to the end
+    starts    so many of each kind of them, the best, are improved to the end
     ends      of how many of these the fit of an effect ended at the best, by name
     """
 
-    draws: int = 48
-    starts: int = 3
+    draws: int = 120
+    starts: int = 2
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     _squares: dict[int, tuple[Posterior, _BySquares]] = field(default_factory=dict)
 
@@ -147,7 +147,7 @@ class UnknownNumbers(MeasuredRoad):
         without = by_squares.squares(anchor)
 
         def begun(one: Screened) -> Screened:
-            found = self._begun(by_squares, one.effect, anchor, 1, rounds=3)
+            found = self._begun(by_squares, one.effect, anchor, 1)
             if not found:
                 return one
             gain = by_squares.freedom * float(np.log(without / by_squares.squares(found[0])))
@@ -206,32 +206,33 @@ class UnknownNumbers(MeasuredRoad):
 
     def _begun(self, by_squares: _BySquares, effect: Effect | None, near: State, count: int, rounds: int = 12
                ) -> tuple[State, ...]:
-        """The best so many of cars that were drawn around the file's and around a state, improved by squares, the best
-        first."""
+        """The best so many of cars that were drawn around the file's, and as many of those around a state, improved by
+        squares, the best first. A state without the effect is in a valley of its own, whose cars are the better ones
+        before they are improved."""
         prior = by_squares.posterior.prior
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = effect.trials() if effect else [{}]
-        drawn = []
+        drawn: tuple[list[tuple[float, State]], ...] = [], []
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
-            effects = [_drawn(one, rng) for one in near.effects]
+            effects = [_drawn(one, rng, WEAKEST) for one in near.effects]
             if effect is not None:
-                effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng))
+                # Usual sizes follow the vehicle's by powers of ten (``sized``).
+                effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng, float(np.log(10.0)) / 2))
             if (one := by_squares.at(effects, logs, near)) is not None:
-                drawn.append(one)
-        drawn.sort(key=lambda pair: pair[0])
-        ends = sorted((by_squares.improved(state, rounds) for _, state in drawn[:count]), key=lambda pair: pair[0])
+                drawn[number % 2].append(one)
+        best = [state for some in drawn for _, state in sorted(some, key=lambda pair: pair[0])[:count]]
+        ends = sorted((by_squares.improved(state, rounds) for state in best), key=lambda pair: pair[0])
         return tuple(state for _, state in ends)
 
 
-def _drawn(one: Chosen, rng: np.random.Generator) -> Chosen:
-    """An effect with its sizes drawn around those that it has, as those of the car are: as far as what counts as not
-    measured."""
+def _drawn(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:
+    """An effect with its sizes drawn around those that it has, by a standard deviation of their logarithms."""
     values: dict[str, Any] = dict(one.values)
     for parameter in one.effect.parameters:
         if parameter.is_free and values[parameter.name]:
-            value = values[parameter.name] * float(np.exp(WEAKEST * rng.standard_normal()))
+            value = values[parameter.name] * float(np.exp(spread * rng.standard_normal()))
             values[parameter.name] = min(max(value, parameter.low), parameter.high)
     return replace(one, values=values)
