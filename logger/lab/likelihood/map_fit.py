@@ -249,7 +249,9 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     unseen = np.diag([range_of(state.effects[free.effect].effect.parameters[free.parameter])**-2.0
                       for free in free_parameters])
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, free_parameters)])
-    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS).at
+    farthest = np.concatenate([linear.prior.farthest[:p], np.full(len(free_parameters), np.inf)])
+    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,
+                    low=-farthest, high=farthest).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
 
 
