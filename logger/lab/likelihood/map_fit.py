@@ -10,13 +10,13 @@ is judged by a full prediction. Then the model is linearised again at the distan
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.fitting.levenberg_marquardt import minimise
+from logger.fitting.levenberg_marquardt import Damping, minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
 from logger.lab.likelihood.posterior import Posterior, State, derivatives
@@ -217,10 +217,11 @@ class _Point:
 def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequence[FreeParameter],
                      small_gain: float = 0.15) -> State:
     """Levenberg-Marquardt steps on the car's numbers and the free ones of the effects, with the most likely distance
-    errors to first order at each."""
+    errors to first order at each. A car that cannot be simulated, as its numbers are too far off, is no step."""
     own: list[Array] | None = None
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
+    evaluated: list[_Point] = []
     realigns = any(state.effects[free.effect].effect.realigns for free in free_parameters)
     predict = linear.posterior.predictor(state)
 
@@ -232,9 +233,17 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
             there, at, slopes = known
             predictions = [one + (x - there)[p:] @ columns for one, columns in zip(at.predictions, slopes, strict=True)]
             record = linear.fit_record_errors(predictions, at.record).record
-        predictions = predict(effects, logs, record)
-        found = linear.fit_record_errors(predictions, record)
-        return _Point(effects, logs, record, predictions, found, 0.5 * (found.squares + linear.prior.cost(logs)))
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                predictions = predict(effects, logs, record)
+                found = linear.fit_record_errors(predictions, record)
+        except (np.linalg.LinAlgError, OverflowError):
+            if not evaluated:  # where a fit begins is a car
+                raise
+            return replace(evaluated[0], cost=np.inf)
+        evaluated[:] = [_Point(effects, logs, record, predictions, found,
+                               0.5 * (found.squares + linear.prior.cost(logs)))]
+        return evaluated[0]
 
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal own, known
@@ -249,9 +258,11 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     unseen = np.diag([range_of(state.effects[free.effect].effect.parameters[free.parameter])**-2.0
                       for free in free_parameters])
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, free_parameters)])
-    farthest = np.concatenate([linear.prior.farthest[:p], np.full(len(free_parameters), np.inf)])
+    # Where a number is not known, a size that all masses and forces share is held by the prior of another one alone: a
+    # step that is damped by what the runs say of each moves it by next to nothing, and looks like the last.
+    damping = Damping(first=Damping.least) if linear.prior.is_vague else Damping()
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,
-                    low=-farthest, high=farthest).at
+                    damping=damping).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
 
 

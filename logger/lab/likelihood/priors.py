@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.named_parameters import WEAKEST, bounds_of, changed, read, sized
+from logger.vehicle.named_parameters import WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
@@ -94,11 +94,6 @@ class VehiclePrior:
         """Whether a number may well be so far off that it counts as not measured: a fit that begins at the file's may
         end elsewhere."""
         return bool((UNUSUAL_SIGMA * self.deviations > WEAKEST).any())
-
-    @property
-    def farthest(self) -> Array:
-        """The largest size (p,) of the logarithms: no fit goes farther from a file's number."""
-        return -np.log([bounds_of(name, 1.0)[0] for name in self.names])
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""

@@ -69,8 +69,9 @@ def deviations_from_null(one: Chosen, errors: NumberErrors | None = None) -> flo
         name = f"{one.effect.name}.{parameter.name}"
         if mass is not None and name in names:
             error *= float(np.sqrt(max(1 - matrix[names.index(name), mass]**2, 0.0)))
-        if parameter.null is not None and 0 < error < np.inf:
-            null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
+        none = parameter.low if parameter.name in one.effect.also_by else parameter.null
+        if none is not None and 0 < error < np.inf:
+            null = 0.0 if np.isinf(none) else parameter.coordinate(none)
             found.append(abs((parameter.coordinate(value) - null) / (error * slope_of(parameter, value))))
     return max(found, default=float("inf"))
 
