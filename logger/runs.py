@@ -72,9 +72,11 @@ class Signal:
     def never_repeats(self) -> bool:
         """Whether equal samples are one that was written twice: noise makes an acceleration another one each time, a
         place may stay what it is."""
-        return self.measures == "acceleration" and self.kind != "encoder"
+        return self.measures == "acceleration" and self.kind != ENCODER
 
 
+ENCODER = "encoder"
+"""The kind of a sensor that counts: it has no gain, no filter and no bracket of its own."""
 SENSOR = "accel_z_mps2"
 """The column of the sensor's acceleration."""
 ACCELERATION = Signal(SENSOR, "acceleration")

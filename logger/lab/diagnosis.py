@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from logger.lab.likelihood.distance_error import signals_off
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import (
     Noise,
     SignalErrors,
-    excess_over_noise,
+    excess_by_signal,
     floor_error,
     sensor_noise_with_rounding,
     signal_errors_of,
@@ -30,9 +31,11 @@ from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
+from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.noise_colour import coloured_noise
 from logger.lab.residuals.removed import Removed, removed_from
+from logger.lab.residuals.road_coherence import best_linear_share
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
@@ -81,6 +84,7 @@ class Diagnosis:
     catalogue            all effects that were asked for, by name
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
+    best_linear          share of the measured power that a linear car could explain at most; None: the runs do not say
     noise                of the sensors, their rounding in it
     candidates           missing effects first, with their final values; then the others of the first round that are
                          better than the refitted model, the least probable by chance first
@@ -97,6 +101,9 @@ class Diagnosis:
     shape                of the unexplained residual; None where it is noise
     removed              sensor drift, distance error and filtering, removed from the error before it is judged
     signals              errors of other signals than the sensor's acceleration, by name
+    signals_off          by what share one of these reads more than all else that was measured says, by name, where it
+                         is more than a sensor's gain is off by
+    excess_of            as ``excess``, by signal; empty: the sensor's acceleration
     band                 in which the runs were compared; None: all
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
@@ -124,6 +131,8 @@ class Diagnosis:
     shape: Shape | None
     removed: Removed
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
+    signals_off: Mapping[str, float] = field(default_factory=dict)
+    excess_of: Mapping[str, float] = field(default_factory=dict)
     band: ComparedBand | None = None
     car: FittedCar | None = None
     coloured: bool = False
@@ -133,6 +142,14 @@ class Diagnosis:
     ends: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     contradicted: tuple[str, ...] = ()
     as_moved: Chosen | None = None
+    best_linear: float | None = None
+
+    @property
+    def explained(self) -> tuple[float, float]:
+        """Shares of the measured power that are explained on stretches that no fit saw: with the numbers refitted, and
+        by the model that it ends with."""
+        refitted, last = (next(one.error for one in self.steps if one.words == REFITTED), self.steps[-1].error)
+        return 1 - refitted**2, 1 - last**2
 
     @property
     def exceeds_noise(self) -> bool:
@@ -143,6 +160,12 @@ class Diagnosis:
     def unexplained(self) -> bool:
         """Whether the effects of the verdict, in a car within its priors, do not explain all."""
         return self.exceeds_noise or self.in_conflict
+
+    @property
+    def contradicted_by(self) -> tuple[str, ...]:
+        """Signals whose residual alone is above their noise: they contradict the others."""
+        above = tuple(name for name, excess in self.excess_of.items() if excess > UNEXPLAINED)
+        return above if len(above) < len(self.excess_of) and "" not in above else ()
 
     @property
     def missing(self) -> tuple[Chosen, ...]:
@@ -205,13 +228,15 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     progress("how certain the numbers are")
     errors = standard_errors(after)
     progress("what these runs could not show")
-    excess = excess_over_noise(fine, state, FALSE_ALARM)
+    excess_of = excess_by_signal(fine, state, FALSE_ALARM)
+    excess = max(excess_of.values())
     baseline = fine.start(present)
     removed = removed_from(fine, baseline.predictions, state)
     shape = shape_of(fine, state, removed) if excess > UNEXPLAINED else None
     colour = None if shape is None else coloured_noise(fine.bands, shape)
     if colour is not None:
-        noise, excess = colour, excess_over_noise(fine, state, FALSE_ALARM, colour)
+        noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
+        excess = max(excess_of.values())
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
@@ -232,8 +257,20 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
+        best_linear=_best_linear(selection.before),
+        signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
         car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
+
+
+def _best_linear(before: Baseline) -> float | None:
+    """What a linear car could explain at most, by the refitted model, where that is linear."""
+    posterior, state = before.posterior, before.state
+    runs, car = posterior.runs.runs, posterior.car(state.effects, state.logs)
+    if car.bends_laws:
+        return None
+    main = [run.main(one) for run, one in zip(runs, state.predictions, strict=True)]
+    return best_linear_share(ModelResiduals(runs, car, main, ()), before.hold_out.error)
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:
@@ -247,9 +284,12 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
     by_road = all(run.facts.places_by == BY_ROAD for run in runs)
     there = {one.effect.name for one in present}
+    kinds = {run.facts.main.kind for run in runs}
     found = {}
     for name, effect in effects.items():
         why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
+        if why is None and kinds <= set(effect.not_of):
+            why = f"no {' or '.join(sorted(filter(None, kinds)))} has it"
         if why is None and by_road and not effect.reshapes:
             why = LAID_BY_THE_ROAD
         if why is not None:

@@ -112,6 +112,10 @@ class Excitation:
         """The parts that the forces act on."""
         return tuple(one.parts for one in self.forces)
 
+    def forces_n(self, time_s: Array) -> Array:
+        """The forces (M, f) at some times since the first sample of the record [s] [N]."""
+        return np.asarray(self._pushes(np.clip(time_s, self.start_s, self.end_s)))
+
     def _derivative(self, order: int, time_s: Array) -> Array:
         """Of the elevation under the front wheels (M, 1), by time; 0 where it stays where it is."""
         inside = np.clip(time_s, self.start_s, self.end_s)

@@ -183,6 +183,7 @@ class Effect(ABC):
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
+    not_of       kinds of sensors that cannot have it
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
     """
@@ -200,6 +201,7 @@ class Effect(ABC):
     needs_road: bool = False
     needs_wheel: bool = False
     needs_body: bool = False
+    not_of: tuple[str, ...] = ()
     also_by: tuple[str, ...] = ()
     stage: int = 0
 

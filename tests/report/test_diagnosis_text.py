@@ -64,7 +64,8 @@ def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
     nothing, errors = diagnosis_summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
     assert errors == ("NRMSE on held-out stretches: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit 84.8 %) "
-                      "with its parameters refitted. Noise floor: about 0.150 (fit 85.0 %).")
+                      "with its parameters refitted. Noise floor: about 0.150 (fit 85.0 %). Share of the measured "
+                      "power explained: 98% with the parameters refitted.")
     assert looks_like(NOTHING) == untested(NOTHING) == []
 
 
@@ -73,21 +74,35 @@ def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() ->
     assert missing == (f"dry_friction is missing ({EFFECTS['dry_friction'].title}): friction_force_n 85 ± 4 N, "
                        "transition_velocity_m_per_s 0 m/s. p-value (probability that noise alone looks like any known "
                        "effect): below 1e-9.")
-    assert errors.endswith("0.153 (fit 84.7 %) with dry_friction. Noise floor: about 0.150 (fit 85.0 %).")
+    assert "0.153 (fit 84.7 %) with dry_friction. Noise floor: about 0.150 (fit 85.0 %). " in errors
+    assert errors.endswith("explained: 94% with the parameters refitted, 98% in the end.")
+    reach = diagnosis_summary(replace(FOUND, best_linear=0.962))[1]
+    assert reach.endswith("A linear car could explain 96% at most.")
+    assert diagnosis_json(FOUND)["explained_power"] == {
+        "refitted": pytest.approx(1 - 0.25**2), "final": pytest.approx(1 - 0.153**2), "best_linear": None}
+
+
+def test_a_signal_that_contradicts_the_others_is_named() -> None:
+    (off,) = (one for one in diagnosis_summary(replace(FOUND, signals_off={"travel_m": 0.052})) if "travel_m" in one)
+    assert off.startswith("travel_m reads +5.2% against what all other signals say")
+    left = replace(FOUND, excess=3.0, excess_of={"": 0.0, "travel_m": 3.0})
+    assert any(one.startswith("It is in travel_m alone") for one in diagnosis_summary(left))
+    everywhere = replace(left, excess_of={"": 0.5, "travel_m": 3.0})
+    assert not any("travel_m" in one for one in diagnosis_summary(everywhere))
 
 
 def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
     missing, left, *_ = diagnosis_summary(replace(FOUND, excess=0.5))
     assert "dry_friction explains part of the residual, or imitates something else" in missing
     assert left == ("Something more is missing that no known effect explains: in the worst run the residual is 1.5 "
-                    "times the sensor's noise.")
+                    "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
 
 
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
     found = replace(NOTHING, excess=2.0)
     left, _ = diagnosis_summary(found)
     assert left == ("Something is missing that no known effect explains: in the worst run the residual is 3 times the "
-                    "sensor's noise.")
+                    "sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
     _, imitation, _ = diagnosis_summary(imitating)
     assert imitation.startswith("Effects that improve the fit by less than 10% of a full explanation are not named")

@@ -356,11 +356,19 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines.append("The sensor's noise is coloured (louder at some frequencies). It is as loud when the car shakes "
                      "little as when it shakes much, so it does not come from the road.")
     if found.exceeds_noise:
+        left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
-                     f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
+                     f"run the residual is {1 + found.excess:.3g} times the sensor's noise. Beyond that noise it is "
+                     f"{left} of the measured power.")
+        if found.contradicted_by:
+            lines.append(f"It is in {enumerated(found.contradicted_by, 'and')} alone: the other signals are explained "
+                         "to their noise. Check that sensor: its place, its sign, its filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"Effects that improve the fit by less than {IMITATION:.0%} of a full explanation are not "
                          "named: they may only imitate what is missing.")
+    lines += [f"{name} reads {share:+.1%} against what all other signals say, which is more than a sensor is off by: "
+              "check its scale and its unit. The effects were found with that taken out."
+              for name, share in found.signals_off.items()]
     if found.beyond:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
         lines.append(f"Parameters beyond their tolerance: {off}. Measure them: either the vehicle's file is wrong "
@@ -371,7 +379,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         one = found.as_moved
         lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would move all of them in this way. "
                      f"To tell: {one.effect.shown_by}.")
-    lines += error_words(found.steps, found.noise_floor_error)
+    errors, *rises = error_words(found.steps, found.noise_floor_error)
+    lines += [f"{errors} {_explained_power(found)}", *rises]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} in the end, noise floor about {}")
     lines += _faint(found)
@@ -381,6 +390,13 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
                "it ended at the end of its range, or where it does nothing")
         lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}).")
     return lines
+
+
+def _explained_power(found: LabDiagnosis) -> str:
+    refitted, last = (percent(one) if one < 0.995 else f"{one:.2%}" for one in found.explained)
+    ends = f", {last} in the end" * (len(found.steps) > 2)
+    linear = "" if found.best_linear is None else f" A linear car could explain {percent(found.best_linear)} at most."
+    return f"Share of the measured power explained: {refitted} with the parameters refitted{ends}.{linear}"
 
 
 def looks_like(found: LabDiagnosis) -> list[str]:
@@ -491,6 +507,9 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
             "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
+        "signals_off": dict(found.signals_off), "contradicted_by": list(found.contradicted_by),
+        "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
+                            "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         **errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.lag import SLOWEST_MPS
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
 from logger.runs import RECEIVER_ERROR_LASTS_S, Run
 
 if TYPE_CHECKING:
@@ -88,7 +88,9 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 @dataclass(frozen=True, eq=False)
 class RecordError:
     """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
-    of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop).
+    of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop),
+    and the gain of each further signal. None of these sensors is quite right, and one that is wrong by a per cent would
+    else contradict the others wherever it is hundreds of times its noise.
 
     basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]; sparse: of a spline's, four
                    are not 0 at a sample
@@ -118,7 +120,18 @@ class RecordError:
     @property
     def count(self) -> int:
         """Number of the numbers k."""
-        return self.places + 2
+        return self.places + len(self._recorder_deviations)
+
+    @cached_property
+    def _recorder_deviations(self) -> Array:
+        """Standard deviations of the numbers of the recorder and of the further signals (2 + s,)."""
+        signals = (self.run.facts.main, *self.run.signals)
+        gain, *gains = (self.tolerance.gain_of(one) for one in signals)
+        return np.array([gain, self.tolerance.droop, *gains])
+
+    def signal_gains(self, k: Array) -> Array:
+        """By what share each further signal reads too much (s,)."""
+        return k[self.places + 2 :]
 
     @property
     def places(self) -> int:
@@ -133,7 +146,7 @@ class RecordError:
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
         found = self._walk_precision / (self._start_and_walk_m(size)[1] ** 2 * self.knot_s)
-        np.einsum("ii->i", found)[-3:] += 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
+        np.einsum("ii->i", found)[self.places - 1 :] += 1.0, *self._recorder_deviations**-2
         if self.delay_std_s is not None:
             found[self.spline_count, self.spline_count] += self.delay_std_s**-2
         return found + (self.trend * self.trend_precisions(size)) @ self.trend.T
@@ -142,7 +155,8 @@ class RecordError:
     def trend(self) -> Array:
         """Columns (k, t) whose products with k are the start and the scale error."""
         found = np.zeros((self.count, 2))
-        found[: self.spline_count, 0], found[-4, 1] = self.basis[: self.spline_count, [0]].toarray()[:, 0], 1.0
+        found[: self.spline_count, 0] = self.basis[: self.spline_count, [0]].toarray()[:, 0]
+        found[self.places - 2, 1] = 1.0
         return found
 
     def trend_precisions(self, size: ErrorSize) -> Array:
@@ -164,7 +178,7 @@ class RecordError:
         """Logarithm of the determinant of the precision."""
         start_m, walk_m = self._start_and_walk_m(size)
         walk = -(self.spline_count - 1) * np.log(walk_m**2 * self.knot_s)
-        others = [start_m, size.scale, self.tolerance.gain, self.tolerance.droop, self.delay_std_s or 1.0]
+        others = [start_m, size.scale, *self._recorder_deviations, self.delay_std_s or 1.0]
         return float(walk - 2 * np.log(others).sum())
 
     def distance_error_m(self, k: Array) -> Array:
@@ -197,27 +211,35 @@ class RecordError:
         """A prediction (n,), or more signals joined to it, as a recorder with these numbers (k,) records it."""
         main = self.run.main(prediction)
         rise = derivative(main, self.run.rate_hz)
-        found = np.asarray(main + k[self.places :] @ _recorder_slopes(main, rise, self.run))
-        return np.concatenate([found, prediction[len(main) :]]) if len(main) < len(prediction) else found
+        found = np.asarray(main + k[self.places : self.places + 2] @ _recorder_slopes(main, rise, self.run))
+        if len(main) == len(prediction):
+            return found
+        others = prediction[len(main) :].reshape(-1, len(main)) * (1 + self.signal_gains(k))[:, None]
+        return np.concatenate([found, others.ravel()])
 
     def slopes(self, prediction: Array) -> csr_array:
         """Derivatives of a prediction (n,), or of more signals joined to it, by each of k: a sparse array (k, n) [m/s2
-        per unit]. The distance moves all signals; the recorder's numbers are those of the sensor."""
+        per unit]. The distance moves all signals; the recorder's numbers are those of the sensor, and each gain that of
+        its signal."""
         from scipy.sparse import block_array, csr_array
 
-        n, found = self.run.count, []
-        for start in range(0, len(prediction), n):
+        n, found, count = self.run.count, [], len(self._recorder_deviations)
+        for signal, start in enumerate(range(0, len(prediction), n)):
             rise = derivative(prediction[start : start + n], self.run.rate_hz)
             by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
             moved = csr_array((self.basis.data * by_place[self.basis.indices], self.basis.indices, self.basis.indptr),
                               self.basis.shape)
-            recorded = csr_array((2, n)) if start else csr_array(_recorder_slopes(prediction[:n], rise, self.run))
-            found.append([[moved], [recorded]])
+            recorded = np.zeros((count, n))
+            if start:
+                recorded[1 + signal] = prediction[start : start + n]
+            else:
+                recorded[:2] = _recorder_slopes(prediction[:n], rise, self.run)
+            found.append([[moved], [csr_array(recorded)]])
         return csr_array(block_array([[column[row][0] for column in found] for row in range(2)], format="csr"))
 
 
 class RigRecordError(RecordError):
-    """Errors of the record of a run on a rig: numbers k of its recorder (gain, droop) alone. What moves a rig is
+    """Errors of the record of a run on a rig: numbers k of its recorder and signals alone. What moves a rig is
     recorded by the same clock as what the rig does, so that there is no distance error; one that was fitted
     nevertheless would absorb physics. Methods as of ``RecordError``."""
 
@@ -230,13 +252,13 @@ class RigRecordError(RecordError):
         return np.empty((2, 0))
 
     def precision(self, size: ErrorSize) -> Array:
-        return np.diag([self.tolerance.gain**-2, self.tolerance.droop**-2])
+        return np.diag(self._recorder_deviations**-2)
 
     def trend_precisions(self, size: ErrorSize) -> Array:
         return np.empty(0)
 
     def log_determinant(self, size: ErrorSize) -> float:
-        return -2 * float(np.log([self.tolerance.gain, self.tolerance.droop]).sum())
+        return -2 * float(np.log(self._recorder_deviations).sum())
 
     def distance_error_m(self, k: Array) -> Array:
         return np.zeros(self.run.count)
@@ -268,6 +290,18 @@ def unusual_distance_error_m(errors: Sequence[RecordError], record: Sequence[Arr
         off_m = float(np.abs(one.distance_error_m(k)).max())
         found = max(found, off_m if off_m > UNUSUAL_SIGMA * usual_m else 0.0)
     return found
+
+
+def signals_off(errors: Sequence[RecordError], record: Sequence[Array]) -> dict[str, float]:
+    """By what share further signals read more than the rest of what was measured says, numbers (k,) per run, by name:
+    those whose gain is in conflict with its prior."""
+    found: dict[str, list[float]] = {}
+    for one, k in zip(errors, record, strict=True):
+        for signal, gain in zip(one.run.signals, one.signal_gains(k), strict=True):
+            found.setdefault(signal.name, []).append(float(gain))
+    known = {signal.name: one.tolerance.gain_of(signal) for one in errors for signal in one.run.signals}
+    shares = {name: float(np.mean(gains)) for name, gains in found.items()}
+    return {name: share for name, share in shares.items() if abs(share) > CONFLICT_SIGMA * known[name]}
 
 
 def _cubic_b_splines(pieces: int, count: int) -> csr_array:

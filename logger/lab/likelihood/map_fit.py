@@ -21,15 +21,18 @@ from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offse
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
 from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter
 from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,
     free_parameters_of,
+    slope_of,
     steps_of,
     with_coordinates,
 )
+from logger.vehicle.uncertain import grows_with_mass
 
 Array = npt.NDArray[np.float64]
 
@@ -221,7 +224,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     own: list[Array] | None = None
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
-    evaluated: list[_Point] = []
+    here, evaluated = linear, list[_Point]()
     realigns = any(state.effects[free.effect].effect.realigns for free in free_parameters)
     predict = linear.posterior.predictor(state)
 
@@ -246,20 +249,23 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
         return evaluated[0]
 
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
-        nonlocal own, known
+        nonlocal own, known, here
         if free_parameters and fresh:
             slopes = effect_slopes(linear, at.effects, at.logs, free_parameters, at.record, at.predictions)
-            own, known = linear.whitened(slopes), (x.copy(), at, slopes)
-        information = linear.information(own)
+            known = x.copy(), at, slopes
+            if linear.prior.is_vague:
+                here, slopes = without_common_scale(linear, at.effects, slopes)
+            own = linear.whitened(slopes)
+        information = here.information(own)
         information[p:, p:] += unseen
-        return linear.gradient(at.fit.residuals, at.logs, own), information
+        return here.gradient(at.fit.residuals, at.logs, own), information
 
     # A number that the runs say nothing of would be moved by roundings: its step is damped by what its range says.
     unseen = np.diag([range_of(state.effects[free.effect].effect.parameters[free.parameter])**-2.0
                       for free in free_parameters])
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, free_parameters)])
-    # Where a number is not known, a size that all masses and forces share is held by the prior of another one alone: a
-    # step that is damped by what the runs say of each moves it by next to nothing, and looks like the last.
+    # Where numbers are not known, the scale of all masses and forces is held by the prior of one of them alone: a step
+    # that is damped by what the runs say of each moves it by next to nothing, and looks like the last.
     damping = Damping(first=Damping.least) if linear.prior.is_vague else Damping()
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,
                     damping=damping).at
@@ -292,6 +298,31 @@ def own_slopes(linear: LinearModel) -> list[Array] | None:
     if not free_parameters:
         return None
     return effect_slopes(linear, state.effects, state.logs, free_parameters, state.record, state.predictions)
+
+
+def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None
+                         ) -> tuple[LinearModel, list[Array] | None]:
+    """The model and the derivatives by the numbers of its effects (m, n), per run, without a common scale of all
+    masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
+    that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
+    to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
+    drives a rig shows the size."""
+    prior, numbers = linear.prior, linear.numbers
+    forced = any(isinstance(run.track, Excitation) and run.track.forces for run in linear.posterior.runs.runs)
+    if forced or numbers is None or own is None or any(one.file for one in effects) or not linear.posterior.car(
+            effects, linear.state.logs).bends_laws:
+        return linear, own
+    step = [float(grows_with_mass(name)) for name in prior.names]
+    for free in free_parameters_of(effects):
+        one = effects[free.effect]
+        parameter = one.effect.parameters[free.parameter]
+        value = one.values[parameter.name]
+        step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
+    scaling = np.array(step)
+    share = np.divide(1.0, scaling, out=np.zeros_like(scaling), where=scaling != 0) / np.count_nonzero(scaling)
+    freed = [one - share[:, None] * (scaling @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
+    p = linear.count
+    return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
 def _fine_steps(linear: LinearModel) -> Array:

@@ -151,17 +151,23 @@ def _steady_of(signal: SignalResiduals) -> Array:
     return steady_power(power, motion)
 
 
-def excess_over_noise(posterior: Posterior, state: State, chance: float, noise: Noise | None = None) -> float:
-    """Share by which the residual is above the noise and the discrepancy of two right simulations, of the run and the
-    signal where it is largest. A run so short that noise alone may do the same with this probability counts no higher
-    than ``UNEXPLAINED``.
+def excess_over_noise(posterior: Posterior, state: State, chance: float) -> float:
+    """The largest of ``excess_by_signal``, whose arguments these are."""
+    return max(excess_by_signal(posterior, state, chance).values())
+
+
+def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: Noise | None = None
+                     ) -> dict[str, float]:
+    """Share by which the residual is above the noise and the discrepancy of two right simulations, by name of the
+    signal (empty: the sensor's acceleration), of the run where it is largest. A run so short that noise alone may do
+    the same with this probability counts no higher than ``UNEXPLAINED``.
 
     noise    of the sensors, where it is known; None: estimated from the residuals
     """
     from scipy.special import gammainccinv
 
     signals = _by_signal(posterior, state)
-    count, found = sum(len(one.bands) for one in signals), []
+    count, found = sum(len(one.bands) for one in signals), dict[str, float]()
     for signal in signals:
         own = noise or _noise_of(signal)
         for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True):
@@ -169,8 +175,9 @@ def excess_over_noise(posterior: Posterior, state: State, chance: float, noise: 
             expected = one.freedom @ (own.deviation_mps2**2 / share + one.floor)
             above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
             by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / count) / (freedom / 2))) - 1
-            found.append(above if above > by_chance else min(above, UNEXPLAINED))
-    return max(found)
+            above = above if above > by_chance else min(above, UNEXPLAINED)
+            found[signal.name] = max(above, found.get(signal.name, above))
+    return found
 
 
 def floor_error(posterior: Posterior, noise: Noise) -> float:

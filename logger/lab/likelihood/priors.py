@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from logger.runs import ENCODER, SENSOR, Signal
 from logger.vehicle.named_parameters import WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
@@ -35,7 +36,9 @@ class Tolerance:
     numbers      of masses, inertias, springs and dampers, as a share: 20 % either way, as data sheets and textbook cars
                  are off by (in twelve such files 4 % either way named false effects, 20 % none)
     lengths      of places on the car, as a share
-    gain         of the acceleration, as a share
+    gain         of the sensor's acceleration, as a share
+    scale        of the gain of any other signal, as a share: a per cent, as a travel sensor, a laser or a load cell has
+                 with its mounting; of an encoder, which counts, a tenth of that (judgements)
     droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
                  each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
     band         in which numbers may well be, in these deviations: 20 % either way have 12.5 %
@@ -45,6 +48,7 @@ class Tolerance:
     numbers: float = 0.125
     lengths: float = 0.02
     gain: float = 0.005
+    scale: float = 0.01
     droop: float = 0.4
     band: float = 1.6
     by_name: Mapping[str, float] = field(default_factory=dict)
@@ -53,6 +57,12 @@ class Tolerance:
     def largest(self) -> float:
         """The largest standard deviation of a mass, inertia, spring or damper."""
         return max(self.numbers, *self.by_name.values(), 0.0)
+
+    def gain_of(self, signal: Signal) -> float:
+        """Of what a sensor reads, as a share."""
+        if signal.kind == ENCODER:
+            return 0.1 * self.scale
+        return self.gain if signal.name == SENSOR else self.scale
 
     def widened(self) -> Tolerance:
         """Nothing is known of any number of which the file does not say how well it is known."""

@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import own_slopes, range_of
-from logger.profiles.excitation import Excitation
+from logger.lab.likelihood.map_fit import own_slopes, range_of, without_common_scale
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
-from logger.vehicle.uncertain import NumberErrors, grows_with_mass
+from logger.vehicle.uncertain import NumberErrors
 
 Array = npt.NDArray[np.float64]
 
@@ -92,7 +91,7 @@ def _number_errors(linear: LinearModel, covariance: Array) -> NumberErrors:
 def _covariance(linear: LinearModel) -> Array:
     """Covariance of the logarithms of the car's numbers, then of the effects' numbers on their scales; infinite where
     nothing is known."""
-    linear, slopes = _without_common_scale(linear, own_slopes(linear))
+    linear, slopes = without_common_scale(linear, linear.state.effects, own_slopes(linear))
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0
@@ -100,30 +99,6 @@ def _covariance(linear: LinearModel) -> Array:
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
     return np.asarray(np.where(np.outer(known, known), inverse / np.outer(scale, scale),
                                np.diag(np.where(known, 0.0, np.inf))))
-
-
-def _without_common_scale(linear: LinearModel, own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
-    """The derivatives by the car's numbers and by those of its effects (m, n), per run, without a common scale of all
-    masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
-    that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
-    to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
-    drives a rig shows the size."""
-    state, prior, numbers = linear.state, linear.prior, linear.numbers
-    forced = any(isinstance(run.track, Excitation) and run.track.forces for run in linear.posterior.runs.runs)
-    if forced or numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
-            state.effects, state.logs).bends_laws:
-        return linear, own
-    step = [float(grows_with_mass(name)) for name in prior.names]
-    for free in free_parameters_of(state.effects):
-        one = state.effects[free.effect]
-        parameter = one.effect.parameters[free.parameter]
-        value = one.values[parameter.name]
-        step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
-    scaling = np.array(step)
-    share = np.divide(1.0, scaling, out=np.zeros_like(scaling), where=scaling != 0) / np.count_nonzero(scaling)
-    freed = [one - share[:, None] * (scaling @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
-    p = linear.count
-    return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
 def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array,

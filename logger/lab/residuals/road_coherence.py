@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Way
 from logger.runs import Run
 
@@ -63,10 +65,11 @@ class Coherence:
 
 
 def coherence_with_road(residuals: ModelResiduals) -> Coherence:
-    """The coherence of residuals with the road under the wheels that the car has."""
-    axles_m = np.unique(residuals.car.structure.behind_m)
+    """The coherence of residuals with the road under the wheels that the car has, or with what drives a rig."""
     residual = segments(residuals, residuals.residual)
-    roads = np.stack([segments(residuals, _slopes(residuals, one)) for one in axles_m], axis=2)
+    axles_m = np.unique(residuals.car.structure.behind_m)
+    inputs = [_slopes(residuals, one) for one in axles_m] + _forces(residuals)
+    roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
     count = len(residual)
     power = np.mean(np.abs(residual) ** 2, axis=0)
     own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
@@ -75,7 +78,7 @@ def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     found = np.einsum("fi,fi->f", cross.conj(), gain).real
     raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)
     # Segments that overlap by half, with a Hann taper, are worth 18 / 19 of their number (P. D. Welch 1967).
-    q, n = len(axles_m), 0.947 * count
+    q, n = len(inputs), 0.947 * count
     chance = q / n
     share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
     return Coherence(frequencies(residuals), share, raw, q, n, power)
@@ -89,3 +92,20 @@ def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
         return np.gradient(height, 1 / run.rate_hz)
 
     return residuals.kept(of)
+
+
+def _forces(residuals: ModelResiduals) -> list[list[Array]]:
+    """The forces that drive a rig, the samples that count, per run [N]; none where not all runs have the same."""
+    forces = {run.track.forces if isinstance(run.track, Excitation) else () for run in residuals.runs}
+    if len(forces) > 1:
+        return []
+    return [residuals.kept(lambda run, index=index: run.track.forces_n(run.time_s)[:, index])
+            for index in range(len(*forces))]
+
+
+def best_linear_share(residuals: ModelResiduals, error: float) -> float | None:
+    """The share of the measured power that a linear car could explain at most: what the model explains, whose
+    normalised r.m.s. error is ``error``, and of its residual what is coherent with the road or what drives the rig.
+    None where runs are too short for that."""
+    share, chance = coherence_with_road(residuals).explained(LOWEST_HZ, residuals.top_hz)
+    return None if np.isnan(chance) else 1 - error**2 * (1 - share)

@@ -21,6 +21,7 @@ class SensorGain(SensorEffect):
     source = "data sheets of accelerometers give scale errors of some per cent"
     signature = "the measurement is the model times one factor, at every frequency, speed and strength"
     shown_by = "turn the sensor over at rest: the readings must differ by 2 g"
+    not_of = ("encoder",)
     stage = 2
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:

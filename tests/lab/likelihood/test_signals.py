@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.likelihood.distance_error import derivative
+from logger.lab.likelihood.distance_error import derivative, signals_off
+from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.readings import Readings
@@ -132,8 +133,29 @@ def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:
     slopes = error.slopes(state.predictions[0]).toarray()[curve].sum(axis=0).reshape(-1, run.count)
     for one, other in zip(slopes, expected, strict=True):
         assert np.corrcoef(one, other)[0, 1] > 0.98
-    gain = error.slopes(state.predictions[0]).toarray()[-2].reshape(-1, run.count)
-    assert not gain[1:].any()
+    gains = error.slopes(state.predictions[0]).toarray()[[error.places, -1]].reshape(2, -1, run.count)
+    assert not gains[0, 1:].any() and not gains[1, :-1].any()
+    assert gains[1, -1] == pytest.approx(state.predictions[0][-run.count:])
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.015, {}), (0.1, {"travel_m": pytest.approx(0.1, abs=0.005)})])
+def test_a_signal_whose_scale_is_off_moves_no_number_of_the_car(run: Run, share: float, named: dict[str, float]) -> None:
+    """A travel sensor that reads too much: its gain is found, and named where no sensor is off so far."""
+    travel = SIGNALS[-1:]
+    (true,) = SimulatedRuns([with_signals(run, travel)], FINE_HZ).predict(compose(CAR))
+    noise = np.random.default_rng(5).normal(0, 1, (2, run.count)) * np.array([[0.02], [2e-5]])
+    body, moved = true.reshape(2, -1)
+    seen = replace(with_signals(run, travel), measured_mps2=body + noise[0], more=(1 + share) * moved[None] + noise[1:])
+    posterior = Posterior(SimulatedRuns([seen], FINE_HZ), CAR, Tolerance())
+    found = fit_model(posterior, posterior.start()).state
+    assert np.abs(found.logs).max() < 0.01
+    assert posterior.record_errors[0].signal_gains(found.record[0]) == pytest.approx([share], abs=0.005)
+    assert signals_off(posterior.record_errors, found.record) == named
+
+
+def test_a_counting_sensor_has_no_gain_to_speak_of() -> None:
+    known = Tolerance()
+    assert known.gain_of(replace(SIGNALS[-1], kind="encoder")) == pytest.approx(known.gain_of(SIGNALS[-1]) / 10)
 
 
 def test_a_run_holds_as_many_samples_of_each() -> None:
