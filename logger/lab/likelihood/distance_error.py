@@ -249,7 +249,7 @@ class RigRecordError(RecordError):
 
     @property
     def trend(self) -> Array:
-        return np.empty((2, 0))
+        return np.empty((self.count, 0))
 
     def precision(self, size: ErrorSize) -> Array:
         return np.diag(self._recorder_deviations**-2)

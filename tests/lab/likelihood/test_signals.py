@@ -139,7 +139,7 @@ def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:
 
 
 @pytest.mark.parametrize(("share", "named"), [(0.015, {}), (0.1, {"travel_m": pytest.approx(0.1, abs=0.005)})])
-def test_a_signal_whose_scale_is_off_moves_no_number_of_the_car(run: Run, share: float, named: dict[str, float]) -> None:
+def test_a_signal_whose_scale_is_off_moves_no_number(run: Run, share: float, named: dict[str, float]) -> None:
     """A travel sensor that reads too much: its gain is found, and named where no sensor is off so far."""
     travel = SIGNALS[-1:]
     (true,) = SimulatedRuns([with_signals(run, travel)], FINE_HZ).predict(compose(CAR))
