@@ -11,6 +11,7 @@ variance. Neighbouring frequencies of tapered segments are correlated: every oth
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -96,11 +97,13 @@ def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
 
 def _forces(residuals: ModelResiduals) -> list[list[Array]]:
     """The forces that drive a rig, the samples that count, per run [N]; none where not all runs have the same."""
-    forces = {run.track.forces if isinstance(run.track, Excitation) else () for run in residuals.runs}
-    if len(forces) > 1:
-        return []
-    return [residuals.kept(lambda run, index=index: run.track.forces_n(run.time_s)[:, index])
-            for index in range(len(*forces))]
+    counts = {len(run.track.forces) if isinstance(run.track, Excitation) else 0 for run in residuals.runs}
+
+    def of(run: Run, index: int) -> Array:
+        assert isinstance(run.track, Excitation)
+        return run.track.forces_n(run.time_s)[:, index]
+
+    return [residuals.kept(partial(of, index=index)) for index in range(counts.pop() if len(counts) == 1 else 0)]
 
 
 def best_linear_share(residuals: ModelResiduals, error: float) -> float | None:
