@@ -95,6 +95,7 @@ class Diagnosis:
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
                          farthest first, by their tolerance; of masses and forces, against their mean
+    shows_forces         whether a force was measured, so that these are known for themselves
     as_moved             the effect that changes the records as the move of all of these does; None: none does
     effects              of the model that it ends with, with standard errors
     undetectable         effects that these runs could not show at their usual strength
@@ -143,6 +144,7 @@ class Diagnosis:
     contradicted: tuple[str, ...] = ()
     as_moved: Chosen | None = None
     best_linear: float | None = None
+    shows_forces: bool = False
 
     @property
     def explained(self) -> tuple[float, float]:
@@ -249,15 +251,15 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
-        moved={name: one for name, one in fine.prior.moved(state.logs, errors.covariance).items()
-               if name not in beyond},
+        moved={name: one for name, one in fine.prior.moved(
+            state.logs, errors.covariance, fine.shows_forces).items() if name not in beyond},
         ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        best_linear=_best_linear(selection.before),
+        shows_forces=fine.shows_forces, best_linear=_best_linear(selection.before),
         signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
         car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
@@ -284,12 +286,14 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
     by_road = all(run.facts.places_by == BY_ROAD for run in runs)
     there = {one.effect.name for one in present}
-    kinds = {run.facts.main.kind for run in runs}
+    sensors = [run.facts.main for run in runs]
     found = {}
     for name, effect in effects.items():
         why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
-        if why is None and kinds <= set(effect.not_of):
-            why = f"no {' or '.join(sorted(filter(None, kinds)))} has it"
+        if why is None and all(one.kind in effect.not_of for one in sensors):
+            why = f"no {' or '.join(sorted({str(one.kind) for one in sensors}))} has it"
+        if why is None and all(one.measures in effect.found_of for one in sensors):
+            why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
         if why is None and by_road and not effect.reshapes:
             why = LAID_BY_THE_ROAD
         if why is not None:

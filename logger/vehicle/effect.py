@@ -184,6 +184,7 @@ class Effect(ABC):
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
     not_of       kinds of sensors that cannot have it
+    found_of     what sensors measure whose records have it in any model, to a per cent
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
     """
@@ -202,6 +203,7 @@ class Effect(ABC):
     needs_wheel: bool = False
     needs_body: bool = False
     not_of: tuple[str, ...] = ()
+    found_of: tuple[str, ...] = ()
     also_by: tuple[str, ...] = ()
     stage: int = 0
 

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
-from logger.runs import RECEIVER_ERROR_LASTS_S, Run
+from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -293,13 +293,16 @@ def unusual_distance_error_m(errors: Sequence[RecordError], record: Sequence[Arr
 
 
 def signals_off(errors: Sequence[RecordError], record: Sequence[Array]) -> dict[str, float]:
-    """By what share further signals read more than the rest of what was measured says, numbers (k,) per run, by name:
-    those whose gain is in conflict with its prior."""
+    """By what share signals read more than all else says that is known, numbers (k,) per run, by name: those whose gain
+    is in conflict with its prior, but for the sensor's acceleration, whose gain is an effect."""
     found: dict[str, list[float]] = {}
+    known: dict[str, float] = {}
     for one, k in zip(errors, record, strict=True):
-        for signal, gain in zip(one.run.signals, one.signal_gains(k), strict=True):
-            found.setdefault(signal.name, []).append(float(gain))
-    known = {signal.name: one.tolerance.gain_of(signal) for one in errors for signal in one.run.signals}
+        signals = (one.run.facts.main, *one.run.signals)
+        for signal, gain in zip(signals, [k[one.places], *one.signal_gains(k)], strict=True):
+            if signal.name != SENSOR:
+                found.setdefault(signal.name, []).append(float(gain))
+                known[signal.name] = one.tolerance.gain_of(signal)
     shares = {name: float(np.mean(gains)) for name, gains in found.items()}
     return {name: share for name, share in shares.items() if abs(share) > CONFLICT_SIGMA * known[name]}
 

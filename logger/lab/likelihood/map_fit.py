@@ -21,7 +21,6 @@ from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offse
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
 from logger.lab.likelihood.posterior import Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
-from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter
 from logger.vehicle.named_parameters import (
@@ -306,10 +305,9 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
     masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
     that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
     to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
-    drives a rig shows the size."""
+    was measured shows the size."""
     prior, numbers = linear.prior, linear.numbers
-    forced = any(isinstance(run.track, Excitation) and run.track.forces for run in linear.posterior.runs.runs)
-    if forced or numbers is None or own is None or any(one.file for one in effects) or not linear.posterior.car(
+    if linear.posterior.shows_forces or numbers is None or own is None or any(one.file for one in effects) or not linear.posterior.car(
             effects, linear.state.logs).bends_laws:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]

@@ -12,6 +12,7 @@ from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
+from logger.profiles.excitation import Excitation
 from logger.runs import normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
@@ -68,6 +69,13 @@ class Posterior:
         counted = np.concatenate([run.kept_mps2[run.read[run.first:]] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
+
+    @property
+    def shows_forces(self) -> bool:
+        """Whether a force was measured, that drives a rig or that a part pulls back with: else a car in which all
+        masses and forces are larger by one factor moves the same."""
+        return any(signal.measures == "force" for run in self.runs.runs for signal in (run.facts.main, *run.signals)
+                   ) or any(isinstance(run.track, Excitation) and run.track.forces for run in self.runs.runs)
 
     def simulated_finely(self) -> Posterior:
         """The posterior with runs simulated as finely as what is reported."""

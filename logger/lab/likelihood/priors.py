@@ -141,16 +141,17 @@ class VehiclePrior:
             return {}
         return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-np.abs(place)) if ended[index]}
 
-    def moved(self, logs: Array, covariance: Array) -> dict[str, tuple[float, float]]:
+    def moved(self, logs: Array, covariance: Array, shows_forces: bool = False) -> dict[str, tuple[float, float]]:
         """Relative changes of the numbers that the runs move for sure and farther than half of all right numbers are
         off, and their standard errors, the farthest first, by their tolerance; arguments as of ``beyond_tolerance``.
 
         A car in which all masses and forces are larger by one factor moves the same. So these are counted against the
-        one of them that moves as the median does: where most are right, a wrong one is named alone.
+        one of them that moves as the median does: where most are right, a wrong one is named alone. Where the runs show
+        forces, each is counted for itself.
         """
         scaling = np.flatnonzero([grows_with_mass(name) for name in self.names])
         against = np.eye(len(logs))
-        if len(scaling):
+        if len(scaling) and not shows_forces:
             middle = scaling[np.argsort(logs[scaling])[len(scaling) // 2]]
             against[scaling, middle] -= 1.0
         logs, errors = against @ logs, np.sqrt(np.maximum(np.diag(against @ covariance @ against.T), 0.0))

@@ -22,6 +22,7 @@ class SensorGain(SensorEffect):
     signature = "the measurement is the model times one factor, at every frequency, speed and strength"
     shown_by = "turn the sensor over at rest: the readings must differ by 2 g"
     not_of = ("encoder",)
+    found_of = ("velocity", "displacement", "force", "travel")
     stage = 2
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
