@@ -253,7 +253,8 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
             slopes = effect_slopes(linear, at.effects, at.logs, free_parameters, at.record, at.predictions)
             known = x.copy(), at, slopes
             if linear.prior.is_vague:
-                here, slopes = without_common_scale(linear, at.effects, slopes)
+                here, freed = without_common_scale(linear, at.effects, slopes)
+                slopes = freed or slopes
             own = linear.whitened(slopes)
         information = here.information(own)
         information[p:, p:] += unseen
@@ -306,9 +307,10 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
     that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
     to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
     was measured shows the size."""
-    prior, numbers = linear.prior, linear.numbers
-    if linear.posterior.shows_forces or numbers is None or own is None or any(one.file for one in effects) or not linear.posterior.car(
-            effects, linear.state.logs).bends_laws:
+    prior, numbers, posterior = linear.prior, linear.numbers, linear.posterior
+    if numbers is None or own is None or posterior.shows_forces or any(one.file for one in effects):
+        return linear, own
+    if not posterior.car(effects, linear.state.logs).bends_laws:
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]
     for free in free_parameters_of(effects):
