@@ -423,10 +423,10 @@ def _moved(found: LabDiagnosis) -> str:
              for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
     rest = len(found.moved) - len(shown)
     more = f", and {rest} more" * bool(rest)
-    relative = (" (Masses, springs and dampers are relative to each other: no run shows a factor common to all.)"
-                * (not found.shows_forces))
-    return (f"The refit moved parameters of the vehicle's file: {', '.join(shown)}{more}.{relative} Measure one of them "
-            "and put it into the file; an effect that does the same would then show.")
+    relative = "" if found.shows_forces else (
+        " (Masses, springs and dampers are relative to each other: no run shows a factor common to all.)")
+    return (f"The refit moved parameters of the vehicle's file: {', '.join(shown)}{more}.{relative} Measure one of "
+            "them and put it into the file; an effect that does the same would then show.")
 
 
 def _alike(one: Undetectable) -> str:
