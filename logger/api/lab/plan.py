@@ -172,14 +172,15 @@ def summary(found: LabPlan) -> list[str]:
     from_where = ("as in the runs" if found.measured else "as given or usual")
     lines = [f"ridelog diagnose would name {named} of {len(found.names)} effects, each alone and of usual strength, "
              f"from {count} drive{'s' * (count != 1)} of {seconds:.0f} s in all with noise of "
-             f"{found.noise.variance**0.5:.3g} m/s2 r.m.s. ({from_where})."]
+             f"{found.noise.variance**0.5:.3g} {found.unit} r.m.s. ({from_where})."]
     if found.groups:
         lines.append("Detected, but not distinguished: " + "; ".join(", ".join(one) for one in found.groups) + ".")
     hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
         lines.append(f"Too faint in these drives: {', '.join(hidden)}.")
-    lines += [f"{name}: not tried; {why}." for name, why in found.obstacles.items()]
-    return lines
+    reasons = dict.fromkeys(found.obstacles.values())
+    return lines + [f"Not tried, as {why}: {', '.join(name for name, one in found.obstacles.items() if one == why)}."
+                    for why in reasons]
 
 
 def rows(found: LabPlan) -> list[tuple[str, str, str, str, str]]:

@@ -75,7 +75,8 @@ class Plan:
     """The effects that some drives could show, and next drives.
 
     drives       names and seconds of the runs and the planned drives
-    noise        of the accelerometers; ``measured``: whether it is that of the runs
+    noise        of the accelerometers, or of what else the runs measure first, in its ``unit``; ``measured``: whether it
+                 is that of the runs
     names        of the effects (e,)
     effects      with the values that each is tried with (e,)
     now          what the drives could show of them
@@ -85,6 +86,7 @@ class Plan:
 
     drives: tuple[tuple[str, float], ...]
     noise: SensorNoise
+    unit: str
     measured: bool
     names: tuple[str, ...]
     effects: tuple[Chosen, ...]
@@ -123,7 +125,9 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
         progress("refitting the car's own numbers")
         fitted = fit_model(runs, runs.start(there.effects))
         there = replace(there, logs=fitted.state.logs)
-        noise = noise or SensorNoise(sensor_noise_of(fitted.posterior, fitted.state).deviation_mps2)
+        main = runs.runs.runs[0].facts.main
+        further_mps2 = None if main.measures == "acceleration" else usual_noise.noise_mps2
+        noise = noise or SensorNoise(sensor_noise_of(fitted.posterior, fitted.state).deviation_mps2, 0.0, further_mps2)
     noise = noise or usual_noise
     drives = [PlannedDrive(one, there, noise) for one in planned]
     posteriors = [*([fitted.posterior] if fitted is not None else []), *(one.posterior for one in drives)]
@@ -152,7 +156,8 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
                 after = total + one.drive.information(changes, signals)
                 following.append(_next(option, settings, now, outlook(settings, after, analysis.precision, columns)))
     return Plan(
-        tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
+        tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise,
+        base[0].facts.main.unit, measured,
         tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), refitted,
         obstacles,
         tuple(sorted(following, key=lambda one: (-round(one.more_named, 1), -len(one.gains)))))

@@ -50,10 +50,12 @@ that a delay of some hundredths of a second or a wheel radius that is wrong by a
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Noise of the accelerometers: r.m.s., and the step that they round to [m/s2]; 0: none."""
+    """Noise of the accelerometers: r.m.s., and the step that they round to [m/s2]; 0: none. Where the first sensor is
+    no accelerometer it is in its unit, and ``further_mps2`` is that of accelerometers that may be added."""
 
     noise_mps2: float
     step_mps2: float = 0.0
+    further_mps2: float | None = None
 
     @property
     def variance(self) -> float:
@@ -62,7 +64,7 @@ class SensorNoise:
 
     def variance_of(self, signal: Signal | None) -> float:
         """Variance of a reading of a signal, or of the sensor (None), in the square of its unit."""
-        known = SIGNAL_NOISE.get(signal.measures) if signal is not None else None
+        known = SIGNAL_NOISE.get(signal.measures, self.further_mps2) if signal is not None else None
         return self.variance if known is None else known**2
 
 
@@ -94,8 +96,8 @@ def at_speed(name: str, track: Track, vehicle: Vehicle, speed_mps: float, signal
 def repeat_run(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
     """The beginning of a run repeated, with other signals and an empty record."""
     count = min(run.count, int(most_s * run.rate_hz))
-    return replace(_empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals),
-                   rate_hz=run.rate_hz)
+    empty = _empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals)
+    return replace(empty, rate_hz=run.rate_hz, facts=replace(empty.facts, main=run.facts.main))
 
 
 def _empty(name: str, track: Track | Excitation, distance_m: Array, speed_mps: Array, signals: Sequence[Signal]) -> Run:
@@ -270,8 +272,11 @@ def option_drives(there: PlannedCar, noise: SensorNoise, road: Track | None, kno
 
 def second_sensors(vehicle: Vehicle) -> list[Signal]:
     """Second sensors that a vehicle of this model may have."""
-    sides = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "rear_left")}[len(structure_of(vehicle).wheels)]
-    found = [Signal(f"wheel_{side}_mps2", "acceleration", f"{side}_wheel") for side in sides]
+    structure = structure_of(vehicle)
+    if structure.held:
+        return []  # its bench moves it: the force is all that there is to measure
+    sides = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "rear_left")}[len(structure.wheels)]
+    found = [Signal(f"wheel_{side}_mps2", "acceleration", f"{side}_wheel") for side in sides if not structure.on_base]
     found += [Signal(f"travel_{side}_m", "travel", f"{side}_suspension") for side in sides]
     if len(sides) > 1:
         found += [Signal("pitch_rate_rad_per_s", "pitch_rate"),
