@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 # Directions with less of the numbers' variance than this are rounding.
 _LEAST_VARIANCE = 1e-6
+_HALF_NORMAL = (-float(np.euler_gamma + np.log(2)) / 2, float(np.pi / np.sqrt(8)))
+"""Mean and standard deviation of ln |z| of a standard normal z."""
 _FARTHEST = 1.0  # a size that may be off by more than a factor e is not known at all
 
 
@@ -39,9 +41,13 @@ class Known:
 
     @classmethod
     def about(cls, value: float, deviation: float, percent: bool) -> Known:
-        """A value and its standard deviation, in its unit or in ``percent`` of it."""
+        """A value and its standard deviation, in its unit or in ``percent`` of it. Of a size that is 0 within its
+        deviation the logarithm has the mean and deviation of a half-normal variable's."""
+        words = f"{value!r} +- {deviation:g}{'%' * percent}"
+        if value == 0:
+            return cls(deviation * exp(_HALF_NORMAL[0]), _HALF_NORMAL[1], words)
         share = deviation / (100.0 if percent else value)
-        return cls(value, share, f"{value!r} +- {deviation:g}{'%' * percent}")
+        return cls(value, share, words)
 
     @classmethod
     def within(cls, low: float, high: float) -> Known:

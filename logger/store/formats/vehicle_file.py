@@ -39,7 +39,7 @@ from logger.shipped import shipped
 from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.vehicle.effect import Chosen
 from logger.vehicle.models import GOLDEN_CAR
-from logger.vehicle.named_parameters import changed, names, read, sized
+from logger.vehicle.named_parameters import PRELOAD, changed, names, read, sized
 from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, OWN_NAMES, Axle, SensorPlace, Vehicle
 
@@ -87,6 +87,7 @@ _SHORTEST_WHEELBASE_M = 0.01
 _USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5,
           "contact_patch_m": 0.15, _ANTI_ROLL_KEY: 1e4}
 _NUMBERS = {*_LIMITS, *_LIMITS_PER_KG, *(name for own in OWN_NAMES.values() for name in own)}
+_MAY_BE_NOTHING = {PRELOAD, *(name for name in OWN_NAMES["component"] if name != "mass_kg")}
 _ROUNDING = 1e-12
 _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40
 
@@ -212,22 +213,32 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
 
 
 def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
-    """The number of a node without how well it is known, which is added to ``known``. BadInput for what says neither.
-    """
+    """The number of a node without how well it is known, which is added to ``known``; not that of a preload, which any
+    fit finds as a constant of its record. BadInput for what says neither."""
+    is_signed = name == PRELOAD
     if isinstance(node.content, tuple):
-        ends = [one.number(above=0.0) for one in node.content]
+        ends = [one.number() if is_signed else one.number(above=0.0) for one in node.content]
         if len(ends) != 2 or not ends[0] < ends[1]:
             raise node.wrong("a range, [low, high]")
-        one = Known.within(*ends)
+        one = None if is_signed else Known.within(*ends)
+        value = sum(ends) / 2
     elif isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
-        value, spread = (replace(node, content=text, plain=True).number(above=0.0) for text in said.groups()[:2])
-        one = Known.about(value, spread, bool(said[3]))
-        if one.deviation > 1:
+        number, deviation = (replace(node, content=text, plain=True) for text in said.groups()[:2])
+        value = number.number() if is_signed else number.number(low=0.0)
+        spread, percent = deviation.number(above=0.0), bool(said[3])
+        if value == 0 and (percent or name not in _MAY_BE_NOTHING):
+            raise node.wrong("a number above 0 before +-" if name not in _MAY_BE_NOTHING else
+                             "a standard deviation in the unit of the number, as a share of 0 is 0")
+        one = None if is_signed else Known.about(value, spread, percent)
+        if one is not None and value > 0 and one.deviation > 1:
             raise node.wrong(f"a standard deviation up to the number itself, or {UNKNOWN}")
+    elif is_signed and _is_unknown(node):
+        one, value = None, 0.0
     else:
         return node
-    known[name] = one
-    return replace(node, content=repr(one.value), plain=True)
+    if one is not None:
+        known[name], value = one, one.value
+    return replace(node, content=repr(value), plain=True)
 
 
 def _is_unknown(node: Node) -> bool:
@@ -245,7 +256,7 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
         for key, one in content.items():
             if key in _NUMBERS:
                 content[key] = _plain_number(one, part + key, known)
-                unknown.extend([part + key] * _is_unknown(one))
+                unknown.extend([part + key] * _is_unknown(content[key]))
             elif key in ("front", "rear") and isinstance(one.content, Mapping):
                 content[key] = plain(one, f"{key}.")
         return replace(node, content=content)
@@ -264,7 +275,9 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
     found = plain(top)
     if not unknown:
         return found, known
-    mass = "mass_kg" if "mass_kg" in found.mapping() else "sprung_mass_kg"
+    is_part = "model" in found.mapping() and found.mapping()["model"].content == "component"
+    # A part alone is one of a car, however little of it moves.
+    mass = "mass_kg" if "mass_kg" in found.mapping() and not is_part else "sprung_mass_kg"
     mass_kg = _usual_number(mass, 1.0)
     if mass in found.mapping() and mass not in unknown:
         mass_kg = found.mapping()[mass].number(above=0.0)

@@ -568,11 +568,28 @@ def test_a_number_says_how_well_it_is_known(tmp_path: Path, said: str, value: fl
     ("[80, 20]", "a range, [low, high], found a list"), ("[20]", "a range, [low, high], found a list"),
     ("40 +- 300%", "a standard deviation up to the number itself, or unknown"),
     ("40 +- 0", "greater than 0, found '0'"),
-    ("40 kg +- 2", "greater than 0, found '40 kg'"), ("unknwon", "a number of at least 0, found 'unknwon'")])
+    ("40 kg +- 2", "a number of at least 0, found '40 kg'"), ("0 +- 2", "a number above 0 before +-, found '0 +- 2'"), ("unknwon", "a number of at least 0, found 'unknwon'")])
 def test_what_says_nothing_of_a_number_is_refused_with_its_line(tmp_path: Path, said: str, expected: str) -> None:
     text = QUARTER.replace("unsprung_mass_kg: 40", f"unsprung_mass_kg: {said}")
     message = complaint(tmp_path, text)
     assert message.startswith(f"{line_of(text, '  unsprung_mass_kg')}: ") and expected in message
+
+
+@pytest.mark.parametrize(("stiffness", "preload", "stiffness_n_per_m", "preload_n"), [
+    ("0 +- 2000", "-60 +- 20", 2000 * np.exp(-0.63518), -60.0),  # the mean of ln |z| is -(Euler's gamma + ln 2) / 2
+    ("unknown", "unknown", 350 * 63.3, 0.0), ("30 +- 10%", "[-100, 40]", 30.0, -30.0), ("0", "5", 0.0, 5.0)])
+def test_a_part_may_have_no_spring_and_any_preload(
+        tmp_path: Path, stiffness: str, preload: str, stiffness_n_per_m: float, preload_n: float) -> None:
+    path = tmp_path / "damper.yaml"
+    path.write_text(f"name: damper\nmodel: component\nstiffness_n_per_m: {stiffness}\n"
+                    f"damping_n_s_per_m: 1500\npreload_n: {preload}\n", "utf-8")
+    model = read_model(path)
+    assert model.vehicle.front.suspension_stiffness_n_per_m == pytest.approx(stiffness_n_per_m, rel=1e-5)
+    assert model.vehicle.preload_n == preload_n
+    assert "preload_n" not in model.known
+    path.write_text(path.read_text("utf-8").replace(stiffness, "0 +- 20%", 1), "utf-8")
+    with pytest.raises(BadInput, match=f"{path}:3: expected .* as a share of 0 is 0, found '0 .- 20%'"):
+        read_model(path)
 
 
 def test_no_number_is_unknown_on_board(tmp_path: Path) -> None:
