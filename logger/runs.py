@@ -170,7 +170,8 @@ class Run:
     more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
     low_pass         what was found of it; None: nothing
     outside_mps2     r.m.s. of what a model and the sensor differ by outside of the pass band [m/s2]
-    cut_s            how much of its drive is in no run, as the car stood or nothing was read; of one run of a drive
+    cut_s            how much of its drive is in no run, as nothing drove it or nothing was read; of one run of a
+                     drive
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -316,7 +317,7 @@ def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> flo
 def runs_left_out(runs: Sequence[Run]) -> tuple[LeftOut, ...]:
     """What of the drives that these runs are of is compared with nothing."""
     return counting((
-        LeftOut(sum(run.cut_s for run in runs), "s", "in which the car stood or nothing was read"),
+        LeftOut(sum(run.cut_s for run in runs), "s", "in which nothing drove it or nothing was read"),
         LeftOut(sum(run.first / run.rate_hz for run in runs), "s", "at the beginning of runs, as the car's past is not "
                 "known"),
         LeftOut(sum(np.count_nonzero(~run.read[run.first:]) / run.rate_hz for run in runs), "s",

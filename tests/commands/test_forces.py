@@ -208,6 +208,41 @@ def test_a_part_alone_on_its_bench_answers_as_its_equation_says(tmp_path: Path) 
     assert ridelog.read_vehicle(tmp_path / "found.yaml").vehicle == found.model.vehicle
 
 
+@pytest.mark.parametrize(("drive_loses", "excitation_ends_s"), [(None, 12.0), (700, 12.0), (None, 7.0)])
+def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the_excitation(
+        tmp_path: Path, drive_loses: int | None, excitation_ends_s: float, capsys: pytest.CaptureFixture[str]) -> None:
+    """Steps of a microcontroller's clock that are off by a quarter, one sample lost: the force is that of the equation
+    at each time."""
+    way, draw = noise(3.0, 0.02, 6), np.random.default_rng(5)
+    (tmp_path / "run").mkdir()
+    for name, column in (("excitation.csv", "displacement_m"), ("drive.csv", "force_n")):
+        time_s = np.sort(TIME_S + draw.normal(0.0, 0.25 / RATE_HZ, len(TIME_S)) * (draw.random(len(TIME_S)) < 0.2))
+        time_s = np.clip(time_s, 0, TIME_S[-1]) + 1e-7 * np.arange(len(time_s))
+        if name == "drive.csv":
+            time_s = np.delete(time_s, drive_loses) if drive_loses is not None else time_s
+            values = 400.0 * way(time_s) + 90.0 * way(time_s, 1)
+        else:
+            time_s = time_s[time_s <= excitation_ends_s]
+            values = way(time_s)
+        np.savetxt(tmp_path / "run" / name, np.stack([time_s, values], axis=1), "%.12g", ",", header=f"t_s,{column}",
+                   comments="")
+    (tmp_path / "part.yaml").write_text("name: damper\nmodel: component\nstiffness_n_per_m: 400\n"
+                                        "damping_n_s_per_m: 90\n")
+    assert main(["compare", "--vehicle", str(tmp_path / "part.yaml"), str(tmp_path / "run"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["error"] < 0.01
+    not_driven = [one["amount"] for one in found["left_out"] if "nothing drove it" in one["why"]]
+    assert not_driven == ([pytest.approx(12.0 - excitation_ends_s, abs=0.02)] if excitation_ends_s < 12 else [])
+
+
+def test_a_clock_that_loses_several_samples_in_a_row_is_refused_with_its_line(tmp_path: Path) -> None:
+    run = bench_of_a_part(tmp_path)
+    lines = (run / "drive.csv").read_text().splitlines()
+    (run / "drive.csv").write_text("\n".join(lines[:100] + lines[105:]) + "\n")
+    with pytest.raises(BadInput, match=r"drive.csv:101: expected samples evenly 0.004 s apart, found a step of 0.024"):
+        ridelog.compare(tmp_path / "part.yaml", [run])
+
+
 def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = bench_of_a_part(tmp_path)
     text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")

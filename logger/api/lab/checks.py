@@ -315,12 +315,16 @@ def check_distances(drive: Drive, file: Path) -> None:
 
 
 def driven_stretches(drive: DriveOnRoad) -> list[Run]:
-    """The parts of a drive in which the car moved, or stood on a rig, and there were readings (``driven_parts``), each
-    a run; of one that stood or had none nowhere the whole. A part says in its name which seconds it is of. BadInput as
-    ``driven_parts``."""
+    """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
+    (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
+    from logger.profiles.excitation import Excitation
     from logger.runs import Run
 
-    parts = driven_parts(drive, drive.track.timed)
+    driven = None
+    if isinstance(drive.track, Excitation):
+        near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
+        driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
+    parts = driven_parts(drive, driven)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
     def main(part: slice) -> Array:
@@ -335,8 +339,8 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
             for part in parts]
 
 
-def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
-    """Where in a drive the car moved, or stood ``on_rig``, and there were readings.
+def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
+    """Where in a drive the car moved, or was driven ``on_rig`` (n,), and there were readings.
 
     A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
     well. One that lasts longer than that is cut out, and so are those at the ends of a part.
@@ -349,7 +353,7 @@ def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
     from logger.lab.likelihood.lag import SLOWEST_MPS
     from logger.runs import NO_READING, SKIP_S
 
-    driven = (drive.speed_mps >= SLOWEST_MPS) | on_rig
+    driven = drive.speed_mps >= SLOWEST_MPS if on_rig is None else on_rig
     read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
     kept = read.copy()
     for gap in map(slice, *stretches_of(driven & ~read)):
@@ -358,7 +362,7 @@ def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
     parts = [part for part in map(slice, *stretches_of(kept))
              if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
     if not parts:
-        moving = "" if on_rig else f" at {SLOWEST_MPS:g} m/s or faster"
+        moving = f" at {SLOWEST_MPS:g} m/s or faster" if on_rig is None else " while its excitation lasts"
         raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings{moving}, without a break of more than "
                        f"{SKIP_S:g} s")
     return parts

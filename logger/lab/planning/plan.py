@@ -75,8 +75,8 @@ class Plan:
     """The effects that some drives could show, and next drives.
 
     drives       names and seconds of the runs and the planned drives
-    noise        of the accelerometers, or of what else the runs measure first, in its ``unit``; ``measured``: whether it
-                 is that of the runs
+    noise        of the accelerometers, or of what else the runs measure first, in its ``unit``; ``measured``: whether
+                 it is that of the runs
     names        of the effects (e,)
     effects      with the values that each is tried with (e,)
     now          what the drives could show of them

@@ -41,7 +41,7 @@ from logger.store.formats.profile_file import (
     read_excitation,
     read_profile,
 )
-from logger.store.formats.record_file import DRIVE_NAME, MAX_BYTES, TIME, USABLE, VERTICAL, even_rate_hz
+from logger.store.formats.record_file import DRIVE_NAME, MAX_BYTES, TIME, USABLE, VERTICAL, even_rate_hz, laid_evenly
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
 RUN = "run.yaml"
@@ -330,7 +330,12 @@ def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = (), 
     """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns; ``main``
     in place of the sensor's acceleration. Times and errors as in ``read_run``."""
     file, columns = read_columns(path, timed, more, main)
-    return replace(drive_of(path, even_rate_hz(columns[TIME], file), columns), facts=facts_beside(path),
+    if timed and USABLE not in columns:
+        rate_hz, laid = laid_evenly(columns[TIME], np.stack(list(columns.values()), axis=1), file)
+        columns = dict(zip(columns, laid.T.copy(), strict=True))
+    else:
+        rate_hz = even_rate_hz(columns[TIME], file)
+    return replace(drive_of(path, rate_hz, columns), facts=facts_beside(path),
                    more={name: columns[name] for name in more})
 
 

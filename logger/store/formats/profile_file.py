@@ -33,7 +33,7 @@ from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.plausible import UNITS_M, unit_complaint
 from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, taken
 from logger.store.formats.erd_file import ErdFile, is_erd, parse_erd
-from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
+from logger.store.formats.record_file import MAX_BYTES, TIME, laid_evenly
 
 Array = npt.NDArray[np.float64]
 
@@ -218,8 +218,8 @@ _FEWEST = 4
 
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
     """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; or
-    of a part alone ``displacement_m``. It begins at the file's own time. A ``velocity_mps`` beside that is not read:
-    the displacement says it.
+    of a part alone ``displacement_m``. It begins at the file's own time, and has even ones (``laid_evenly``). A
+    ``velocity_mps`` beside that is not read: the displacement says it.
 
     forces    what each of its forces acts on
 
@@ -242,12 +242,12 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
                        f"found {', '.join(names)}")
     columns = {name: taken(FORCE if name in pushes else ELEVATION, name, column, file)
                for name, column in zip(names[1:], table.T[1:], strict=True)}
-    heights = [columns[name] for name in (*EXCITATION_COLUMNS, PART_COLUMNS[1]) if name in columns
-               ] or [np.zeros(len(table))]
-    return Excitation(
-        even_rate_hz(table[:, 0], file), np.stack(heights, axis=1) if len(heights) > 1 else heights[0].copy(),
-        float(table[0, 0]), np.stack([columns[name] for name in pushes], axis=1) if pushes else None,
-        tuple(known[name] for name in pushes), PART_COLUMNS[1] in names)
+    heights = tuple(name for name in (*EXCITATION_COLUMNS, PART_COLUMNS[1]) if name in columns)
+    rate_hz, laid = laid_evenly(table[:, 0], np.stack([columns[name] for name in (*heights, *pushes)], axis=1), file)
+    moved = laid[:, :len(heights)] if heights else np.zeros((len(laid), 1))
+    return Excitation(rate_hz, moved if len(heights) > 1 else moved[:, 0].copy(), float(table[0, 0]),
+                      laid[:, len(heights):] if pushes else None, tuple(known[name] for name in pushes),
+                      PART_COLUMNS[1] in names)
 
 
 def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:

@@ -40,7 +40,7 @@ from logger.printable import counted
 from logger.runs import CLIPPED, NO_READING
 from logger.store.formats.csv_table import parse_columns, place, taken
 from logger.store.formats.drive_file import DISTANCE, DRIVE, PLACE, SPEED, USABLE, header_of
-from logger.store.formats.record_file import MAX_BYTES, TIME, VERTICAL, check_grows, even_rate_hz
+from logger.store.formats.record_file import HOLE_STEPS, MAX_BYTES, TIME, VERTICAL, check_grows, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -58,7 +58,6 @@ _MOVING_MPS = 3.0
 _LEAST_FOR_ROADS_HZ = 79.9
 _HOLES = 0.02  # of the time
 _MOSTLY = 0.5  # of the samples: the recorder is slow, and did not stop for a while
-_HOLE_STEPS = 2.5
 
 
 @dataclass(frozen=True)
@@ -235,7 +234,7 @@ def _resampled(
     if len(steps) < 2:
         raise BadInput(f"{file}: expected three samples or more, found {len(taken_s)}")
     own_hz = mean_rate_hz(taken_s)
-    holes = steps[steps > _HOLE_STEPS / own_hz].sum() / (taken_s[-1] - taken_s[0])
+    holes = steps[steps > HOLE_STEPS / own_hz].sum() / (taken_s[-1] - taken_s[0])
     if holes > _HOLES:
         doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time lies in holes, across which straight lines were "
                                  "laid: the ride is harder than the values say", {"share": float(holes)})]

@@ -29,6 +29,8 @@ MAX_BYTES = 1024 * 1024 * 1024
 # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
 _ROUNDING_S = 0.00101
 _ROUNDING_STEPS = 0.2
+HOLE_STEPS = 2.5
+"""Longer than so many steps is a hole: more than one sample is lost."""
 
 _HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
 
@@ -108,11 +110,10 @@ def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
     steps = np.diff(t_s)
     check_grows(t_s, file, mend if (steps >= 0).all() and steps.any() else "")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)
-    tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
-    off = np.abs(t_s - (t_s[0] + step_s * np.arange(len(t_s))))
-    if (off > tolerance_s).any():
+    off = _off_even(t_s)
+    if (off > _tolerance_s(step_s)).any():
         usual_s = float(np.median(steps))
-        odd = np.abs(steps - usual_s) > min(_ROUNDING_S, _ROUNDING_STEPS * usual_s)
+        odd = np.abs(steps - usual_s) > _tolerance_s(usual_s)
         if not odd.any():
             raise BadInput(f"{place(file, int(np.argmax(off)))}: expected samples evenly {step_s:.6g} s apart, found "
                            f"one {off.max():.3g} s off: the clock drifts{mend}")
@@ -120,3 +121,27 @@ def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
         raise BadInput(f"{place(file, sample)}: expected samples evenly {usual_s:.6g} s apart, found a step of "
                        f"{steps[sample - 1]:.6g} s{mend}")
     return 1.0 / step_s
+
+
+def laid_evenly(t_s: Array, columns: Array, file: str) -> tuple[float, Array]:
+    """A rate, and columns (n, c) at even times: as they are, or, where a clock is uneven but no two samples in a row
+    are lost, laid on even times. BadInput as ``even_rate_hz``."""
+    steps = np.diff(t_s)
+    if (steps <= 0).any() or (_off_even(t_s) <= _tolerance_s(float(steps.mean()))).all() or (
+            steps.max() > HOLE_STEPS * np.median(steps)):
+        return even_rate_hz(t_s, file), columns
+    from logger.dsp.whole_record import mean_rate_hz, on_even_grid
+
+    taken(bounds.TIME, TIME, t_s, file)
+    rate_hz = mean_rate_hz(t_s)
+    return rate_hz, on_even_grid(t_s, columns, rate_hz, rate_hz)
+
+
+def _off_even(t_s: Array) -> Array:
+    """How far times (n,) are from an even grid between the first and the last [s]."""
+    return np.abs(t_s - np.linspace(t_s[0], t_s[-1], len(t_s)))
+
+
+def _tolerance_s(step_s: float) -> float:
+    """How far a time may be from an even grid, as its digits are rounded [s]."""
+    return min(_ROUNDING_S, _ROUNDING_STEPS * step_s)

@@ -568,7 +568,9 @@ def test_a_number_says_how_well_it_is_known(tmp_path: Path, said: str, value: fl
     ("[80, 20]", "a range, [low, high], found a list"), ("[20]", "a range, [low, high], found a list"),
     ("40 +- 300%", "a standard deviation up to the number itself, or unknown"),
     ("40 +- 0", "greater than 0, found '0'"),
-    ("40 kg +- 2", "a number of at least 0, found '40 kg'"), ("0 +- 2", "a number above 0 before +-, found '0 +- 2'"), ("unknwon", "a number of at least 0, found 'unknwon'")])
+    ("40 kg +- 2", "a number of at least 0, found '40 kg'"),
+    ("0 +- 2", "a number above 0 before +-, found '0 +- 2'"),
+    ("unknwon", "a number of at least 0, found 'unknwon'")])
 def test_what_says_nothing_of_a_number_is_refused_with_its_line(tmp_path: Path, said: str, expected: str) -> None:
     text = QUARTER.replace("unsprung_mass_kg: 40", f"unsprung_mass_kg: {said}")
     message = complaint(tmp_path, text)
