@@ -54,12 +54,12 @@ def test_numbers_survive_to_the_last_bit(pairs: list[tuple[float, float]]) -> No
 
 
 @pytest.mark.parametrize(("content", "expected"), [
-    ("", ":1: expected the header distance_m,elevation_m[,elevation_right_m] (other units by name: "
-     "distance_ft,elevation_in), found nothing"),
-    ("0,1\n0.25,1\n", ":1: expected the header distance_m,elevation_m[,elevation_right_m] (other units by name: "
-     "distance_ft,elevation_in), found numbers: no line"),
-    ("distance;elevation\n0;1", ":1: expected the header distance_m,elevation_m[,elevation_right_m] (other units by name: "
-     "distance_ft,elevation_in), found 'dist"),
+    ("", ":1: expected the header distance_m,elevation_m[,elevation_right_m] "
+     "(other units by name: distance_ft,elevation_in), found nothing"),
+    ("0,1\n0.25,1\n", ":1: expected the header distance_m,elevation_m[,elevation_right_m] "
+     "(other units by name: distance_ft,elevation_in), found numbers: no line"),
+    ("distance;elevation\n0;1", ":1: expected the header distance_m,elevation_m[,elevation_right_m] "
+     "(other units by name: distance_ft,elevation_in), found 'dist"),
     ("elevation_m,distance_m\n0,1\n", ":1: expected the header"),
     (HEADER + ",roll\n0,1,2\n", ":1: expected the header"),
     (b"\x00" * 5000, ":1: expected text"),
