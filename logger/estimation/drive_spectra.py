@@ -12,9 +12,13 @@ window included, so that a resonance which is narrower than the window biases no
 
 from __future__ import annotations
 
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from struct import pack
+from typing import Any
+from zlib import compress, decompressobj, error
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +43,12 @@ one level, 0.6 its standard deviation in a block, 12 that of a block that a poth
 _WIDENING = 0.06  # of a band above 4 Hz, as a share: a tenth of the width of a wheel's resonance
 _FINE = 2  # points of the model's spectrum for each bin: the window's autocorrelation is as long as two blocks
 _AT_ONCE = 256
+STRETCH_S = 300.0
+"""A road is of one waviness for so long."""
+MOST_KEPT = 256
+"""Blocks of a drive in its sidecar: some 8 kB. Nine minutes of steady driving know a car to a few per cent."""
+_WAITING_HALVES = 32  # half blocks: a minute of samples
+_FORM, _FLOOR = 1, 1e-8  # of what is kept; the least power [m2/s4 per Hz], 25 dB below the noise of the finest sensor
 
 INDEPENDENT = 1 / (1 + 2 * ((2 / 3) ** 2 + (1 / 6) ** 2)) / (1 + 2 * (1 / 6) ** 2)
 """Independent values in a bin of a block: neighbours under a Hann window are correlated by 2/3 and 1/6, blocks half
@@ -65,6 +75,11 @@ class DriveSpectra:
 
     def __len__(self) -> int:
         return len(self.speed_mps)
+
+    def part(self, chosen: Bools | slice) -> DriveSpectra:
+        """Some of the blocks."""
+        stretch = np.unique(self.stretch[chosen], return_inverse=True)[1]
+        return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen], stretch)
 
 
 def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
@@ -124,14 +139,24 @@ def _hann_kernel(bins: Array) -> Array:
 
 
 def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, noise: float = np.nan,
-                  passed_hz: float = np.inf, stretch_s: float = 300.0) -> DriveSpectra:
+                  passed_hz: float = np.inf) -> DriveSpectra:
     """The blocks of a drive: samples (n,), evenly spaced, of the acceleration, the speed, and whether there is a
     reading.
 
     noise        spectrum of the part of the readings' noise that is known [m2/s4 per Hz]
     passed_hz    the recorder passes what is below
-    stretch_s    a road is of one waviness for so long
     """
+    return _of_stretches(*_blocks(accel_mps2, speed_mps, usable, rate_hz, passed_hz), noise)
+
+
+def _of_stretches(begin_s: Array, speed_mps: Array, spread: Array, power: Array, noise: float) -> DriveSpectra:
+    stretch = np.unique((begin_s // STRETCH_S).astype(int), return_inverse=True)[1]
+    return DriveSpectra(speed_mps, spread, power, np.full(len(begin_s), noise), stretch)
+
+
+def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, passed_hz: float = np.inf
+            ) -> tuple[Array, Array, Array, Array]:
+    """When each block begins (b,) [s], its speed [m/s] and the speed's spread (b,), and power (b, k)."""
     length = round(BLOCK_S * rate_hz)
     begins = np.arange(0, len(accel_mps2) - length + 1, length // 2)
     taper = np.hanning(length + 1)[:-1]
@@ -139,7 +164,7 @@ def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: f
     firsts = np.array([first for first, _ in bands()])
     last = bands()[-1][1]
     passes = middles_hz() + counts() / (2 * BLOCK_S) <= min(PASSED * rate_hz, passed_hz)
-    kept: list[tuple[Array, ...]] = []
+    kept = [(np.empty(0), np.empty(0), np.empty(0), np.empty((0, len(firsts))))]
     for some in np.split(begins, range(_AT_ONCE, len(begins), _AT_ONCE)):
         rows = some[:, None] + np.arange(length)
         speeds = speed_mps[rows]
@@ -154,8 +179,91 @@ def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: f
         square = (own**2).mean(axis=1)
         shakes = (square > 0) & ((own**4).mean(axis=1) < IMPULSIVE * square**2)
         power[:, ~passes] = np.nan
-        kept.append(tuple(one[shakes] for one in (mean[good], spread[good] / mean[good], power, some[good] / rate_hz)))
-    mean, spread, power, begin_s = (np.concatenate(parts) for parts in zip(*kept, strict=True)) if kept else (
-        np.empty(0), np.empty(0), np.empty((0, len(bands()))), np.empty(0))
-    stretch = np.unique((begin_s // stretch_s).astype(int), return_inverse=True)[1]
-    return DriveSpectra(mean, spread, power, np.full(len(mean), noise), stretch)
+        kept.append((some[good][shakes] / rate_hz, mean[good][shakes], (spread[good] / mean[good])[shakes],
+                     power[shakes]))
+    begin_s, mean, spread, power = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+    return begin_s, mean, spread, power
+
+
+class SpectraKeeper:
+    """Keeps the blocks of a long drive in little memory, as samples come.
+
+    Problem: a logger drives for years, and what it keeps of a drive is a few kB. Solution: at most ``MOST_KEPT`` blocks;
+    of more, every second one is let go of, and from then on every second, fourth, eighth one is kept. A power is kept
+    in steps of 1 dB, which is little beside its scatter (a band is a sum of few squares).
+
+    rate_hz    of the samples
+    noise      spectrum of the part of the readings' noise that is known [m2/s4 per Hz]
+    """
+
+    def __init__(self, rate_hz: float, noise: float) -> None:
+        self._rate_hz, self._noise = rate_hz, noise
+        self._half = round(BLOCK_S * rate_hz) // 2
+        self._waiting: list[tuple[Array, Array, Bools]] = []
+        self._taken = self._seen = 0  # samples; blocks
+        self._every = 1
+        self._kept: list[bytes] = []
+
+    def push(self, accel_mps2: Array, speed_mps: Array, usable: Bools) -> None:
+        """Samples (n,) that follow those before."""
+        self._waiting.append((accel_mps2, speed_mps, usable))
+        if sum(len(one) for one, _, _ in self._waiting) >= _WAITING_HALVES * self._half:
+            self._take(keep=self._half)
+
+    def break_off(self) -> None:
+        """The next samples do not follow."""
+        self._take(keep=0)
+
+    def _take(self, keep: int) -> None:
+        if not self._waiting:
+            return
+        accel, speed, usable = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
+        whole = len(accel) // self._half * self._half
+        begin_s, *blocks = _blocks(accel[:whole], speed[:whole], usable[:whole], self._rate_hz)
+        for begin, mean, spread, power in zip(begin_s, *blocks, strict=True):
+            if self._seen % self._every == 0:
+                self._kept.append(_packed(self._taken / self._rate_hz + begin, mean, spread, power))
+            self._seen += 1
+            if len(self._kept) > MOST_KEPT:
+                self._kept, self._every = self._kept[::2], 2 * self._every
+        gone = whole - keep if keep else len(accel)
+        self._taken += gone
+        self._waiting = [(accel[gone:], speed[gone:], usable[gone:])] if keep else []
+
+    def fields(self) -> dict[str, Any]:
+        """What is kept, as JSON; ``spectra_of_fields`` reads it. Empty before the first block."""
+        if not self._kept:
+            return {}
+        return {"form": _FORM, "noise": self._noise, "every": self._every, "blocks": len(self._kept),
+                "data": b64encode(compress(b"".join(self._kept))).decode("ascii")}
+
+
+def _packed(begin_s: float, speed_mps: float, spread: float, power: Array) -> bytes:
+    """A block: begin [s], speed [cm/s] and spread [0.1 %] as unsigned numbers of two bytes, the last of one, and the
+    power of each band in dB over ``_FLOOR`` as one byte."""
+    levels = np.clip(np.round(10 * np.log10(np.maximum(power, _FLOOR) / _FLOOR)), 0, 255).astype(np.uint8)
+    return pack("<HHB", int(begin_s) % 65536, min(round(100 * speed_mps), 65535), min(round(1000 * spread), 255)
+                ) + levels.tobytes()
+
+
+def spectra_of_fields(fields: Any) -> DriveSpectra:
+    """The blocks that ``SpectraKeeper.fields`` holds. ValueError for what it cannot have written."""
+    if not isinstance(fields, dict) or fields.get("form") != _FORM:
+        raise ValueError("expected spectra in a form that this version knows")
+    noise, data = fields.get("noise"), fields.get("data")
+    if not isinstance(noise, float) or not isinstance(data, str) or not 0 <= noise < np.inf:
+        raise ValueError("expected noise and data")
+    size = 5 + len(bands())
+    try:
+        reader = decompressobj()
+        raw = reader.decompress(b64decode(data, validate=True), MOST_KEPT * size + 1)
+    except (error, ValueError):
+        raise ValueError("expected data that can be unpacked") from None
+    if not raw or len(raw) % size or len(raw) > MOST_KEPT * size:
+        raise ValueError("expected whole blocks")
+    rows = np.frombuffer(raw, np.uint8).reshape(-1, size)
+    begin_s, speed, spread = (rows[:, at].astype(float) + (256.0 * rows[:, at + 1] if at < 4 else 0.0)
+                              for at in (0, 2, 4))
+    if speed.min() < 100 * SLOWEST_MPS - 1:
+        raise ValueError("expected speeds of a car that drives")
+    return _of_stretches(begin_s, speed / 100, spread / 1000, _FLOOR * 10 ** (rows[:, 5:] / 10), noise)
