@@ -533,11 +533,12 @@ def _ahead(text: str) -> float:
 class LearnCarQuestion(LongQuestion):
     """Learn a car that nobody has measured, from ordinary drives over roads that nobody has measured.
 
-    Each DRIVE is a dump of the box (.dump, .dump.gz), a run's folder or its drive.csv (t_s,accel_z_mps2,speed_mps), or
-    a phone's recording as ridelog extract reads it. Twenty minutes are enough, with some at 30, 60 and 90 km/h; town
-    helps. Measure the wheelbase, or read it off the car's data sheet.
+    Each DRIVE is a folder of logs (the sidecars keep what is needed), a dump of the box (.dump, .dump.gz), a run's
+    folder or its drive.csv (t_s,accel_z_mps2,speed_mps), or a phone's recording as ridelog extract reads it. Twenty
+    minutes are enough, with some at 30, 60 and 90 km/h; town helps. Measure the wheelbase, or read it off the car's
+    data sheet.
 
-      ridelog learn-car drives/*.dump.gz --wheelbase 2.66 --out mycar.yaml
+      ridelog learn-car /var/lib/ridelog --wheelbase 2.66 --out mycar.yaml
       ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
 
     It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
@@ -549,8 +550,8 @@ class LearnCarQuestion(LongQuestion):
     In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
     """
 
-    drives: Annotated[Runs, Argument("dump, run's folder, drive.csv or recording of a phone", metavar="DRIVE",
-                                     read=Path, many=list)]
+    drives: Annotated[Runs, Argument("folder of logs, dump, run's folder, drive.csv or recording of a phone",
+                                     metavar="DRIVE", read=Path, many=list)]
     wheelbase_m: Annotated[float, Option("distance between the axles [m]", _WHEELBASE, "M")]
     _: KW_ONLY
     mass_kg: Annotated[float | None, Option(

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
     from logger.store.formats.vehicle_file import Model
 
-_TOLD_STD_M, _UNTOLD_STD_M = 0.1, 0.2
-"""Standard error of where the sensor sits before the centre of gravity, which nobody knows exactly; and where nothing
-is said, within the front of the cabin."""
+_GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
+"""Standard error of where the sensor sits before the middle between the axles; and where nothing is said, within the
+front of the cabin."""
 _FEWEST_BLOCKS = 60
 """Two minutes of steady driving (a judgement: less says little more than the prior)."""
 _WRONG_WHEELBASE, _SIGMA = 0.03, 4.0
@@ -35,6 +35,8 @@ _CHANGED = 2.64
 _NO_CAR = 4.0
 """Standard deviations of what is known before: of 14 right numbers one goes as far once in 1100 cars (normal
 distribution). Simulated cars went to 2.1, braking read as up and down to 4.2 and more."""
+_MOST_BLOCKS = 20_000
+"""Eleven hours of steady driving, some 300 MB: more says nothing new."""
 _MOST_GROUPS, _LOOSE = 8, 0.1
 """Of many drives, groups that are compared; and how well the wheelbase is known there, as a share."""
 _LIMP, _ONE_SPEED = 0.1, 1.5
@@ -91,6 +93,7 @@ def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
     from logger.api.extraction import even_drives, recorded_dump
     from logger.service.config import Config
     from logger.store.formats.drive_file import DRIVE
+    from logger.vehicle.vehicle import GENERIC
 
     if not isinstance(source, str | Path):
         return [source]
@@ -98,7 +101,7 @@ def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
     if not path.exists():
         raise BadInput(f"{path}: expected a dump, a run's folder or a recording of a phone, found no such file")
     if path.name.endswith((".dump", ".dump.gz")):
-        return even_drives(recorded_dump(path, None, "rav4-2009", tell), path)
+        return even_drives(recorded_dump(path, None, GENERIC, tell), path)
     if path.name == DRIVE or (path / DRIVE).exists() or _is_drive(path):
         return [_read_run(path)]
     return even_drives(recorded_csv(path, CsvSettings(), Config(), tell), path)
@@ -153,6 +156,47 @@ class _Used:
     name: str
     seconds: float
     spectra: DriveSpectra
+    vehicle: str = ""  # that the settings named, where it is known
+
+
+def _of_logs(source: Drive | Path | str) -> list[_Used] | None:
+    """What the sidecars of a log, or of a folder of logs, keep of their drives; None where there are no logs. BadInput
+    where they keep nothing."""
+    from logger.estimation.drive_spectra import BLOCK_S, DRIVE_SPECTRA, spectra_of_fields
+    from logger.store.log.log_name import LogName, OwnFile, inside_of
+    from logger.store.log.sidecar import load_sidecar
+
+    if not isinstance(source, str | Path):
+        return None
+    path = Path(source)
+    if path.is_dir():
+        logs = [one for one in sorted(inside_of(path)) if (own := OwnFile.of(one.name)) and own.kind == ".csv"]
+    else:
+        logs = [path] if path.exists() and LogName.of(path) else []
+    found: dict[tuple[Path, int], _Used] = {}
+    for log in logs:  # the last file of a session has what is kept of all of it
+        name = LogName.of(log)
+        try:
+            sidecar = load_sidecar(log)
+            content = sidecar.content if sidecar else {}
+            if name is not None and (fields := content.get(DRIVE_SPECTRA)):
+                spectra = spectra_of_fields(fields)
+                vehicle = content.get("vehicle")
+                found[log.parent, name.session] = _Used(
+                    log.name, len(spectra) * fields.get("every", 1) * BLOCK_S / 2, spectra,
+                    str(vehicle.get("name", "")) if isinstance(vehicle, dict) else "")
+        except (OSError, ValueError) as error:
+            raise BadInput(f"{log}: its sidecar cannot be used: {error}: leave the log out") from None
+    if logs and not found:
+        raise BadInput(f"{path}: expected logs whose sidecars keep spectra of the drives, found none in "
+                       f"{len(logs)} files: they are kept from this version on; give dumps of older drives")
+    return list(found.values()) or None
+
+
+def _thinned(used: list[_Used]) -> list[_Used]:
+    """The drives with as many blocks in all as memory is meant for, spread over each."""
+    every = -(-sum(len(one.spectra) for one in used) // _MOST_BLOCKS)
+    return used if every < 2 else [replace(one, spectra=one.spectra.part(slice(None, None, every))) for one in used]
 
 
 def _used(question: LearnCarQuestion) -> list[_Used]:
@@ -164,6 +208,9 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
         raise BadInput(f"{again}: expected every drive once, found it twice")
     found = []
     for source in given:
+        if (kept := _of_logs(source)) is not None:
+            found += kept
+            continue
         drives = read_drives(source, question.progress)
         for number, drive in enumerate(drives, 1):
             name = Path(drive.path).name + (f" ({number})" if len(drives) > 1 else "")
@@ -174,7 +221,7 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
         driven_s = sum(one.seconds for one in found)
         raise BadInput(f"learn-car: expected two minutes of steady driving at least, found {2 * blocks} s in "
                        f"{driven_s:.0f} s of drives: drive for twenty minutes, some of it at 30, 60 and 90 km/h")
-    return [one for one in found if len(one.spectra)]
+    return _thinned([one for one in found if len(one.spectra)])
 
 
 def learned(question: LearnCarQuestion) -> LearnedVehicle:
@@ -184,10 +231,9 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
 
     used = _used(question)
     knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor or 0.0,
-                             ahead_std_m=_UNTOLD_STD_M if question.sensor is None else _TOLD_STD_M)
-    problem = UnknownCar(joined([one.spectra for one in used]), knowledge)
+                             ahead_std_m=_USUAL_STD_M if question.sensor is None else _GIVEN_STD_M)
     question.progress("finding the car")
-    car = problem.fit()
+    problem, car = UnknownCar(joined([one.spectra for one in used]), knowledge).learn()
     question.progress("checking it")
     _check_car(problem, car)
     _check_drives(used, knowledge, car.x, question.progress)
@@ -256,8 +302,7 @@ def _value(car: LearnedCar, name: str) -> str:
 
     at = _place(name)
     value = float(np.exp(car.x[at]))
-    unit = " Hz" if name.endswith("_hz") else " m" if name.endswith("_m") else ""
-    return f"{value:.3g} +- {value * float(car.std[at]):.1g}{unit}"
+    return f"{value:.3g} +- {value * float(car.std[at]):.1g} {_WORDS[name.rpartition('.')[2]][1]}".strip()
 
 
 def _place(name: str) -> int:
@@ -267,12 +312,22 @@ def _place(name: str) -> int:
     return COORDINATES.index(name)
 
 
+_WORDS = {"bounce_hz": ("body bounce", "Hz"), "damping_ratio": ("damping ratio", ""), "hop_hz": ("wheel hop", "Hz"),
+          "unsprung_to_sprung": ("unsprung / sprung mass", ""), "rear_share": ("share of weight on the rear axle", ""),
+          "dynamic_index": ("dynamic index of pitch", ""), "wheelbase_m": ("wheelbase", "m"),
+          "contact_patch_m": ("contact patch", "m"), "ahead_m": ("ahead of the middle", "m"), "noise": ("noise", "")}
+"""Of each coordinate the words and the unit."""
+
+
 def _words_of(name: str) -> str:
-    if name == "wheelbase_m":
-        return "wheelbase"
-    end, _, number = name.partition(".")
-    said = {"bounce_hz": "body bounce", "damping_ratio": "damping ratio", "hop_hz": "wheel hop"}
-    return f"{end} {said[number]}"
+    """With its end of the car: "front body bounce"."""
+    end, _, number = name.rpartition(".")
+    return f"{end} {_WORDS[number][0]}".strip()
+
+
+def _with_unit(number: str) -> str:
+    words, unit = _WORDS[number]
+    return f"{words} [{unit}]" if unit else words
 
 
 def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
@@ -284,7 +339,7 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     off[_place("wheelbase_m")] = 0.0  # it has a check of its own
     at = int(abs(off).argmax())
     if abs(off[at]) > _NO_CAR:
-        raise CheckFailed(f"learn-car: no car answers roads like these drives: {COORDINATES[at].replace('_', ' ')} "
+        raise CheckFailed(f"learn-car: no car answers roads like these drives: {_words_of(COORDINATES[at])} "
                           f"would be {abs(off[at]):.1f} standard deviations from what is known before. Is "
                           "vertical_axis the one that points up, is the sensor bolted to the body, were they driven "
                           "without a trailer?")
@@ -325,19 +380,21 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
     shown = [*NUMBERS, "wheelbase_m"]
     values = {name: _shown(name, float(car.x[at])) for at, name in enumerate(shown)}
     deviations = {name: _slope(name, values[name]) * float(car.std[at]) for at, name in enumerate(shown)}
-    untold = list(_untold(problem, car, question))
+    unknown = list(_not_identifiable(problem, car))
     moved = list(_changes(question, car)) if question.compare else []
+    misfits = list(_misfits(used, knowledge, car, speeds, noise, level))
     seconds = sum(one.seconds for one in used)
     as_json = {
-        "parameters": values, "standard_errors": deviations, "sensor_ahead_m": float(car.x[own + 1]),
+        "parameters": values, "standard_errors": deviations, "sensor_ahead_of_middle_m": float(car.x[own + 1]),
         "drives": len(used), "seconds": seconds, "blocks": len(problem.spectra),
         "speed_low_mps": float(problem.spectra.speed_mps.min()),
         "speed_high_mps": float(problem.spectra.speed_mps.max()),
         "iri": [{"speed_mps": speed, "std_share": now[speed], "std_share_before": ever[speed]} for speed in speeds],
         "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
-        "converged": car.is_converged, "not_told": untold, "changes": moved}
+        "converged": car.is_converged, "not_identifiable": unknown, "changes": moved, "other_than_settings": misfits}
     lines = [*_head(used, problem, seconds), "", *_table(values, deviations), "", *_iri_lines(now, ever), "",
-             *_kept_lines(errors), _mass_line(question, mass), *_warnings(values, deviations, car), *untold, *moved]
+             *_kept_lines(errors), _mass_line(question, mass), *_warnings(values, deviations, car),
+             *unknown, *moved, *misfits]
     comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in
                        [f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *lines])
     return LearnedVehicle("\n".join(lines), as_json, model, values, deviations, now, ever,
@@ -395,13 +452,11 @@ def _head(used: Sequence[_Used], problem: UnknownCar, seconds: float) -> Iterato
 
 def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Iterator[str]:
     yield f"{'':26}{'front':>18}{'rear':>18}"
-    for name, words in (("bounce_hz", "body bounce [Hz]"), ("damping_ratio", "damping ratio"),
-                        ("hop_hz", "wheel hop [Hz]"), ("unsprung_to_sprung", "unsprung / sprung mass")):
-        cells = [f"{values[f'{end}.{name}']:.3f} +- {deviations[f'{end}.{name}']:.3f}" for end in ("front", "rear")]
-        yield f"  {words:24}{cells[0]:>18}{cells[1]:>18}"
-    for name, words in (("rear_share", "share of weight on the rear axle"), ("dynamic_index", "dynamic index of pitch"),
-                        ("wheelbase_m", "wheelbase [m]"), ("contact_patch_m", "contact patch [m]")):
-        yield f"  {words:42}{f'{values[name]:.3f} +- {deviations[name]:.3f}':>18}"
+    cells = {name: f"{value:.3f} +- {deviations[name]:.3f}" for name, value in values.items()}
+    for name in (one.removeprefix("front.") for one in cells if one.startswith("front.")):
+        yield f"  {_with_unit(name):24}{cells[f'front.{name}']:>18}{cells[f'rear.{name}']:>18}"
+    for name in (one for one in cells if "." not in one):
+        yield f"  {_with_unit(name):42}{cells[name]:>18}"
 
 
 def _iri_lines(now: Mapping[float, float], ever: Mapping[float, float]) -> Iterator[str]:
@@ -438,7 +493,7 @@ def _warnings(values: Mapping[str, float], deviations: Mapping[str, float], car:
         yield "The search did not come to an end: the numbers may be off by more than their errors; give more drives."
 
 
-def _untold(problem: UnknownCar, car: LearnedCar, question: LearnCarQuestion) -> Iterator[str]:
+def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
     """What the drives cannot tell, a line each."""
     import numpy as np
 
@@ -452,12 +507,8 @@ def _untold(problem: UnknownCar, car: LearnedCar, question: LearnCarQuestion) ->
         yield "No drive was faster than 60 km/h: add one at 90 km/h, where springs and dampers show best."
     prior = problem.knowledge.std
     unknown = [name for at, name in enumerate(NUMBERS) if car.std[at] > 0.8 * prior[at]]
-    said = {"bounce_hz": "body bounce", "damping_ratio": "damping", "hop_hz": "wheel hop",
-            "unsprung_to_sprung": "unsprung mass", "dynamic_index": "dynamic index of pitch",
-            "rear_share": "share of weight on the rear axle", "contact_patch_m": "contact patch"}
     if unknown:
-        words = [" ".join(filter(None, [name.rpartition(".")[0], said[name.rpartition(".")[2]]])) for name in unknown]
-        yield f"Not told by these drives, and as of published cars: {', '.join(words)}."
+        yield f"These drives cannot tell, and it is as of published cars: {', '.join(map(_words_of, unknown))}."
 
 
 def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
@@ -482,6 +533,39 @@ def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
             found.append(f"{_words_of(name)} {100 * np.expm1(change):+.0f} % (+- {100 * std:.0f})")
     yield (f"Changed since {question.compare}: {', '.join(found)}." if found else
            f"Nothing has changed since {question.compare} by more than chance.")
+
+
+def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, speeds_mps: Sequence[float], noise: float,
+             level: float) -> Iterator[str]:
+    """Vehicles that the settings of the drives named and that are not this car: their IRI is off by more than this
+    car's error lets it be."""
+    import numpy as np
+
+    from logger.identification.unknown_car import iri_errors, iri_ratio, reading_power
+    from logger.shipped import vehicle_names, vehicle_path
+    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.vehicle.published_cars import NUMBERS, coordinates_of
+    from logger.vehicle.vehicle import GENERIC
+
+    said = {one.vehicle for one in used if one.vehicle in vehicle_names()} - {GENERIC}
+    if not said:
+        return
+    errors = iri_errors(knowledge, car.x, car.covariance, speeds_mps, noise, level)
+    for name in sorted(said):
+        try:
+            x = np.append(coordinates_of(read_vehicle(vehicle_path(name))), car.x[len(NUMBERS):])
+        except ValueError:  # a quarter car says nothing of two axles
+            continue
+        bias = np.array([iri_ratio(reading_power(knowledge, x, speed), reading_power(knowledge, car.x, speed), speed,
+                                   noise, level) for speed in speeds_mps])
+        at = int(np.argmax(abs(np.log(bias)) / errors))
+        if abs(np.log(bias[at])) < _SIGMA * errors[at]:
+            continue
+        numbers = [NUMBERS.index(one) for one in _COMPARED[:-1]]
+        most = NUMBERS[max(numbers, key=lambda one: abs(x[one] - car.x[one]) / car.std[one])]
+        yield (f"These drives do not fit {name}, which the settings named: {_words_of(most)} is {_value(car, most)}, "
+               f"not {np.exp(x[NUMBERS.index(most)]):.3g}; its IRI is {100 * (bias[at] - 1):+.0f} % off at "
+               f"{3.6 * speeds_mps[at]:.0f} km/h.")
 
 
 def _coordinate_errors(model: Model) -> Array:

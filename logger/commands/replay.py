@@ -128,8 +128,8 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         with FolderLock(out):
             repair(out)
             session = next_session(out)
-            segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
             pipeline = wiring.pipeline(config, sensor, car, known)
+            segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes, more=pipeline.sidecar)
             core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
             player = Player(core, rate, _progress(quiet))
             started_s = time.monotonic()

@@ -43,6 +43,8 @@ one level, 0.6 its standard deviation in a block, 12 that of a block that a poth
 _WIDENING = 0.06  # of a band above 4 Hz, as a share: a tenth of the width of a wheel's resonance
 _FINE = 2  # points of the model's spectrum for each bin: the window's autocorrelation is as long as two blocks
 _AT_ONCE = 256
+DRIVE_SPECTRA = "drive_spectra"
+"""In a sidecar: what is kept of the drives of a session so that their car can be learnt of them."""
 STRETCH_S = 300.0
 """A road is of one waviness for so long."""
 MOST_KEPT = 256
@@ -78,8 +80,8 @@ class DriveSpectra:
 
     def part(self, chosen: Bools | slice) -> DriveSpectra:
         """Some of the blocks."""
-        stretch = np.unique(self.stretch[chosen], return_inverse=True)[1]
-        return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen], stretch)
+        return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen],
+                            np.unique(self.stretch[chosen], return_inverse=True)[1])
 
 
 def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
@@ -188,9 +190,9 @@ def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, 
 class SpectraKeeper:
     """Keeps the blocks of a long drive in little memory, as samples come.
 
-    Problem: a logger drives for years, and what it keeps of a drive is a few kB. Solution: at most ``MOST_KEPT`` blocks;
-    of more, every second one is let go of, and from then on every second, fourth, eighth one is kept. A power is kept
-    in steps of 1 dB, which is little beside its scatter (a band is a sum of few squares).
+    Problem: a logger drives for years, and what it keeps of a drive is a few kB. Solution: at most ``MOST_KEPT``
+    blocks; of more, every second one is let go of, and from then on every second, fourth, eighth one is kept. A power
+    is kept in steps of 1 dB, which is little beside its scatter (a band is a sum of few squares).
 
     rate_hz    of the samples
     noise      spectrum of the part of the readings' noise that is known [m2/s4 per Hz]

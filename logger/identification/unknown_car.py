@@ -73,7 +73,7 @@ class CarKnowledge:
     """What is known of a car and its sensor, and how well.
 
     wheelbase_m, wheelbase_std    and its standard error, as a share
-    ahead_m, ahead_std_m          of the sensor before the centre of gravity
+    ahead_m, ahead_std_m          of the sensor before the middle between the axles, which a person can find
     prior                         of the rest
     """
 
@@ -108,8 +108,10 @@ class CarKnowledge:
 
     def car(self, x: Array, sprung_mass_kg: float, name: str) -> Vehicle:
         """The half car with these coordinates (p,), its sensor where it sits."""
-        own = len(NUMBERS)
-        return car_of(x[:own], float(np.exp(x[own])), sprung_mass_kg, SensorPlace(float(x[own + 1])), name)
+        own, wheelbase_m = len(NUMBERS), float(np.exp(x[len(NUMBERS)]))
+        share = 1 / (1 + np.exp(-x[NUMBERS.index("rear_share")]))
+        sensor = SensorPlace(float(x[own + 1] + (share - 0.5) * wheelbase_m))
+        return car_of(x[:own], wheelbase_m, sprung_mass_kg, sensor, name)
 
 
 def band_gains(knowledge: CarKnowledge, x: Array, speed_mps: Array, spread: Array) -> Array:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 from math import hypot, isfinite, nan
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.uncertain_ride import NO_FIGURES
 from logger.dsp.windows import Floats, GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
@@ -160,12 +162,12 @@ def longest_wait_us(bridge_s: float) -> int:
 
 
 class Pipeline:
-    """The whole way from readings to records of one service run. ``alignment`` and the use of the range learn beside it
-    and change no row."""
+    """The whole way from readings to records of one service run. ``alignment``, the use of the range and the
+    spectra that are kept learn beside it and change no row."""
 
     def __init__(
         self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
-        alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse,
+        alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse, spectra: SpectraKeeper,
     ) -> None:
         self._settings = settings
         self._chain = chain
@@ -188,6 +190,12 @@ class Pipeline:
         self.speed_check = SpeedCheck()
         self.alignment = alignment
         self.range_use = range_use
+        self._spectra = spectra
+
+    def sidecar(self) -> dict[str, Any]:
+        """What the sidecars keep of the drives by now."""
+        fields = self._spectra.fields()
+        return {DRIVE_SPECTRA: fields} if fields else {}
 
     @property
     def waiting_samples(self) -> int:
@@ -307,6 +315,7 @@ class Pipeline:
             doubtful = self.stillness.spans.during(part.t_us) | self.speed_check.spans.during(part.t_us)
             doubtful |= self.repetition.spans.during(part.t_us)
             believed = replace(part, present=part.present & ~doubtful)
+            self._spectra.push(part.reading_mps2, speed_mps, believed.present & ~part.interpolated)
             self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
 
@@ -314,6 +323,7 @@ class Pipeline:
         """Close the window being filled where it stands, and have the estimator give what it can."""
         self._enqueue(self._cutter.break_off())
         self._roughness.end_leg()
+        self._spectra.break_off()
         self._leg = _BLIND
 
     def _enqueue(self, windows: list[Window]) -> None:

@@ -298,10 +298,10 @@ def _serve(config: Config, stop: Stop) -> None:
     facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
     header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
     limits = QuotaLimits(config.log.quota_bytes, config.log.keep_free_bytes)
-    storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
-                      pairing=config.pairing)
-    decoder = wiring.gps_decoder(config)
     pipeline = wiring.pipeline(config, sensor, model, receiver_delay)
+    storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
+                      pairing=config.pairing, more=pipeline.sidecar)
+    decoder = wiring.gps_decoder(config)
     delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
     sensor_learning = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)

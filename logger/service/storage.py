@@ -36,13 +36,14 @@ class Storage:
     header    of the raw dump; None: none is recorded
     now_us    the monotonic clock
     pairing   on whose sticks a copy lets a file be removed
+    more      what else the sidecars say by now
     """
 
     def __init__(self, directory: Path, facts: dict[str, Any], max_file_bytes: int, header: DumpHeader | None,
                  limits: QuotaLimits, now_us: Callable[[], int], files: FileSystem | None = None,
-                 pairing: Pairing = NOT_PAIRED) -> None:
+                 pairing: Pairing = NOT_PAIRED, more: Callable[[], dict[str, Any]] = dict) -> None:
         self._directory = directory
-        self._facts = facts
+        self._facts, self._more = facts, more
         self._max_file_bytes = max_file_bytes
         self._now_us = now_us
         self._files = files or FileSystem()
@@ -113,7 +114,7 @@ class Storage:
         session = next_session(self._directory, self._files, self._warn)
         if put_aside_before:
             self._notices.append(f"put aside at an earlier start: {', '.join(put_aside_before[:SHOWN_NOTICES])}")
-        return SegmentLog(self._directory, session, self._facts, self._max_file_bytes, self._files)
+        return SegmentLog(self._directory, session, self._facts, self._max_file_bytes, self._files, self._more)
 
     def _warn(self, words: str) -> None:
         """For the status, and once for the journal: while no session can begin it is tried over and over."""

@@ -31,6 +31,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.drive_spectra import SpectraKeeper
 from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import SlopeErrors
 from logger.estimation.noise_belief import NoiseBelief
@@ -189,8 +190,10 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
     alignment = DriveAlignment(axis.column, axis.sign)
     columns = ComfortColumns(_noise_floor(sensor, low_pass_hz), sensor.sensor)
     relation = rms_relation(car, recorder_gain(low_pass_hz))
+    on_grid = sensor.on_grid(sensor.sensor.noise_rms_mps2)
+    spectra = SpectraKeeper(GRID_RATE_HZ, 2 * on_grid.variance_mps2_2 / GRID_RATE_HZ)
     return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns,
-                    RangeUse(config.accelerometer.kind.others(config.accelerometer.settings)))
+                    RangeUse(config.accelerometer.kind.others(config.accelerometer.settings)), spectra)
 
 
 def car_of(config: Config, read: Callable[[Path], Model] = read_on_board) -> Model:

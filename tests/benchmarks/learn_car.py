@@ -43,14 +43,20 @@ def truth(car: UnmeasuredCar) -> np.ndarray:
     """Coordinates of ``unknown_car`` (p,)."""
     share = car.rear_share
     return np.concatenate([np.log([*car.front, *car.rear, car.dynamic_index]), [
-        np.log(share / (1 - share)), np.log(car.patch_m), np.log(car.wheelbase_m), car.ahead_m, 0.0]])
+        np.log(share / (1 - share)), np.log(car.patch_m), np.log(car.wheelbase_m), ahead_of_middle_m(car), 0.0]])
+
+
+def ahead_of_middle_m(car: UnmeasuredCar) -> float:
+    """Of the sensor."""
+    return car.ahead_m + (0.5 - car.rear_share) * car.wheelbase_m
 
 
 def coordinates(vehicle: Vehicle) -> np.ndarray:
     """The same of a vehicle's file."""
     assert vehicle.rear is not None
     wheelbase_m = vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
-    return np.concatenate([coordinates_of(vehicle), [np.log(wheelbase_m), vehicle.sensor.ahead_m, 0.0]])
+    ahead_m = vehicle.sensor.ahead_m + wheelbase_m / 2 - vehicle.front.cg_distance_m
+    return np.concatenate([coordinates_of(vehicle), [np.log(wheelbase_m), ahead_m, 0.0]])
 
 
 def biases(x: np.ndarray, true: np.ndarray, noise: float) -> np.ndarray:
@@ -87,7 +93,7 @@ def main() -> int:
             drives = mixed(car, 50_000 + seed, 60 * asked.minutes / parts, recorder, **speeds)
             runs = written(Path(name), drives, recorder)
             started_s = time.process_time()
-            found = learn_car(runs, wheelbase_m, sensor=AHEAD_M)
+            found = learn_car(runs, wheelbase_m, sensor=ahead_of_middle_m(car))
             spent.append(time.process_time() - started_s)
             true = truth(car)
             ours.append(biases(coordinates(found.model.vehicle), true, noise))

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
 from logger.store.formats.vehicle_file import read_model
+from logger.store.log.log_writer import SegmentLog
 from logger.vehicle.uncertain import cars_off
 
 from ..support.command import called
+from ..support.drives.logged_rows import ROW
 from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, mixed, written
 
 CAR = UnmeasuredCar()
@@ -110,3 +113,43 @@ def test_last_year_s_file_says_what_changed(learned: tuple[dict[str, Any], Path,
     changes = json.loads(found.stdout)["changes"][0]
     assert "rear damping ratio -" in changes and "front" not in changes
     assert np.isfinite(json.loads(found.stdout)["kept_back"]["log_evidence_gain"])
+
+
+def _logged(folder: Path, number: int, run: Path, vehicle: str = "generic") -> None:
+    """A session's log whose sidecar keeps what the service keeps of a drive, as samples come."""
+    drive = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
+    keeper = SpectraKeeper(100.0, 2 * (0.147**2 + 0.153**2 / 12) / 100)
+    for low in range(0, len(drive), 57):
+        some = drive[low:low + 57]
+        keeper.push(9.8 + some["accel_z_mps2"], some["speed_mps"], np.ones(len(some), bool))
+    keeper.break_off()
+    log = SegmentLog(folder, number, {"vehicle": {"name": vehicle}}, 10**6,
+                     more=lambda: {DRIVE_SPECTRA: keeper.fields()})
+    log.append(ROW)
+    log.close()
+
+
+def test_sidecars_of_logs_do_for_drives_and_a_vehicle_that_is_not_the_car_is_found_out(
+        runs: list[Path], learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
+    for number, run in enumerate(runs, 1):
+        _logged(tmp_path, number, run, "rav4-2009" if number == 2 else "generic")
+    assert max(path.stat().st_size for path in tmp_path.glob("*.json")) < 15_000
+    found = called("learn-car", tmp_path, "--wheelbase", 2.68, "--json")
+    assert found.returncode == 0, found.stderr
+    answer, (dumps, *_) = json.loads(found.stdout), learned
+    for name, value in answer["parameters"].items():  # steps of 1 dB and other edges of blocks move a number a little
+        assert abs(value - dumps["parameters"][name]) < 0.7 * dumps["standard_errors"][name], name
+    said, = answer["other_than_settings"]
+    assert "do not fit rav4-2009" in said and "its IRI is" in said
+
+
+def test_logs_that_keep_nothing_or_what_cannot_be_are_refused_in_one_line(tmp_path: Path) -> None:
+    for number, (kept, said) in enumerate((({}, "found none in 1 files"), ({"form": 9}, "leave the log out"),
+                                           ({"form": 1, "noise": 1e-4, "data": "AAAA"}, "leave the log out"))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        log = SegmentLog(folder, 1, {DRIVE_SPECTRA: kept} if kept else {}, 10**6)
+        log.append(ROW)
+        log.close()
+        found = called("learn-car", folder, "--wheelbase", 2.66)
+        assert found.returncode == 2 and said in found.stderr and len(found.stderr.splitlines()) == 1

@@ -81,6 +81,7 @@ class SegmentLog:
     directory    an existing folder that one service at a time writes to
     session      a number from ``next_session``
     sidecar      what a reader needs beside the rows (configuration, versions, scales); plain JSON values
+    more         what the sidecar says besides by now; written every ``ROWS_A_SIDECAR`` rows, as a car cuts the power
     max_bytes    a part is finished before a row would make its rows longer than this
 
     ``path`` is the open part; ``rows_on_disk`` counts the rows that were synced, in all parts. Raises ``OSError`` for
@@ -94,10 +95,11 @@ class SegmentLog:
     _bytes: int
 
     def __init__(self, directory: Path, session: int, sidecar: dict[str, Any], max_bytes: int,
-                 files: FileSystem | None = None) -> None:
+                 files: FileSystem | None = None, more: Callable[[], dict[str, Any]] = dict) -> None:
         self._directory = directory
         self.session = session
-        self._given = sidecar
+        self._given, self._more = sidecar, more
+        self._rows_said = 0
         self._max_bytes = max_bytes
         self._files = files or FileSystem()
         self._clock: ClockMap | None = None
@@ -130,6 +132,11 @@ class SegmentLog:
             self._dirty = self._is_retry = False
             self.rows_on_disk += self._tally.rows - self._rows_synced
             self._rows_synced = self._tally.rows
+            if self._tally.rows - self._rows_said >= ROWS_A_SIDECAR:
+                self._rows_said = self._tally.rows
+                if more := self._more():
+                    self._given = self._given | more
+                    self._write_sidecar("open")
 
     def rotate(self) -> None:
         """Finish the part and open the next; a part without rows stays open."""
@@ -198,7 +205,7 @@ class SegmentLog:
                 raise FileExistsError(f"{taken}: this session has been logged before")
         self._tally = Tally()
         self._bytes = 0
-        self._rows_synced = 0
+        self._rows_synced = self._rows_said = 0
         self._descriptor = self._files.create(self.path)
         self._files.write(self._descriptor, f"{HEADER}\n".encode())
         self._dirty = True
@@ -207,7 +214,7 @@ class SegmentLog:
     def _finish(self) -> None:
         self.sync()
         self._close_file()
-        finished = finish_part(self._files, self.path, self._given, self._tally, self._clock)
+        finished = finish_part(self._files, self.path, self._given | self._more(), self._tally, self._clock)
         if self._clock is None and self._tally.unset:
             self._without_utc.append((finished, self._tally))
 
@@ -242,6 +249,9 @@ class SegmentLog:
         store_sidecar(self._files, self.path, self._given, state, self._tally, self._clock)
         self._stored_clock = self._clock
 
+
+ROWS_A_SIDECAR = 500
+"""Rows after which the sidecar of an open part is written again: 4 km, some minutes."""
 
 WAITING_ROWS = 5000
 """Most rows kept in memory, some 5 MB: 38 km of windows of 7.62 m. Of more the oldest are lost, and counted."""
