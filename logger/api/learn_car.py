@@ -13,6 +13,7 @@ from logger.api.question import each, function
 from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed
+from logger.printable import counted
 from logger.units import MPH_MPS
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ def _of_logs(source: Drive | Path | str) -> list[_Used] | None:
             raise BadInput(f"{log}: its sidecar cannot be used: {error}: leave the log out") from None
     if logs and not found:
         raise BadInput(f"{path}: expected logs whose sidecars keep spectra of the drives, found none in "
-                       f"{len(logs)} files: they are kept from this version on; give dumps of older drives")
+                       f"{counted(len(logs), 'file')}: they are kept from this version on; give dumps of older drives")
     return list(found.values()) or None
 
 

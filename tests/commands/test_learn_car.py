@@ -144,7 +144,7 @@ def test_sidecars_of_logs_do_for_drives_and_a_vehicle_that_is_not_the_car_is_fou
 
 
 def test_logs_that_keep_nothing_or_what_cannot_be_are_refused_in_one_line(tmp_path: Path) -> None:
-    for number, (kept, said) in enumerate((({}, "found none in 1 files"), ({"form": 9}, "leave the log out"),
+    for number, (kept, said) in enumerate((({}, "found none in 1 file:"), ({"form": 9}, "leave the log out"),
                                            ({"form": 1, "noise": 1e-4, "data": "AAAA"}, "leave the log out"))):
         folder = tmp_path / str(number)
         folder.mkdir()

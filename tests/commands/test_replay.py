@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from drivers.dump import DumpHeader, DumpWriter, Event
+from logger.estimation.drive_spectra import spectra_of_fields
 
 from ..support.command import called
 
@@ -78,6 +79,9 @@ def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
     assert [int(record["segment"]) for record in records] == list(range(1, len(records) + 1))
     sidecar = json.loads(log.with_suffix(".json").read_text())
     assert sidecar["sensor"]["verified"] is True
+    kept = spectra_of_fields(sidecar["drive_spectra"])
+    driven = [float(row["speed_mps"]) for row in csv.DictReader(log.read_text().splitlines()) if row["speed_mps"]]
+    assert len(kept) > 10 and min(driven) < kept.speed_mps.mean() < max(driven)
 
 
 @pytest.mark.slow
