@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from re import fullmatch
 from threading import Lock
 from traceback import extract_tb
 from types import ModuleType
@@ -87,5 +88,8 @@ def blamed_on(path: Path) -> Iterator[None]:
         raise BadInput(f"{error.filename}:{error.lineno or 1}: expected Python, found {error.msg}") from error
     except (Exception, SystemExit) as error:
         lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
-        said = f":{lines[-1]}: {type(error).__name__}: {error}" if lines else f": {error}"
+        lacks = fullmatch(r"Can't instantiate abstract class (\w+) (?:with|without).* (\S+)", str(error))
+        what = (f"expected a function {lacks[2]} in the class {lacks[1]}" if lacks else
+                f"{type(error).__name__}: {error}")
+        said = f":{lines[-1]}: {what}" if lines else f": {error}"
         raise BadInput(f"{path}{said}") from error

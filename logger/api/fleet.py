@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion
+from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, full_day
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
@@ -159,7 +159,7 @@ def day_us(day: str | None) -> int | None:
     """The start of a day (UTC) [us since 1970]; None for None."""
     if day is None:
         return None
-    return (datetime.fromisoformat(day).replace(tzinfo=UTC) - _EPOCH) // timedelta(microseconds=1)
+    return (datetime.fromisoformat(full_day(day)).replace(tzinfo=UTC) - _EPOCH) // timedelta(microseconds=1)
 
 
 def _pieces(dataset: Dataset) -> RoadPieces | None:

@@ -33,12 +33,17 @@ def length_of(length: str | float) -> float:
     return length_m
 
 
+def full_day(day: str) -> str:
+    """The day itself, or the first one of a year (2026) or month (2026-04)."""
+    return day + {4: "-01-01", 7: "-01"}.get(len(day), "")
+
+
 def check_day(day: str) -> None:
-    """ValueError for what is no day."""
+    """ValueError for what is no day, month or year."""
     try:
-        date.fromisoformat(day)
+        date.fromisoformat(full_day(day))
     except ValueError:
-        raise ValueError("expected a date such as 2026-04-30") from None
+        raise ValueError("expected a date such as 2026-04-30, a month (2026-04) or a year (2026)") from None
 
 
 Logs = Annotated[Path | str | Sequence[Path | str], Argument(
@@ -124,7 +129,8 @@ class PassesQuestion(LogsQuestion):
         check=check_day)] = None
     until: Annotated[str | None, Option("rows before this day (UTC)", metavar="DAY", check=check_day)] = None
     split: Annotated[str | None, Option(
-        "what changed between the drives before this day and those from it on", metavar="DAY", check=check_day)] = None
+        "what changed between the drives before this day (or month 2026-04, or year 2026) and those from it on",
+        metavar="DAY", check=check_day)] = None
     above_m_per_km: Annotated[float | None, Option(
         "the IRI [m/km, or at a terminal as 160in/mi] from which a place goes on the work list (default: 2.68, poor by "
         "23 CFR 490.313)", LIMIT, "IRI", read=limit_of)] = None

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.log_questions import PassesQuestion, length_of
+from logger.api.log_questions import PassesQuestion, full_day, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
@@ -83,7 +83,7 @@ class RepeatedDrives(CommandResult):
         if longest is None:
             return []
         at_m: Array = self._found.length_m * (np.arange(len(longest), dtype=np.float64) + 0.5)
-        return [Curves("Mean of the drives over the longest way", "distance [m]", "IRI [m/km]", (
+        return [Curves("Mean IRI of all drives on the longest road, ± standard error", "distance [m]", "IRI [m/km]", (
             Line("IRI", at_m, self.iri_m_per_km[longest], self.iri_std_m_per_km[longest]),))]
 
     def write(self, path: Path, option: str = "--out") -> None:
@@ -104,8 +104,8 @@ class RepeatedDrives(CommandResult):
 
 
 def _day_s(day: str) -> float:
-    """The beginning of a day such as 2026-04-30 in UTC [s since 1970]."""
-    return datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp()
+    """The beginning of a day such as 2026-04-30, a month or a year in UTC [s since 1970]."""
+    return datetime.fromisoformat(full_day(day)).replace(tzinfo=UTC).timestamp()
 
 
 def combined(question: PassesQuestion) -> RepeatedDrives:
@@ -262,44 +262,44 @@ def lines(found: CombinedDrives) -> list[str]:
     if not cells:
         return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
     changes = change_lines(found)
-    return [*_summary(found), *_passes_visits(found), *([""] if changes else []), *changes]
+    return [*changes, *([""] if changes else []), *_summary(found), *_passes_visits(found)]
 
 
 def _summary(found: CombinedDrives) -> Iterator[str]:
     drives, cells = found.iri.drives, len(found.iri.key)
     several = int((drives > 1).sum())
-    yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
-           f"{counted(cells, 'cell')} of {found.length_m:g} m by place and direction")
-    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells; median {np.median(drives):g}, "
-           f"{drives.max()} at most")
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
-    yield f"IRI of the cells {mean:.2f} m/km on average, standard error of one cell {std:.2f}"
+    yield (f"Mean IRI {mean:.2f} m/km over {counted(cells, 'piece')} of road ({found.length_m:g} m, one direction); "
+           f"standard error of one piece {std:.2f} m/km")
+    yield f"From {counted(found.drives, 'drive')}; {found.placed:,} of {counted(found.windows, 'window')} have a place"
+    yield (f"More than one drive passed {several / cells:.0%} of the pieces; drives per piece: median "
+           f"{np.median(drives):g}, largest {drives.max()}")
     if isfinite(found.scatter.drive):
-        yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
-               f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
+        yield (f"Whole drives differ by {found.scatter.drive:.1%} of the IRI and single passes by "
+               f"{found.scatter.passes:.1%}, beyond the errors of their windows; the standard errors include both")
         if found.scatter.alike > 0:
-            yield (f"Of the variance of their own errors {found.scatter.alike:.0%} is alike in all drives over a "
-                   "place: more drives do not make that part smaller")
+            yield (f"All drives over a place share {found.scatter.alike:.0%} of the variance of their windows' errors; "
+                   "more drives do not reduce that part")
     else:
-        yield ("No cell was passed by two drives: how far a drive differs as a whole (tires, load, temperature) is not "
-               "known, and not in the standard errors")
+        yield ("No two drives passed the same piece, so the standard errors lack how whole drives differ (tires, load, "
+               "temperature)")
 
 
 def _passes_visits(found: CombinedDrives) -> Iterator[str]:
     yield ""
     if not found.visits:
-        yield "No place lies above a limit with enough confidence: nothing to visit."
+        yield "Work list: empty; no place is above a limit with enough confidence."
         return
-    yield f"Places to visit: {len(found.visits)}"
+    yield f"Work list: {counted(len(found.visits), 'place')}"
     yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w m/s2':>8}  "
-           f"{'perception':25} {'sure':>4} drives")
+           f"{'perception':25} {'confidence':>10} drives")
     for number, one in enumerate(found.visits[:MOST_VISITS], start=1):
         values = visit_values(found, one)
         iri = f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}"
         a_w = values["a_w_mps2"]
         yield (f"{number:3} {values['lat_deg']:10.5f},{values['lon_deg']:10.5f} {compass(values['heading_deg']):7} "
                f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>8}  "
-               f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:4.0%} "
+               f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:10.0%} "
                f"{one.drives:6}")
     if len(found.visits) > MOST_VISITS:
         yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
@@ -312,17 +312,19 @@ def change_lines(found: CombinedDrives) -> list[str]:
 
 def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
     if not len(change.key):
-        yield "No cell was passed in both periods: no change can be measured."
+        yield "No change can be measured: no piece of road was passed in both periods."
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")
-    yield (f"Changed between the two periods: {worse} of {counted(len(change.key), 'cell')} got worse, {better} better "
-           f"(at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
+    yield (f"Between the two periods {worse} of {counted(len(change.key), 'piece')} of {found.length_m:g} m got worse, "
+           f"{better} better (at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
+    if worse or better:
+        yield f"{'#':>3} {'':6} {'coordinates':>21} towards  change of the IRI"
     cell = np.searchsorted(found.iri.key, change.key)
     for one in largest_changes(change):
         at = int(cell[one])
         yield (f"{place_number(found, at):>3} {changed(change, one):6} {found.lat_deg[at]:10.5f},"
-               f"{found.lon_deg[at]:10.5f} {compass(found.heading_deg[at]):2}  {change.change_m_per_km[one]:+6.2f} ± "
+               f"{found.lon_deg[at]:10.5f} {compass(found.heading_deg[at]):7}  {change.change_m_per_km[one]:+6.2f} ± "
                f"{change.change_std_m_per_km[one]:.2f} m/km, p {change.p_value[one]:.1e}, "
                f"{counted(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
 
@@ -443,7 +445,7 @@ def _layer_visits(found: CombinedDrives) -> Iterator[Feature]:
         place = (values["lon_deg"], values["lat_deg"])
         title = (f"{number} {one.kind}, {one.length_m:.0f} m towards {compass(values['heading_deg'])}, "
                  f"{iri_title(values['iri_m_per_km'])}")
-        yield Feature("places to visit", title, tuple(values[name] for name in _VISIT), ((place,),), place,
+        yield Feature("work list", title, tuple(values[name] for name in _VISIT), ((place,),), place,
                       values["last_utc"], False, iri_class(values["iri_m_per_km"]))
 
 
@@ -456,10 +458,10 @@ def passes_page(found: CombinedDrives) -> Html:
     order = [cell for chain in chains(found) for cell in chain.tolist()]
     rows = [order.index(one.worst) for one in found.visits[:MOST_VISITS]]
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, marked=rows or None, first=(
-        section("Repeated drives combined", paragraphs(lines(found)[:4]) + hint(
-            "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
-            "last drive, its speed their mean.")), section("Places to visit", _page_visits(found, rows)),
-        section("What changed between the two periods", _page_changes(found))))
+        section("Repeated drives combined", paragraphs(list(_summary(found))) + hint(
+            "Below, each piece of road appears once, with the mean of all drives over it: its time is that of the last "
+            "drive, its speed their mean.")), section("What changed between the two periods", _page_changes(found)),
+        section("Work list", _page_visits(found, rows))))
 
 
 def _days(found: CombinedDrives) -> str:
@@ -482,13 +484,13 @@ def _page_changes(found: CombinedDrives) -> Html:
             compass(float(found.heading_deg[cell])),
             f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
             str(change.before[one]), str(change.after[one])))
-    heads = ("#", "It got", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
+    heads = ("#", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
     return paragraphs(change_lines(found)[:1]) + (grid(heads, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
 
 
 def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:
     if not found.visits:
-        return paragraphs(["No place lies above a limit with enough confidence."])
+        return paragraphs(["No place is above a limit with enough confidence."])
     rows = []
     for number, one in enumerate(found.visits, start=1):
         values = visit_values(found, one)
@@ -500,8 +502,8 @@ def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:
             compass(values["heading_deg"]), f"{one.length_m:.0f}",
             f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
-    heads = ("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
-             "Perception", "Sure", "Drives")
+    heads = ("#", "What", "Coordinates of the worst piece", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+             "Perception", "Confidence", "Drives")
     return html('<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 7))) + hint(
         f"Rough: above {found.above_m_per_km:.2f} m/km. A place has its number in all tables, on the map and in the "
         "curves.")

@@ -27,19 +27,20 @@ _ABOUT = (
     "beyond. The second and the fourth have the BMA220 of the box, with its steps of 0.6 m/s2; for the first and the "
     "third a serial accelerometer was plugged in. Both streets had been measured. All of it is simulated: car, "
     "streets and receiver, down to the bytes.",
-    "Something is in this car that its file, rav4-2009, does not know. It makes the IRI wrong. The lab is to find out "
-    "from the first three drives what it is, and the fourth is to say whether that was right.",
+    "This car has something that its file, rav4-2009, does not know, and it makes the IRI wrong. The lab finds it from "
+    "the first three drives; the fourth tells whether it was right.",
 )
 _EXPLAINED = {
-    "extract": "First the bytes become runs. Look at the places: fixes are late and wrong by a metre or two, but the "
-               "car felt the road that was measured, and that says where it was.",
-    "before": "What would the box say of the fourth street? Look at the bias, and at the share of windows within two "
-              "standard errors: 0.95 would be right. On a street that nobody measured, nothing would show it.",
-    "compare": "Does the model fail on the three drives, or are only its numbers a little off? They are refitted "
-               "within a few per cent first. Look at the residual then, and where it is.",
-    "diagnose": "Which physical effect would explain that? Look at the chance, and at the errors: on stretches that no "
-                "fit saw, the right one comes down to the sensor's noise.",
-    "add": "It is fitted on all three drives, with the car's numbers. Look at those that were biased without it.",
+    "extract": "First the bytes become runs. Look at the positions: GPS fixes are late and wrong by a metre or two, "
+               "but the car felt the measured road, and that tells where it was.",
+    "before": "What does the box say of the fourth street? Look at the bias, and at the share of windows within two "
+              "standard errors (ideal: 95%). On a street that nobody measured, nothing would show that it is wrong.",
+    "compare": "Does the model fail on the three drives, or are only its parameters a little off? compare first refits "
+               "them within a few per cent. Look at the residual that remains, and where it is.",
+    "diagnose": "Which physical effect would explain that? Look at the p-value, and at the NRMSE on held-out "
+                "stretches: with the right effect it falls to the noise floor.",
+    "add": "ridelog fits the effect and the car's parameters on all three drives. Look at the parameters that the "
+           "missing effect had biased.",
     "again": "Is that all? Look for anything that is more than noise.",
     "after": "The fourth drive once more, which the lab has never seen, with the new file.",
 }

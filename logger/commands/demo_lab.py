@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 _INTRODUCTION = (
     "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on the one and briskly on the other, "
     "with an accelerometer on the body. Both streets were measured beforehand, and the file of the car, rav4-2009, "
-    "comes with ridelog. Something is in this car that its file does not know; what, the lab is to find out."
+    "comes with ridelog. This car has something that its file does not know, and the lab finds out what."
 )
 _EXPLAINED = {
-    "compare": "First question: does the model fail at all, or are only its numbers a little off? Nominal masses and "
-               "springs are never exact, so they are refitted within a few per cent, and only the residual after "
+    "compare": "First question: does the model fail at all, or are only its parameters a little off? Nominal masses "
+               "and springs are never exact, so compare refits them within a few per cent; only the residual after "
                "that is evidence.",
-    "diagnose": "Second question: which physical effect would explain the residual? Each that ridelog knows is "
-                "simulated and fitted together with the car's numbers, on two thirds of each drive; the other third is "
-                "the judge.",
-    "add": "The effect is fitted on all of the drives, with the car's numbers. Look at the table: how the missing "
-           "effect had biased masses, springs and dampers. They looked like results, and were wrong.",
+    "diagnose": "Second question: which physical effect would explain the residual? diagnose simulates each effect "
+                "that ridelog knows, fits it together with the car's parameters on two thirds of each drive, and "
+                "judges it on the other third.",
+    "add": "add-effect fits the effect on all drives, with the car's parameters. The table shows how the missing "
+           "effect had biased masses, springs and dampers: they looked like results, and were wrong.",
     "again": "The same comparison once more, with the new vehicle file.",
 }
 

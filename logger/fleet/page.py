@@ -409,7 +409,7 @@ def _map() -> Html:
         '<noscript><p class="warn">The map is drawn by a script, which this browser does not run.</p></noscript>'
         '<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
         '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the roads. Arrow '
-        'keys move it, plus and minus zoom, 0 shows all. The lists below hold the places to visit."></canvas>'
+        'keys move it, plus and minus zoom, 0 shows all. The lists below hold the work list."></canvas>'
         '<canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
         '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
         '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
@@ -430,7 +430,7 @@ def _rough(sections: RoadTable) -> Html:
              f"{sections.length_m[one]:.0f}", str(sections.cars[one]), f"{sections.passes[one]:.0f}",
              f"{utc(int(sections.last_us[one])):%Y-%m-%d}", sections.visit[one].replace("|", ", ")) for one in order]
     heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")
-    none = ("No section gives a reason." if np.isfinite(sections.iri_std_m_per_km).any() else
+    none = ("No section is rough, worse or uncomfortable." if np.isfinite(sections.iri_std_m_per_km).any() else
             "Too few drives to be certain of any section.")
     return section("To visit", grid(heads, rows, words=(0, 5, 6)) + hint(
         "Sections of 0.1 mi, one direction each. Rough: above 170 in/mi with 95 % certainty; worse: its change is "

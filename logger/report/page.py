@@ -192,7 +192,7 @@ def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindo
             for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
         return EMPTY
-    heads = ("#", "Drive", "When (UTC)", "Coordinates", "Along the way", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
+    heads = ("#", "Drive", "When (UTC)", "Coordinates", "Distance", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
              "Flags")
     return section("Roughest places", html(
         '<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + hint(
@@ -319,12 +319,12 @@ def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources:
     """
     placed = any(record.lat_deg is not None and record.lon_deg is not None for record in records)
     if not placed and not summary.distance_m > 0:
-        return section("Along the way", Html('<p class="empty">No row has a position or a distance: there is neither '
+        return section("Along the road", Html('<p class="empty">No row has a position or a distance: there is neither '
                                              "map nor curve.</p>"))
     parts = [_map_view(summary, sources, drives) if placed else
              Html('<p class="empty">No row has a position, so there is no map.</p>')]
     parts += [_curves_view()] if summary.distance_m > 0 else []
-    return html('<section id="views" data-mode="iri"><h2>Along the way</h2><noscript><p class="warn">The map, the '
+    return html('<section id="views" data-mode="iri"><h2>Along the road</h2><noscript><p class="warn">The map, the '
                 "curves and the table of windows are drawn by a script, which this browser does not run.</p>"
                 "</noscript>{}{}</section>", concatenated(parts), _READOUT)
 
@@ -353,7 +353,7 @@ def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Htm
     repeated = hint(_repeated_words(summary.windows)) if len(drives) > 1 else EMPTY
     return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
                 "{}</div>{}</div>"
-                '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. '
+                '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the road. '
                 "Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
                 'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
                 '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
@@ -367,7 +367,7 @@ def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Htm
 
 def _curves_view() -> Html:
     return Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves '
-                "of roughness, weighted acceleration and speed along the way. Left and right go from window "
+                "of roughness, weighted acceleration and speed along the road. Left and right go from window "
                 "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
                 'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
                 "</div>") + hint(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.log_questions import check_day, full_day
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.store.log.row_format import HEADER, format_row
@@ -126,8 +127,9 @@ def test_a_place_has_one_number_and_what_got_worse_is_called_so(
     assert main(["passes", str(logs), "--length", "10m", "--split", "2025-06-30", "--above", "4",
                  "--out", str(page), "--out", str(table)]) == 0
     text, shown = capsys.readouterr().out, page.read_text("utf-8")
+    assert text.startswith("Between the two periods 1 of 100 pieces of 10 m got worse, 0 better")
     (line,) = [one for one in text.splitlines() if "m/km, p " in one]
-    visits = text.partition("Places to visit")[2].splitlines()[2:4]
+    visits = text.partition("Work list")[2].splitlines()[2:4]
     (bump,) = [one for one in visits if "single bump" in one]
     assert line.split()[:2] == [bump.split()[0], "worse"]
     worst = [one["changed"] for one in csv.DictReader(table.read_text("utf-8").splitlines())]
@@ -182,3 +184,9 @@ def test_what_all_windows_share_stays_in_the_mean_of_a_drive_and_of_drives(
     assert [one["sections"][0]["iri_std_m_per_km"] for one in drives] == pytest.approx([np.hypot(0.3, 0.04)] * 2)
     assert main(["sections", str(folder), "--length", "50m"]) == 0
     assert f"standard error {np.hypot(0.3, 0.4 / 200**0.5):.3f}," in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("day, full", [("2026", "2026-01-01"), ("2026-04", "2026-04-01"), ("2026-04-30", "2026-04-30")])
+def test_a_year_or_a_month_stands_for_its_first_day(day: str, full: str) -> None:
+    check_day(day)
+    assert full_day(day) == full

@@ -84,8 +84,8 @@ class ProportionTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Both gains."""
         weak, strong = found.figures["weak"], found.figures["strong"]
-        return (f"The response is nonlinear: {BANDS[found.figures['band']]}, the measurement is {weak:.2f} of the "
-                f"model at small motion and {strong:.2f} at large motion.")
+        return (f"The response is nonlinear: {BANDS[found.figures['band']]}, the measurement is {weak:.2f} times "
+                f"the model at small motion and {strong:.2f} times at large motion.")
 
 
 def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tuple[float, float, float, float] | None:

@@ -254,7 +254,7 @@ def stick_pulled_in_mid_copy(bench: Bench, report: Report) -> None:
         report.check("status speaks no more of a pulled stick", gone == report.times, f"{gone} of {report.times}")
         sticks.do("plug 0")
         notes = sticks.ready()
-        report.check("at last everything is on it", len(notes) == 1 and notes[0]["ok"], words(notes))
+        report.check("finally everything is on it", len(notes) == 1 and notes[0]["ok"], words(notes))
         rc, last = sticks.verify(0)
         report.check("ridelog verify of it", rc == 0, last)
         report.check("mounts that were left behind", not sticks.do("grep ridelog-stick /proc/mounts | grep -v "
