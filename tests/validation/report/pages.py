@@ -158,7 +158,7 @@ def _adding(records: Sequence[Record]) -> list[str]:
         lines.append(f"Error over {words}: median {median(ratios):.3f}, nine in ten below "
                      f"{ratios[int(0.9 * (len(ratios) - 1))]:.3f}, largest {ratios[-1]:.3f}; within 10 % in "
                      f"{_share(share(found, lambda record, key=name: near(record, key)))}.")
-    lines.append("The noise floor is the NRMSE of the noise alone. The attainable error is that of the true car with its "
+    lines.append("The noise floor is the NRMSE of the noise alone. The attainable error is that of the true car with "
                  "effects, driven along the recorded distance, which is off by millimetres to centimetres; correcting "
                  "the distance can bring it lower.")
     guesses = sorted(record["said"]["noise_floor_error"] / record["truth"]["noise_floor_error"] for record in found
