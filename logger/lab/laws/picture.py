@@ -15,9 +15,9 @@ from logger.vehicle.uncertain import NumberErrors
 
 Array = npt.NDArray[np.float64]
 
-_AXES = {"rate": ("rate_mps", "rate of the suspension in m/s, positive in extension"),
-         "travel": ("travel_m", "travel of the suspension in m, positive in extension"),
-         "deflection": ("deflection_m", "height of the wheel over the road from rest in m")}
+_AXES = {"rate": ("rate_mps", "suspension rate [m/s], positive in extension"),
+         "travel": ("travel_m", "suspension travel [m], positive in extension"),
+         "deflection": ("deflection_m", "tire deflection from rest [m], positive in extension")}
 _STEP = 1e-4  # of a standard error, over which derivatives are taken
 _LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 4000
 
@@ -33,7 +33,7 @@ def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawConte
     at = np.linspace(-reach, reach, CURVE_POINTS)
     damping = context.vehicle.front.suspension_damping_n_s_per_m
     line = Line("learned", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
-    return Curves(draft.title, name, "force in N", (line,))
+    return Curves(draft.title, name, "force [N]", (line,))
 
 
 def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping: float) -> Array:
@@ -73,5 +73,4 @@ def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
                     memory = memory + step_s * np.array(law.rates(law.p, seen))
         last = slice(-_LOOP_STEPS - 1, None, 20)
         lines.append(Line(f"{1000 * way_m:.3g} mm", travel[last], force[last]))
-    return Curves(draft.title, "travel of the suspension in m, to and fro at a car's bounce", "force in N",
-                  tuple(lines))
+    return Curves(draft.title, "suspension travel [m], to and fro at body bounce", "force [N]", tuple(lines))
