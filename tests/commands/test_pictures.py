@@ -27,6 +27,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
                  "--out", str(place / "drive.csv")]) == 0
     rows = (place / "drive.csv").read_text().splitlines()
     (place / "record.csv").write_text("".join(",".join(row.split(",")[:2]) + "\n" for row in rows))
+    time_s = np.arange(0, 10, 0.01)
+    np.savetxt(place / "decay.csv", np.stack([time_s, np.exp(-time_s) * np.sin(9 * time_s)], axis=1), "%.9g", ",",
+               header="t_s,accel_z_mps2", comments="")
     return place
 
 
@@ -74,7 +77,7 @@ def test_the_same_result_is_the_same_file(folder: Path, monkeypatch: pytest.Monk
     (["iri", "road.csv", "--out", "road.csv"], "--out road.csv: expected another file than those that are read"),
     (["iri", "road.csv", "--out", "x.csv"], "--out x.csv: expected a file that ends in one of .html, .png, .svg"),
     (["iri", "road.csv", "--out", "nowhere/x.png"], "expected a file in a folder that there is"),
-    (["modes", "record.csv", "--method", "decrement", "--response", "decay", "--out", "x.png"],
+    (["modes", "decay.csv", "--method", "decrement", "--out", "x.png"],
      "--out x.png: expected a result with pictures, found one without; .html holds its words"),
     (["estimate", "drive.csv", "--vehicle", "rav4-2009", "--out", "drive.csv.png", "--profile-out", "drive.csv.png"],
      "--profile-out drive.csv.png: expected every file to be another one"),

@@ -46,7 +46,7 @@ def model_of(records: list[Run]) -> VehicleModel:
 
 
 def options(model: VehicleModel):  # type: ignore[no-untyped-def]
-    return fit_options(model, "white", None, False, 0)
+    return fit_options(model, "white", None, 0)
 
 
 def test_a_record_the_right_way_up_is_fitted() -> None:
@@ -75,4 +75,4 @@ def test_records_that_cannot_be_meant_are_named_by_their_number() -> None:
     with pytest.raises(UnusableRun, match="expected 20 to 20000 m of way, found 13"):
         drives_of([record(seconds=2.9)])
     with pytest.raises(UnusableRun, match="for a low pass of 1 Hz, found 100 after the first 2 s"):
-        fit_options(model_of([record(seconds=3.0)]), "auto", 1.0, False, 0)
+        fit_options(model_of([record(seconds=3.0)]), "auto", 1.0, 0)
