@@ -1,10 +1,5 @@
-"""What the verbs about a record, a drive or a car alone are asked: comfort, estimate, calibrate and modes.
-
-What ``ridelog simulate`` is asked.
-
-What the verbs about measured profiles and random ones are asked: iri, road classify, road generate.
-
-What ``ridelog learn-car`` is asked.
+"""Questions about a record, a drive, a road or a car: comfort, estimate, calibrate, modes, simulate, iri, road and
+learn-car.
 """
 
 import re

@@ -1,7 +1,4 @@
-"""What the verbs about segment logs are asked: sections, passes and convert.
-
-What ``ridelog fleet`` is asked: ingest, summarise and report.
-"""
+"""Questions about segment logs: sections, passes, convert, and the three of ``ridelog fleet``."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass

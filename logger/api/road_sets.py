@@ -142,7 +142,7 @@ def runs_of(recording: RoadRecording, vehicle: str, profile: Path | None = None)
         return _runs(recording, Path(scratch), vehicle, profile)
 
 
-def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
+def on_line(run: Run, line: MeasuredLine, from_m: float) -> list[Run]:
     """A drive on a line's own distance, less ``from_m``, by its places alone: a run for each pass over the line.
 
     Where the receiver puts the car along the line is averaged over ``_SMOOTH_FIXES`` fixes: between them the speed

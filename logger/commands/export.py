@@ -36,15 +36,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog export``."""
     phase = parser.add_mutually_exclusive_group(required=True)
     phase.add_argument("--to", metavar="DIR", type=Path, help="the stick, or any other folder")
-    phase.add_argument("--unmounted", metavar="DIR", type=Path, help="say in the note that this stick may be pulled")
-    phase.add_argument("--removed", action="store_true", help="the stick was pulled: ridelog status no longer shows it")
     parser.add_argument("--from", dest="logs", metavar="LOGDIR", type=Path, help="logs (default: the service's)")
     parser.add_argument("--dumps", action="store_true", help="also the recorded dumps")
-    parser.add_argument("--mounted", action="store_true", help="only if DIR is a mount point")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service")
-    parser.add_argument("--note", metavar="FILE", type=Path, help="keep a note for 'ridelog status' in this file")
-    parser.add_argument("--led", metavar="DIR", type=Path, help="light that shows the notes: /sys/class/leds/NAME")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    # What follows is typed by nobody: systemd/ridelog-export@.service passes it. --unmounted: say in the note that this
+    # stick may be pulled; --removed: it was, and ridelog status no longer shows it; --mounted: only if DIR is a mount
+    # point; --note: the file of the note; --led: the light that shows the notes, /sys/class/leds/NAME.
+    for option in ("--unmounted", "--note", "--led"):
+        (phase if option == "--unmounted" else parser).add_argument(option, type=Path, help=argparse.SUPPRESS)
+    for option in ("--removed", "--mounted"):
+        (phase if option == "--removed" else parser).add_argument(option, action="store_true", help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:

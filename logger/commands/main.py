@@ -87,6 +87,7 @@ ASKED = {
     "modes": "drive_questions:MODES",
     "comfort": "drive_questions:COMFORT",
     "calibrate": "drive_questions:CALIBRATE",
+    "fixed-point": "fixed_point:FIXED_POINT",
 }
 """Verbs that are declared by a question, and where in ``logger.api``."""
 MOST_NAMED = 8
@@ -112,6 +113,8 @@ _SAID = (
     (r"argument \S+\|\S+: invalid choice: '(.*)' \(choose from (.*)\)", r"expected one of \2, found '\1'"),
     (r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", r"\1 \2: expected one of \3"),
     (r"the following arguments are required: (.*)", r"expected \1"),
+    (r"one of the arguments (\S+) is required", r"expected \1"),
+    (r"argument (\S+): not allowed with argument (\S+)", r"\1: expected no \2 with it"),
 )
 """Complaints of argparse, and how all others here are worded."""
 

@@ -1,10 +1,7 @@
 """Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed.
 
-``--out FILE.html`` of commands whose results have charts; ``.png``, ``.svg`` and ``.pdf`` hold the charts alone.
-
-Progress on the screen.
-
-Options that are numbers within a range, checked where they are declared.
+Beside them: pages and pictures of results with charts, progress on the screen, and numbers of the verbs that are
+declared by hand.
 """
 
 from __future__ import annotations

@@ -285,7 +285,7 @@ def write_tiles(segments: RoadTable, history: History, folder: Path) -> int:
 
 
 def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    column, row = _tile_of(x, y, level, CELLS)
+    column, row = _tile_of(x, y, level, parts=CELLS)
     place, code = np.unique((column << 32) | row, return_inverse=True)
     length_m = np.bincount(code, segments.length_m)
     mean = np.bincount(code, segments.iri_m_per_km * segments.length_m) / length_m

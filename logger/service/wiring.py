@@ -148,7 +148,7 @@ def _thinned(reading: Sensor, count: int) -> Sensor:
 def gps_decoder(config: Config) -> NmeaDecoder:
     """Decoder of the receiver's sentences."""
     earliest_us = midnight_utc_us(date.fromisoformat(config.gps.earliest_date))
-    return NmeaDecoder(config.gps.week_rollovers, earliest_us, config.gps.baud)
+    return NmeaDecoder(week_rollovers=config.gps.week_rollovers, earliest_utc_us=earliest_us, baud=config.gps.baud)
 
 
 def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None) -> Pipeline:

@@ -135,12 +135,12 @@ class Parameter:
         if self.null is None or self.low < self.null < self.high:
             return False
         weakest = self.coordinate(self.low if self.null <= self.low else self.high)
-        return abs(self.coordinate(value) - weakest) < _AT_BOUND * self.usual_range(weakest)
+        return abs(self.coordinate(value) - weakest) < _AT_BOUND * self.usual_range(origin=weakest)
 
     def is_lowest(self, value: float) -> bool:
         """Whether a value is at the low end of what it may be, to the same share."""
         lowest = self.coordinate(self.low)
-        return abs(self.coordinate(value) - lowest) < _AT_BOUND * self.usual_range(lowest)
+        return abs(self.coordinate(value) - lowest) < _AT_BOUND * self.usual_range(origin=lowest)
 
 
 @dataclass(frozen=True)

@@ -167,7 +167,7 @@ class Scales:
         """Of r.m.s. values. Those of a car are its bounce with a travel of 2 cm."""
         omega = 2 * np.pi * _BOUNCE_HZ
         return cls(_power_of_ten(force_n / (_MASS_KG * omega**2 * _TRAVEL_M)), _power_of_ten(travel_m / _TRAVEL_M),
-                   _power_of_ten(travel_m / rate_mps * omega, 2))
+                   _power_of_ten(travel_m / rate_mps * omega, parts=2))
 
 
 def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Effect:
@@ -207,7 +207,7 @@ def _factors(vehicle: Vehicle) -> tuple[float, float, float]:
     mass_kg = vehicle.sprung_mass_kg / len(structure.wheels) or _MASS_KG
     bounce_hz = float(undamped_frequencies_hz(structure)[0])
     wheelbase_m = float(structure.behind_m.max()) or _WHEELBASE_M
-    return (_power_of_ten(mass_kg / _MASS_KG), _power_of_ten(_BOUNCE_HZ / bounce_hz, 2) if bounce_hz else 1.0,
+    return (_power_of_ten(mass_kg / _MASS_KG), _power_of_ten(_BOUNCE_HZ / bounce_hz, parts=2) if bounce_hz else 1.0,
             _power_of_ten(wheelbase_m / _WHEELBASE_M))
 
 

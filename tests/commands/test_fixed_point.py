@@ -44,7 +44,7 @@ int main(void)
 }
 """
 SOS = {"ridelog_wk": (WEIGHTING.sections[100], FULL_SCALE_MPS2),
-       "ridelog_golden_car": (golden_car_sections(0.05), FULL_SCALE_SLOPE)}
+       "ridelog_golden_car": (golden_car_sections(0.25), FULL_SCALE_SLOPE)}
 
 
 def program(folder: Path, name: str, *options: str) -> Path:
@@ -78,7 +78,7 @@ def hard_input(name: str, bits: int) -> np.ndarray:
 @pytest.mark.parametrize(("name", "bits"), [("ridelog_wk", 32), ("ridelog_golden_car", 16),
                                             *slow(("ridelog_wk", 16), ("ridelog_golden_car", 32))])
 def test_c_gives_the_bits_of_python(tmp_path: Path, name: str, bits: int, options: list[str]) -> None:
-    assert main(["fixed-point", "--data-bits", str(bits), "--spacing", "0.05", "--out", str(tmp_path)]) == 0
+    assert main(["fixed-point", "--data-bits", str(bits), "--out", str(tmp_path)]) == 0
     executable = program(tmp_path, name, *options)
     sos, full_scale = SOS[name]
     cascade = fixed_cascade(sos, full_scale, bits)
@@ -107,12 +107,12 @@ def test_the_headers_stand_side_by_side(tmp_path: Path) -> None:
 
 def test_json_names_files_and_scales(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "deep" / "er"
-    assert main(["fixed-point", "--full-scale-g", "2", "--out", str(out), "--json"]) == 0
+    assert main(["fixed-point", "--out", str(out), "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["data_bits"] == 32
     weighting, car = reported["filters"]
     assert Path(weighting["file"]).is_file()
-    assert weighting["input_step"] == pytest.approx(2 * 9.80665 / 2**31)
+    assert weighting["input_step"] == pytest.approx(16 * 9.80665 / 2**31)
     assert weighting["sections"] == 7
     assert car["unit"] == "m/m"
     assert f"OUTPUT_STEP {car['output_step']!r}" in Path(car["file"]).read_text(encoding="ascii")
@@ -121,9 +121,9 @@ def test_json_names_files_and_scales(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(("arguments", "complaint"), [
     (["--weighting", "wx"], r"weighting 'wx': expected one of .*wk"),
     (["--rate", "50"], r"--rate 50: .*from 80 Hz"),
-    (["--spacing", "0.5"], r"--spacing 0.5: expected samples at most 0.3 m"),
-    (["--spacing", "0.001"], r"--spacing 0.001: expected sections that 32-bit coefficients can hold"),
-    (["--full-scale-g", "0"], r"--full-scale-g 0: expected 0.01 to 1000 g"),
+    (["--rate", "5000"], r"--rate 5000: expected"),
+    (["--rate", "100.5"], r"--rate 100.5: expected a whole number"),
+    (["--data-bits", "8"], r"--data-bits 8: expected 32 or 16"),
 ])
 def test_wrong_use_is_reported(tmp_path: Path, arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):

@@ -35,7 +35,8 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
     (["road", "generate", "--clas", "B"], "there is no option --clas; did you mean --class? (try"),
     (["iri", "p.csv", "q.csv"], "expected no q.csv (try"),
     (["fleet", "frob"], "expected one of 'ingest', 'summarise', 'report', found 'frob' (try"),
-    (["convert", "logs"], "expected --to (try"),
+    (["convert", "logs"], "expected --to (try"), (["export"], "expected --to (try"),
+    (["demo", "--lab", "--field"], "--field: expected no --lab with it (try"),
 ])
 def test_wrong_use_is_said_as_everything_else(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]

@@ -237,7 +237,7 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
         both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
                 mean_between(road.edges_m, known, begin_m, begin_m + window_m))
-        rows.append(repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, _CELL_M * cells))
+        rows.append(repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, moved_m=_CELL_M * cells))
     return rows
 
 

@@ -101,9 +101,9 @@ def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tup
     moved = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
     piecewise, along_m = _moved_piecewise(one, edges_m, values)
     fitted = mean_between(one.edges_m, piecewise, *ends_m)
-    return [repeat_row(names, "nearest cells", *nearest, _CELL_M * cells),
-            repeat_row(names, "laid over", moved, whole, shift_m),
-            repeat_row(names, _PIECEWISE, fitted, np.where(np.isfinite(fitted), whole, np.nan), along_m)]
+    return [repeat_row(names, "nearest cells", *nearest, moved_m=_CELL_M * cells),
+            repeat_row(names, "laid over", moved, whole, moved_m=shift_m),
+            repeat_row(names, _PIECEWISE, fitted, np.where(np.isfinite(fitted), whole, np.nan), moved_m=along_m)]
 
 
 def _moved_piecewise(one: ProfilerPass, edges_m: Array, values: Array) -> tuple[Array, float]:

@@ -358,7 +358,7 @@ class SameRoad:
 
     def _start(self) -> Array:
         """First guess of the roads' numbers: levels and noise from spectra; places by ``_offsets``."""
-        first = self._roads.first_guess(np.zeros(0), self.least_mps2)
+        first = self._roads.first_guess(np.zeros(0), least_mps2=self.least_mps2)
         offsets = self._offsets(first)
         for road, parts in enumerate(self.stretches):
             own = [offsets[run] for run, _ in parts]

@@ -233,7 +233,7 @@ class _Header:
 
 def _text_numbers(body: bytes, file: str, first_line: int) -> Array:
     """The numbers of whole lines, a block at a time: as words they take many times the memory of the file."""
-    refuse_long_lines(body, file, first_line)
+    refuse_long_lines(body, file, first_line=first_line)
     numbers = array("d")
     start = 0
     while start < len(body) and len(numbers) <= MAX_NUMBERS:

@@ -141,7 +141,7 @@ def _matrices(data: bytes, at: int, end: int, order: str, depth: int = 0) -> Ite
             inside = engine.decompress(data[begin:stop], _MOST_BYTES)
             if engine.unconsumed_tail:
                 raise ValueError(f"a variable of more than {_MOST_BYTES} bytes")
-            yield from _matrices(inside, 0, len(inside), order, depth + 1)
+            yield from _matrices(inside, 0, len(inside), order, depth=depth + 1)
         elif kind == _MATRIX and stop > begin:
             yield _matrix(data, begin, stop, order, depth)
 
@@ -153,7 +153,7 @@ def _matrix(data: bytes, begin: int, stop: int, order: str, depth: int) -> _Matr
     flags, = struct.unpack_from(order + "I", data, parts[0][1])
     name = data[parts[2][1] : parts[2][2]].decode("latin-1") if len(parts) > 2 else ""
     if flags & 0xFF not in _NUMERIC:
-        return _Matrix(name, None, False, tuple(_matrices(data, begin, stop, order, depth + 1)))
+        return _Matrix(name, None, False, tuple(_matrices(data, begin, stop, order, depth=depth + 1)))
     kind, first, last = parts[3] if len(parts) > 3 else (9, stop, stop)
     if kind not in _NUMBERS or flags & _COMPLEX:
         raise ValueError(f"numbers of a kind that there is not, {kind}, or complex ones")

@@ -54,7 +54,7 @@ class Node:
         if isinstance(self.content, str):
             if self.plain and self.content in _NULLS:
                 return "nothing"
-            return shortened(self.content, 40)
+            return shortened(self.content, longest=40)
         return "a list" if isinstance(self.content, tuple) else "a mapping"
 
     def is_null(self) -> bool:

@@ -83,7 +83,7 @@ class SensorBandwidth(SensorEffect):
         return seen.low_pass is not None and abs(np.log(values["cutoff_hz"] / seen.low_pass[0])) < np.log(_NEAR)
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
-        return butterworth(int(p.order), s, p.cutoff_hz, p.sampled_hz)
+        return butterworth(int(p.order), s, p.cutoff_hz, sampled_hz=p.sampled_hz)
 
 
 EFFECT = SensorBandwidth()
