@@ -352,6 +352,15 @@ class SimulateQuestion(Question):
             raise self.wrong("speed_mps", words)
 
 
+def _speed(text: str) -> float | Path:
+    try:
+        return float(text)
+    except ValueError:
+        if text[:1].isdigit() and not Path(text).exists():
+            raise ValueError("expected a number in m/s, without its unit, or a file") from None
+        return Path(text)
+
+
 @dataclass(frozen=True)
 class SimulateCommand(SimulateQuestion):
     """At the terminal files stand for roads, and more can be asked for."""
@@ -362,17 +371,15 @@ class SimulateCommand(SimulateQuestion):
     profile: Annotated[Path | None, Option(
         "CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
         "left one", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
-    speed_mps: Annotated[float | None, Option(
-        "the same all the way [m/s]", SPEED, "MPS")] = None  # type: ignore[assignment]
+    speed_mps: Annotated[float | Path | None, Option(
+        f"the same all the way, {SPEED.words}; or a CSV with t_s,speed_mps, straight lines between them: the drive "
+        "then lasts as long as the file", metavar="MPS|FILE", read=_speed)] = None  # type: ignore[assignment]
     _: KW_ONLY
     excitation: Annotated[Path | None, Option(
         "what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m[,elevation_rear_m]); without "
         "--speed", metavar="FILE", read=Path)] = None
     flat_m: Annotated[float | None, Option(
         "a flat road of this length instead [m]", Range(1.0, 10_000.0, "m"), "M")] = None
-    speed_file: Annotated[Path | None, Option(
-        "CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file", metavar="FILE",
-        read=Path)] = None
     effects: Annotated[Sequence[str], Option(
         "a physical effect, or the path of a Python file with one of your own; may repeat. What is not said is at its "
         "usual value; takes the place of the vehicle's own effect of that name", metavar="NAME[:PARAM=VALUE,...]",
@@ -386,12 +393,14 @@ class SimulateCommand(SimulateQuestion):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for ones in (("profile", "excitation", "flat_m"), ("speed_mps", "speed_file")):
-            if len(given := [one for one in ones if getattr(self, one) is not None]) > 1:
-                raise self.wrong(given[1], f": expected no `{given[0]}` with it")
-        beside = [one for one in ("speed_mps", "speed_file", "obstacles") if getattr(self, one) not in (None, [])]
+        if len(given := [one for one in ("profile", "excitation", "flat_m") if getattr(self, one) is not None]) > 1:
+            raise self.wrong(given[1], f": expected no `{given[0]}` with it")
+        beside = [one for one in ("speed_mps", "obstacles") if getattr(self, one) not in (None, [])]
         if self.excitation is not None and beside:
             raise self.wrong(beside[0], ": expected none of it with `excitation`: a rig stands, and has no road")
+
+    def files_read(self) -> Sequence[Path]:
+        return [*super().files_read(), *([self.speed_mps] if isinstance(self.speed_mps, Path) else [])]
 
 
 SIMULATE = Verb(SimulateCommand, "", (

@@ -32,7 +32,7 @@ OUTPUTS = ("wheels", "travel", "tires", "displacement", "velocity", "body")
 
 
 USAGE = """ridelog simulate --vehicle NAME|FILE (--profile FILE | --flat M | --excitation FILE)
-                        (--speed MPS | --speed-file FILE) --out FILE [OPTIONS]
+                        --speed MPS|FILE --out FILE [OPTIONS]
        ridelog simulate --list-effects [--json]"""
 
 
@@ -124,7 +124,7 @@ def _check_given(question: SimulateCommand, drives: list[Path]) -> None:
     stands = question.excitation is not None
     needed = {"--vehicle": question.vehicle,
               "--profile or --flat": stands or question.profile or question.flat_m is not None,
-              "--speed or --speed-file": stands or question.speed_mps is not None or question.speed_file,
+              "--speed": stands or question.speed_mps is not None,
               "--out": drives}
     if missing := [name for name, given in needed.items() if not given]:
         raise BadInput(f"simulate: expected {', '.join(missing)} (try 'ridelog simulate --help')")
@@ -237,8 +237,8 @@ def _motion(question: SimulateCommand, track: Track | Excitation, wheelbase_m: f
 
     if isinstance(track, Excitation):
         return standing(track, question.rate_hz)
-    if question.speed_file is not None:
-        knots = read_speeds(question.speed_file)
+    if isinstance(question.speed_mps, Path):
+        knots = read_speeds(question.speed_mps)
     else:
         assert question.speed_mps is not None  # as was checked
         knots = at_one_speed(track, wheelbase_m, question.speed_mps)

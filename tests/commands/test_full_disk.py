@@ -105,7 +105,7 @@ OTHERS = {
 """Options that ask for what is written, of commands that are judged beside their own tests, and why."""
 WRITE = {"--out", "--profile-out", "--page", "--visit", "--to", "--note", "--root"}
 READ = {"--config", "--from", "--base", "--route", "--roads", "--smoothness", "--profile", "--location", "--csv",
-        "--compare", "--excitation", "--speed-file", "--log", "--unmounted", "--led", "--effect-file"}
+        "--compare", "--excitation", "--log", "--unmounted", "--led", "--effect-file"}
 
 
 def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:

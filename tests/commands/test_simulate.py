@@ -74,7 +74,7 @@ def test_the_installed_command(folder: Path, ridelog: Path) -> None:
 def test_a_speed_file_starts_stands_and_stops(folder: Path) -> None:
     speeds = folder / "speeds.csv"
     speeds.write_text("t_s,speed_mps\n0,0\n1,0\n5,12\n8,12\n10,0\n12,0\n")
-    run = simulated(folder, "--speed-file", str(speeds))
+    run = simulated(folder, "--speed", str(speeds))
     assert len(run.time_s) == 1201
     assert run.speed_mps[[0, 100, 300, 700, 900, 1200]] == pytest.approx([0, 0, 6, 12, 6, 0])
     assert run.distance_m[[100, 300, 500, 800, 1000, 1200]] == pytest.approx(30 + np.array([0, 6, 24, 60, 72, 72]))
@@ -192,14 +192,14 @@ def test_an_obstacle_may_reach_to_the_ends_of_the_road(tmp_path: Path) -> None:
 def test_files_that_will_not_do(folder: Path) -> None:
     speeds = folder / "speeds.csv"
     speeds.write_text("t_s,speed_mps\n0,1\n0,1\n")
-    assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:3: expected a time after 0 s")
+    assert refusal(folder, "--speed", str(speeds)).startswith(f"{speeds}:3: expected a time after 0 s")
     speeds.write_text("t_s,speed_mps\n0,1\n9e4,1\n")
-    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 90000 s")
+    assert refusal(folder, "--speed", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 90000 s")
     for first, then, line in (("1e17", "1.0000000000000001e17", 2), ("0", "1e9", 3)):
         speeds.write_text(f"t_s,speed_mps\n{first},1\n{then},1\n")
-        assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:{line}: expected t_s within 100000 s")
+        assert refusal(folder, "--speed", str(speeds)).startswith(f"{speeds}:{line}: expected t_s within 100000 s")
     speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
-    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
+    assert refusal(folder, "--speed", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
     assert "expected another file than those that are read" in refusal(
         folder, "--speed", "20", "--profile-out", str(folder / "profile.csv"))
     (folder / "mine.yaml").write_bytes(vehicle_file("rav4-2009").read_bytes())

@@ -47,7 +47,7 @@ def test_wrong_use_is_said_as_everything_else(
 
 
 @pytest.mark.parametrize(("arguments", "said"), [
-    (["iri", "p.csv", "--window", "3ft"], "--window 3ft: expected a number, without its unit"),
+    (["modes", "p.csv", "--from", "3ft"], "--from 3ft: expected a number, without its unit"),
     (["sections", "logs", "--units", "uk"], "--units uk: expected one of si, us"),
 ])
 def test_what_an_option_may_not_be_is_one_sentence(arguments: list[str], said: str) -> None:

@@ -144,7 +144,6 @@ class AddEffectQuestion(LabQuestion):
     runs: TrackedRuns
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
-    effect_files: EffectFiles = ()
 
     def files_read(self) -> Sequence[Path]:
         own = Path(str(self.name).partition(":")[0])
