@@ -3,22 +3,30 @@ wherever they begin; and what they are asked to explain they do not bend the car
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, coordinates_of, free_parameters_of, read, with_coordinates
+from logger.vehicle.uncertain import grows_with_mass
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.runs_with_residual import CAR
-from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2
+from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2
 from ...support.slow import slow
+
+Array = npt.NDArray[np.float64]
 
 
 def from_start(posterior: Posterior, *effects: Chosen) -> LinearModel:
@@ -70,6 +78,37 @@ def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
     assert other.score == pytest.approx(damped().score, abs=2 * CONVERGED)
     assert other.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
         damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
+
+
+def test_where_numbers_are_not_known_the_prior_of_one_holds_the_scale_of_all() -> None:
+    """A car in which all masses and forces are larger by one factor moves alike, so that a fit from there goes back to
+    the mass that was weighed."""
+    harder, factor = chosen(EFFECTS["progressive_spring"], {"cubic_stiffness_n_per_m3": 2e6}), 1.1
+    runs = noisy_runs([harder])
+    weighed = Tolerance(numbers=1.0, by_name={"sprung_mass_kg": 0.02})
+    posterior = Posterior(SimulatedRuns(runs, FINE_HZ), CAR, weighed)
+    logs = np.log(factor) * np.array([grows_with_mass(name) for name in posterior.prior.names])
+    state = posterior.state_at([replace(harder, values={"cubic_stiffness_n_per_m3": 2e6 * factor})], logs)
+    assert posterior.error(state) == pytest.approx(noise_share(posterior), rel=0.03)
+    found = fit_to_the_end(LinearModel(posterior, state)).state
+    assert dict(zip(posterior.prior.names, found.logs, strict=True))["sprung_mass_kg"] == pytest.approx(0, abs=0.003)
+
+
+def test_a_car_that_cannot_be_simulated_is_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    predict, tried = Posterior.predict, list[float]()
+
+    def within(self: Posterior, effects: Sequence[Chosen], logs: Array, *more: Any, **said: Any) -> list[Array]:
+        tried.append(float(np.abs(logs).max()))
+        if tried[-1] > 0.02:
+            raise np.linalg.LinAlgError
+        return predict(self, effects, logs, *more, **said)
+
+    posterior = drawn([], 4, plain().state.size).posterior
+    start = align(posterior, posterior.start())
+    monkeypatch.setattr(Posterior, "predict", within)
+    found = fit(start)
+    assert max(tried) > 0.02 >= np.abs(found.state.logs).max() > 0
+    assert found.score <= start.score
 
 
 @pytest.mark.slow

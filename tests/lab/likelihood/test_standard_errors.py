@@ -44,6 +44,8 @@ def errors_of(model: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     ("damper_asymmetry", {"rebound_to_bump_ratio": 2.0}, {"rebound_to_bump_ratio": 0.1}, 20 * np.log(2.0)),
     ("top_mount_compliance", {"mount_stiffness_n_per_m": 2e5}, {"mount_stiffness_n_per_m": 4e4}, 5.0),
     ("occupant", {"mass_kg": 30.0}, {"mass_kg": 10.0, "frequency_hz": 0.1, "damping_ratio": 0.01}, 3.0),
+    ("frame_friction", {"friction_force_n": 0.0, "body_friction_force_n": 1.6},
+     {"friction_force_n": 0.01, "body_friction_force_n": 0.04}, 40.0),
     ("wheel_lift", {}, {}, np.inf),
     ("sensor_offset", {"offset_m": 0.1}, {"offset_m": np.inf}, np.inf),
 ])
