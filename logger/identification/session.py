@@ -161,9 +161,24 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries:
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     if any(record.timed for record in model.records):
         del kinds["road"]
+    trials = model.trials()
     return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
-                   starts=[*model.trials(), *spread_starts(model.parameters, tries)])
+                   starts=[*trials, *(likely_starts(model) if trials else ()),
+                           *spread_starts(model.parameters, tries)])
+
+
+def likely_starts(model: DriveModel, draws: int = 60, best: int = 2) -> list[dict[str, float]]:
+    """The best by squares of so many cars, spread around. A car that was fitted without an effect is biased, and
+    downhill from there the effect may vanish: cars in which other numbers differ as well lead to where it does not."""
+    def error(start: dict[str, float]) -> float:
+        with np.errstate(all="ignore"):
+            predictions = model.predict(np.array([start[one.name] for one in model.parameters]))
+            found = normalised_rms([measured - one for measured, one in zip(model.measured, predictions, strict=True)],
+                                   model.measured)
+        return found if np.isfinite(found) else np.inf
+
+    return sorted(spread_starts(model.parameters, draws), key=error)[:best]
 
 
 def upright_fit(
