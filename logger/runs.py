@@ -69,6 +69,12 @@ class Signal:
         return self.measures not in ("displacement", "travel")
 
     @property
+    def may_drift(self) -> bool:
+        """Whether its sensor's zero wanders by as much as what it measures where that is slow: of accelerations and
+        turning rates it does."""
+        return self.measures not in ("velocity", "displacement", "travel", "force")
+
+    @property
     def never_repeats(self) -> bool:
         """Whether equal samples are one that was written twice: noise makes an acceleration another one each time, a
         place may stay what it is."""

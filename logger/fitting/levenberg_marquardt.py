@@ -3,8 +3,9 @@
 Problem: fits here have hundreds of numbers of which most are known by a prior, derivatives that take as long as a fit
 may, and bounds. ``scipy.optimize.least_squares`` wants residuals and a Jacobian of them all, for each step.
 Solution: a fit gives its cost and its normal equations, however it comes to them. Steps are damped by the diagonal
-(D. W. Marquardt 1963); a number at a bound that it presses against stays there; and derivatives serve on for as long as
-steps gain what was predicted, which is for the fit to make use of: a minimum is believed only with fresh ones.
+(D. W. Marquardt 1963); a number that would go beyond a bound stays there, and the others take that into account; and
+derivatives serve on for as long as steps gain what was predicted, which is for the fit to make use of: a minimum is
+believed only with fresh ones.
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ def minimise(
         free = ~(((x <= low) & (downhill < 0)) | ((x >= high) & (downhill > 0)))
         gained = predicted_gain = 0.0
         while share <= damping.largest:
-            reached = np.clip(x + _step(downhill, information, free, share, longest_step), low, high)
-            step = reached - x
+            step = _step_within(low - x, high - x, downhill, information, free, share, longest_step)
+            reached = np.clip(x + step, low, high)
             predicted_gain = float(downhill @ step - 0.5 * step @ information @ step)
             if not predicted_gain >= small_gain(at):
                 break
@@ -108,6 +109,20 @@ def minimise(
                 return Minimum(x, at, information, rounds, True)
             fresh, share = True, damping.first
     return Minimum(x, at, information, rounds, False)
+
+
+def _step_within(low: Array, high: Array, downhill: Array, information: Array, free: npt.NDArray[np.bool_],
+                 damping: float, longest: float) -> Array:
+    """The damped step (k,) of the numbers that are free to move, within bounds on it (k,): where a number would go
+    beyond one it goes up to there, and the others go where they are best then."""
+    free, ended = free.copy(), np.zeros_like(downhill)
+    while True:
+        step = ended + _step(downhill - information @ ended, information, free, damping, longest)
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            return step
+        ended[beyond] = np.clip(step, low, high)[beyond]
+        free &= ~beyond
 
 
 def _step(downhill: Array, information: Array, free: npt.NDArray[np.bool_], damping: float, longest: float) -> Array:

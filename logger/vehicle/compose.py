@@ -51,6 +51,9 @@ MOST_MPS2 = 1e6
 """Records end here: those of a car whose motion grows without bound, which effects may make."""
 
 
+_NO_RISE_MPS = 1e-9  # over half a step: less is lost in rounding
+
+
 @dataclass(frozen=True, eq=False)
 class Car:
     """A vehicle with its effects.
@@ -79,8 +82,8 @@ class Car:
 
     @property
     def rubs(self) -> bool:
-        """Whether there is dry friction in it."""
-        return any(one.rubs for one in self.laws)
+        """Whether there is dry friction in it that decides how it moves: not in a part that its bench moves."""
+        return not self.structure.held and any(one.rubs for one in self.laws)
 
     @property
     def output(self) -> Output:
@@ -231,11 +234,27 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
     if structure.held:
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
         force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
+        force_n += _friction_of_held(car.laws[0], *inputs[:, 1:3].T, passage.step_s)
         return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
         return _of_motion(structure, moved(car, passage), inputs, outputs)
     observe, direct = structure.output_matrices(outputs)
     return (in_blocks(structure, passage, observe) + inputs @ direct.T).T
+
+
+def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_s: float) -> Array:
+    """Dry friction (M,) of a part that its bench moves at these rates, which grow so fast (M,): its mean over a step
+    around each instant, so that it turns round when the motion does and not when the next step begins."""
+    way, transition = 0.5 * step_s * rise_mps2, laws.friction_transition_mps
+
+    def integral(rate: Array) -> Array:
+        size = np.abs(rate)
+        return size + transition * np.log1p(np.exp(-2 * size / transition)) if transition > 0 else size
+
+    at_once = np.tanh(rate_mps / transition) if transition > 0 else np.sign(rate_mps)
+    over = np.abs(way) > _NO_RISE_MPS
+    mean = (integral(rate_mps + way) - integral(rate_mps - way)) / np.where(over, 2 * way, 1.0)
+    return np.asarray(laws.dry_friction_n * np.where(over, mean, at_once))
 
 
 def _preload(force_n: float, travel_m: Array) -> Array:
@@ -269,8 +288,9 @@ def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
 @lru_cache(maxsize=4)
 def stepper_of(car: Car, step_s: float, forces: Forces = ()) -> Stepper:
     """What steps a car, which passes all of its runs one after the other or at once, under forces on these parts."""
-    structure = carried(car.structure) if car.structure.held else pushed(car.structure, forces)
-    return Stepper.of(structure, car.laws, step_s)
+    if car.structure.held:
+        return Stepper.of(carried(car.structure), [replace(one, dry_friction_n=0.0) for one in car.laws], step_s)
+    return Stepper.of(pushed(car.structure, forces), car.laws, step_s)
 
 
 def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:

@@ -271,3 +271,43 @@ def test_a_circuit_of_tiny_numbers_is_named_a_hardening_spring(tmp_path: Path, c
     assert found["verdict"] == ["progressive_spring"]
     best = next(one for one in found["candidates"] if one["effect"] == "progressive_spring")
     assert best["parameters"]["cubic_stiffness_n_per_m3"] == pytest.approx(30.0, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_zero_of_the_force_on_a_hardening_spring_is_named_and_no_stop(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A spring that is not linear works around another place under a force that is there all the time: stiffer one way
+    than the other, as with a stop."""
+    true = Bench(5e-4, 1.0, 2.5e-3, 30.0)
+    push = noise(20.0, 0.02, 5)
+    off_n = 0.02 * 0.15
+    measured = true.moved(NOTHING, lambda t: push(t) + off_n, NOTHING)["displacement_m"]
+    measured = measured + np.random.default_rng(8).normal(0.0, 2e-3 * measured.std(), len(measured))
+    run = written(tmp_path / "run", {"displacement_m": measured}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "box.yaml").write_text(Bench(5.1e-4, 0.98, 2.5e-3).yaml)
+    assert main(["diagnose", "--vehicle", str(tmp_path / "box.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ["progressive_spring", "constant_force"]
+    best = next(one for one in found["candidates"] if one["effect"] == "constant_force")
+    assert best["parameters"]["push_n"] == pytest.approx(off_n, rel=0.1)
+
+
+def test_what_a_part_pulls_back_with_at_rest_is_found_beside_its_friction(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its file says a damper and no preload; the numbers are those of its equation, and all of its force is explained.
+    A search that starts at friction which grows with the rate ends at friction that does not."""
+    way = noise(3.0, 0.02, 6)
+    x_m, v_mps = way(TIME_S), way(TIME_S, 1)
+    force_n = -40.0 + 400.0 * x_m + 90.0 * v_mps + 15.0 * np.sign(v_mps)
+    force_n += np.random.default_rng(3).normal(0.0, 0.5, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": x_m}, "source: me\n")
+    (tmp_path / "part.yaml").write_text("name: damper\nmodel: component\nstiffness_n_per_m: 380\n"
+                                        "damping_n_s_per_m: 100\npreload_n: 0\n")
+    assert main(["add-effect", "dry_friction:transition_velocity_m_per_s=0.001", "--vehicle",
+                 str(tmp_path / "part.yaml"), "--out", str(tmp_path / "with.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["friction_force_n"] == pytest.approx(15.0, abs=0.3)
+    now = ridelog.read_vehicle(tmp_path / "with.yaml").vehicle
+    assert now.preload_n == pytest.approx(-40.0, abs=0.5)
+    assert now.front.suspension_damping_n_s_per_m == pytest.approx(90.0, rel=0.02)
+    assert ridelog.compare(tmp_path / "with.yaml", [run]).error < 0.1

@@ -124,14 +124,22 @@ class RecordError:
 
     @cached_property
     def _recorder_deviations(self) -> Array:
-        """Standard deviations of the numbers of the recorder and of the further signals (2 + s,)."""
+        """Standard deviations of the numbers of the recorder and of the further signals (2 + s,), and of the zero of a
+        part's force. What a part pulls back with at its rest depends on gas, weight and how its sensor was set to zero:
+        any force as large as those measured is as likely."""
         signals = (self.run.facts.main, *self.run.signals)
         gain, *gains = (self.tolerance.gain_of(one) for one in signals)
-        return np.array([gain, self.tolerance.droop, *gains])
+        zero = [float(np.sqrt(np.mean(self.run.kept_readings_mps2**2))) or 1.0] if self.has_zero else []
+        return np.array([gain, self.tolerance.droop, *gains, *zero])
+
+    @property
+    def has_zero(self) -> bool:
+        """Whether the zero of what was measured is the last of k."""
+        return self.run.facts.main.measures == "force"
 
     def signal_gains(self, k: Array) -> Array:
         """By what share each further signal reads too much (s,)."""
-        return k[self.places + 2 :]
+        return k[self.places + 2 : self.places + 2 + len(self.run.signals)]
 
     @property
     def places(self) -> int:
@@ -212,10 +220,17 @@ class RecordError:
         main = self.run.main(prediction)
         rise = derivative(main, self.run.rate_hz)
         found = np.asarray(main + k[self.places : self.places + 2] @ _recorder_slopes(main, rise, self.run))
+        if self.has_zero:
+            found += k[-1] * self._zero_slope
         if len(main) == len(prediction):
             return found
         others = prediction[len(main) :].reshape(-1, len(main)) * (1 + self.signal_gains(k))[:, None]
         return np.concatenate([found, others.ravel()])
+
+    @property
+    def _zero_slope(self) -> Array:
+        """What a zero of 1 adds to the samples (n,)."""
+        return self.run.in_band(np.ones(self.run.count))
 
     def slopes(self, prediction: Array) -> csr_array:
         """Derivatives of a prediction (n,), or of more signals joined to it, by each of k: a sparse array (k, n) [m/s2
@@ -234,6 +249,8 @@ class RecordError:
                 recorded[1 + signal] = prediction[start : start + n]
             else:
                 recorded[:2] = _recorder_slopes(prediction[:n], rise, self.run)
+                if self.has_zero:
+                    recorded[-1] = self._zero_slope
             found.append([[moved], [csr_array(recorded)]])
         return csr_array(block_array([[column[row][0] for column in found] for row in range(2)], format="csr"))
 
@@ -276,6 +293,17 @@ def record_error(run: Run, tolerance: Tolerance) -> RecordError:
 
     return RigRecordError(run, csr_array((0, run.count)), tolerance, 1.0) if run.timed else (
         RecordError.of(run, tolerance))
+
+
+def zero_of(errors: Sequence[RecordError], record: Sequence[Array]) -> tuple[float, list[Array]]:
+    """The zero of the force [N] that runs of a part on its bench have, in the mean, by numbers (k,) per run, and the
+    numbers of records that have it and no other error; 0 and exact records of others."""
+    found = [float(k[-1]) if one.has_zero else 0.0
+             for one, k in zip(errors, record, strict=True)]
+    zero, exact = float(np.mean(found)), [np.zeros(one.count) for one in errors]
+    for k in exact:
+        k[-1] = zero
+    return zero, exact
 
 
 def unusual_distance_error_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:

@@ -267,14 +267,23 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     # Where numbers are not known, the scale of all masses and forces is held by the prior of one of them alone: a step
     # that is damped by what the runs say of each moves it by next to nothing, and looks like the last.
     damping = Damping(first=Damping.least) if linear.prior.is_vague else Damping()
+    ends = np.array([(-np.inf, np.inf)] * p + [ends_of(state.effects[free.effect].effect.parameters[free.parameter])
+                                               for free in free_parameters]).reshape(-1, 2)
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,
-                    damping=damping).at
+                    low=ends[:, 0], high=ends[:, 1], damping=damping).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)
+
+
+def ends_of(parameter: Parameter) -> tuple[float, float]:
+    """Ends of a parameter's range on the scale that fits move on, the lower one first."""
+    first, last = sorted(map(parameter.coordinate, (parameter.low, parameter.high)))
+    return first, last
 
 
 def range_of(parameter: Parameter) -> float:
     """Width of a parameter's range on the scale that fits move on; infinite where it has no end."""
-    return abs(parameter.coordinate(parameter.high) - parameter.coordinate(parameter.low))
+    low, high = ends_of(parameter)
+    return high - low
 
 
 def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, free_parameters: Sequence[FreeParameter],

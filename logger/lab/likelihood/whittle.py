@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.whole_record import HALF_WIDTH_HZ
-from logger.runs import EVEN_SAMPLES, READING, Run
+from logger.runs import EVEN_SAMPLES, READING, Run, Signal
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ HIGHEST_OF_RATE = 0.37
 """Share of the rate up to which records are compared: above it recorders' filters differ. Below
 ``simulate.PASS_OF_RATE``, up to which a usual filter is flat."""
 LOWEST_HZ = 0.4
-"""Records are not compared below: a car hardly accelerates there, and sensors drift."""
+"""Accelerations are not compared below: a car hardly accelerates there, and sensors drift."""
 # Least noise: of the sensor's acceleration, and of another signal as a share of its own deviation. No sensor has less
 # than a ten-millionth of g; simulated records without noise need a level above 0.
 _LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
@@ -66,7 +66,7 @@ class Bands:
         self._starts = starts[starts <= kept - size]
         f_hz = np.fft.rfftfreq(size, 1 / rate)
         band_hz = run.pass_band_hz if signal is None else (0.0, rate / 2)
-        edges = _edges_hz(run, band_hz)
+        edges = _edges_hz(run, band_hz, run.facts.main if signal is None else run.signals[signal])
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         passed = band_hz[1] >= rate / 2
@@ -127,16 +127,18 @@ class Bands:
         return np.asarray(np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2 / (self._size * self._share))
 
 
-def _edges_hz(run: Run, band_hz: tuple[float, float]) -> Array:
+def _edges_hz(run: Run, band_hz: tuple[float, float], of: Signal) -> Array:
     """Edges of a run's bands (b + 1,) within its pass band, one band at least [Hz]. They stop short of an end of the
     pass band, where its filter begins to act. On a rig, whose wheels may hop above all that cars do, bands of the last
-    relative width go on up to there."""
+    relative width go on up to there; and forces and places, which are as large in slow motions as in quick ones, are
+    compared from 0 on."""
     low_hz, high_hz = band_hz
     high_hz = min(high_hz - HALF_WIDTH_HZ if high_hz < run.rate_hz / 2 else high_hz, HIGHEST_OF_RATE * run.rate_hz)
     widening, top_hz = _EDGES_HZ[-1] / _EDGES_HZ[-2], _EDGES_HZ[-1]
     more_hz = (top_hz * widening**number for number in count(1))
     ends_hz = (*_EDGES_HZ, *takewhile(lambda one: one < high_hz, more_hz)) if run.timed else _EDGES_HZ
-    low_hz = max(low_hz + min(HALF_WIDTH_HZ, 0.5 * low_hz), ends_hz[0])
+    lowest_hz = LOWEST_HZ if of.may_drift or not run.timed else 0.0
+    low_hz = max(low_hz + min(HALF_WIDTH_HZ, 0.5 * low_hz), lowest_hz)
     inside = [one for one in ends_hz if low_hz + 0.5 < one < high_hz - 0.5]
     return np.array([low_hz, *inside, max(high_hz, low_hz + 1.0)])
 

@@ -78,7 +78,8 @@ def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5
     read = run.read[run.first:]
     count = int(2 * LOWEST_HZ * kept / rate)  # of frequencies below the lowest that is judged
     low_hz, _ = run.pass_band_hz
-    if count < fewest_coefficients or low_hz > 0 or not read.any():
+    judged_slowly = run.timed and not run.facts.main.may_drift
+    if count < fewest_coefficients or low_hz > 0 or judged_slowly or not read.any():
         return nothing
     basis = _Cosines(kept, count, int(2 * noise_hz * kept / rate))
     seen = basis.of(np.where(read, residual[run.first:], 0.0))

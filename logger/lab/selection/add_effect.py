@@ -11,11 +11,12 @@ numbers are free in both fits, so that the effect alone makes the difference.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.distance_error import zero_of
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
@@ -167,10 +168,11 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     )
     start, state = posterior.start(present), after.state
     unseen_before, unseen_after = cross_validate(before), cross_validate(after)
+    zero_n, exact = zero_of(posterior.record_errors, state.record)
     return AddedEffects(
-        found, errors.effects, tuple(one.effect.name for one in added), numbers,
+        replace(found, preload_n=found.preload_n + zero_n), errors.effects, tuple(one.effect.name for one in added), numbers,
         error_before=posterior.error(start), error_refitted=unseen_before.error, error_after=unseen_after.error,
-        error_as_written=posterior.error(posterior.state_at(state.effects, state.logs)),
+        error_as_written=posterior.error(posterior.state_at(state.effects, state.logs, exact)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
         p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=errors.numbers,
         held_out_gain=unseen_before.deviance - unseen_after.deviance,
