@@ -170,7 +170,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     unseen_before, unseen_after = cross_validate(before), cross_validate(after)
     zero_n, exact = zero_of(posterior.record_errors, state.record)
     return AddedEffects(
-        replace(found, preload_n=found.preload_n + zero_n), errors.effects, tuple(one.effect.name for one in added), numbers,
+        replace(found, preload_n=found.preload_n + zero_n), errors.effects, tuple(one.effect.name for one in added),
+        numbers,
         error_before=posterior.error(start), error_refitted=unseen_before.error, error_after=unseen_after.error,
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs, exact)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
