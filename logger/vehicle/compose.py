@@ -234,7 +234,7 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
     if structure.held:
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
         force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
-        force_n += _friction_of_held(car.laws[0], *inputs[:, 1:3].T, passage.step_s)
+        force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)
         return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
         return _of_motion(structure, moved(car, passage), inputs, outputs)
