@@ -160,3 +160,13 @@ def test_the_folder_where_one_is_has_a_profile(
     (tmp_path / "run" / "profile.csv").write_bytes(road[0].read_bytes())
     monkeypatch.chdir(tmp_path / "run")
     assert as_json(capsys, Path())["iri_m_per_km"] == as_json(capsys, road[0])["iri_m_per_km"]
+
+
+@pytest.mark.parametrize("window", ["160.9344", "160.9344m", "0.1mi", "528ft", "0.1609344km"])
+def test_a_window_may_name_its_unit(window: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    road = tmp_path / "road.csv"
+    rows = "".join(f"{0.5 * row:.1f},{0.2 * (row % 7):.3f}\n" for row in range(1200))
+    road.write_text(f"distance_ft,elevation_in\n{rows}", "ascii")
+    assert main(["iri", str(road), "--window", window, "--json"]) == 0
+    ends = [one["distance_end_m"] for one in json.loads(capsys.readouterr().out)["windows"]]
+    assert ends[0] == pytest.approx(160.9344, abs=0.08) and len(ends) == 2  # to the next sample, of half a foot
