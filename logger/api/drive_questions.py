@@ -561,8 +561,8 @@ class LearnCarQuestion(LongQuestion):
     mass_kg: Annotated[float | None, Option(
         "of the whole car as it is driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
     sensor: Annotated[float | None, Option(
-        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: about the "
-        "middle)", metavar="ahead_m=M", read=_ahead)] = None
+        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: near its "
+        "centre of gravity)", metavar="ahead_m=M", read=_ahead)] = None
     compare: Annotated[Path | None, Option(
         "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
 

@@ -231,7 +231,7 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     from logger.identification.unknown_car import CarKnowledge, UnknownCar
 
     used = _used(question)
-    knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor or 0.0,
+    knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor,
                              ahead_std_m=_USUAL_STD_M if question.sensor is None else _GIVEN_STD_M)
     question.progress("finding the car")
     problem, car = UnknownCar(joined([one.spectra for one in used]), knowledge).learn()

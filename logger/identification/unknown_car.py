@@ -73,20 +73,23 @@ class CarKnowledge:
     """What is known of a car and its sensor, and how well.
 
     wheelbase_m, wheelbase_std    and its standard error, as a share
-    ahead_m, ahead_std_m          of the sensor before the middle between the axles, which a person can find
+    ahead_m, ahead_std_m          of the sensor before the middle between the axles, which a person can find; None: it is
+                                  near the centre of gravity
     prior                         of the rest
     """
 
     wheelbase_m: float
     wheelbase_std: float = 0.01
-    ahead_m: float = 0.0
+    ahead_m: float | None = None
     ahead_std_m: float = 0.2
     prior: CarPrior = field(default_factory=published_prior)
 
     @cached_property
     def mean(self) -> Array:
         """Of all coordinates (p,)."""
-        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), self.ahead_m, 0.0]])
+        share = 1 / (1 + np.exp(-self.prior.mean[NUMBERS.index("rear_share")]))
+        ahead_m = (0.5 - share) * self.wheelbase_m if self.ahead_m is None else self.ahead_m
+        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, 0.0]])
 
     @cached_property
     def precision(self) -> Array:
