@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from logger.api.question import Option, Question, Verb
-from logger.api.shown import CommandResult
 from logger.files import make_folder, together, write_text
 
 if TYPE_CHECKING:
+    from logger.api.shown import CommandResult
     from logger.dsp.fixed_point import FixedCascade
     from logger.dsp.weightings.weighting import Sections, Weighting
 
@@ -43,8 +43,10 @@ class FixedPointQuestion(Question):
 FIXED_POINT = Verb(FixedPointQuestion, "logger.api.fixed_point:written")
 
 
-def written(question: FixedPointQuestion) -> CommandResult:
+def written(question: FixedPointQuestion) -> "CommandResult":
     """Make the integers and write the headers; what they are. BadInput for what the question says cannot be."""
+    from logger.api.shown import CommandResult
+
     headers, folder = [_weighting(question), _golden_car(question)], question.out
     with together():
         make_folder(folder)

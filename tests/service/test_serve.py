@@ -41,10 +41,10 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         def run(self, stop: Stop) -> None:
             parts["storage"].close()
 
-    def storage(*arguments: Any, pairing: Pairing) -> Storage:
+    def storage(*arguments: Any, pairing: Pairing, **more: Any) -> Storage:
         parts["limits"] = next(argument for argument in arguments if isinstance(argument, QuotaLimits))
         parts["pairing"] = pairing
-        return Storage(*arguments, pairing=pairing)
+        return Storage(*arguments, pairing=pairing, **more)
 
     monkeypatch.setattr(serve, "MainLoop", Loop)
     monkeypatch.setattr(serve, "Storage", storage)
