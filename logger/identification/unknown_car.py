@@ -73,8 +73,8 @@ class CarKnowledge:
     """What is known of a car and its sensor, and how well.
 
     wheelbase_m, wheelbase_std    and its standard error, as a share
-    ahead_m, ahead_std_m          of the sensor before the middle between the axles, which a person can find; None: it is
-                                  near the centre of gravity
+    ahead_m, ahead_std_m          of the sensor before the middle between the axles, which a person can find; None: it
+                                  is near the centre of gravity
     prior                         of the rest
     """
 
