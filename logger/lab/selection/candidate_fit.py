@@ -70,11 +70,13 @@ def _shapes(effect: Effect) -> int:
 
 
 def fit_roughly(score: float, base: Baseline, screen: Screened) -> list[CandidateFit]:
-    """Fit an effect from each of its trials, with the derivatives of the model without it; best first.
+    """Fit an effect from each of its trials, with the derivatives of the model without it; best first. A trial whose
+    car cannot be simulated, as its numbers were extrapolated too far, is left out.
 
     score    of the model that gains are counted from
     """
-    return sorted((_rough_fit(score, base, trial) for trial in screen.trials), key=lambda one: -one.gain)
+    fits = (_rough_fit(score, base, trial) for trial in screen.trials)
+    return sorted((one for one in fits if one is not None), key=lambda one: -one.gain)
 
 
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
@@ -87,7 +89,7 @@ def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:
     return CandidateFit.of(score, fit_to_the_end(one.found.linearise(), one.found.numbers))
 
 
-def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
+def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | None:
     posterior, numbers = base.posterior, base.linear.numbers
     if trial.start is not None:
         linear, state = LinearModel(posterior, trial.start, numbers), trial.start
@@ -95,5 +97,8 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         linear = base.linear.hold_fixed(trial.one.effect.replaces)
         state = State((*base.state.effects, trial.one), trial.logs,
                       linear.state.record, linear.size, [])
-    state = optimise_numbers(linear, state, free_parameters_of(state.effects))
+    try:
+        state = optimise_numbers(linear, state, free_parameters_of(state.effects))
+    except (np.linalg.LinAlgError, OverflowError):
+        return None
     return CandidateFit.of(score, relinearise(posterior, state, linear.numbers, score))

@@ -39,9 +39,9 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     assert removed.drift_share == pytest.approx(drift / (drift + NOISE_MPS2**2), rel=0.03)
     assert removed.error == pytest.approx(clean.plain.error * clean_size(clean, found), rel=0.03)
     said = " ".join(headline(found))
-    assert "The sensor drifts (exponential, " in said and "That has nothing to do with the car" in said
+    assert "The sensor drifts (exponential, " in said and "The drift has nothing to do with the car" in said
     assert evidence(found) == ["No test finds more than noise in the residual."] and not found.missing
-    assert conclusion(found).startswith("Nothing else is missing")
+    assert conclusion(found).startswith("The model lacks nothing beside")
     shown = comparison_json(found)
     assert shown["error"] == found.plain.error and shown["error_without_drift"] == removed.error
     assert shown["removed"]["drift"]["runs"][0]["time_s"] == pytest.approx(9.0, rel=0.1)
@@ -66,7 +66,7 @@ def test_nothing_is_named_where_nothing_is_removed() -> None:
 def test_a_wrong_place_is_named_with_its_share() -> None:
     found = compared(lambda run: replace(run, distance_m=run.distance_m + 1.0))
     assert found.removed.distance_error_m == pytest.approx(1.0, abs=0.05) and found.removed.distance_share > 0.95
-    assert not found.missing and conclusion(found).startswith("Nothing else is missing")
+    assert not found.missing and conclusion(found).startswith("The model lacks nothing beside")
 
 
 @pytest.mark.slow
@@ -76,4 +76,4 @@ def test_what_lies_outside_of_the_pass_band_has_its_share() -> None:
     found = compare(SimulatedRuns(runs), CAR)
     # The model is right: noise alone differs, white up to half the sample rate, half of it above 25 Hz.
     assert found.removed.filter_share == pytest.approx(0.5, abs=0.03)
-    assert "Outside of that lies" in " ".join(headline(found))
+    assert "power lies outside that band" in " ".join(headline(found))
