@@ -405,7 +405,9 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
 def _shown(name: str, coordinate: float) -> float:
     import numpy as np
 
-    return float(1 / (1 + np.exp(-coordinate)) if name == "rear_share" else np.exp(coordinate))
+    from logger.vehicle.published_cars import share_of
+
+    return share_of(coordinate) if name == "rear_share" else float(np.exp(coordinate))
 
 
 def _slope(name: str, value: float) -> float:

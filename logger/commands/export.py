@@ -43,10 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # What follows is typed by nobody: systemd/ridelog-export@.service passes it. --unmounted: say in the note that this
     # stick may be pulled; --removed: it was, and ridelog status no longer shows it; --mounted: only if DIR is a mount
     # point; --note: the file of the note; --led: the light that shows the notes, /sys/class/leds/NAME.
-    for option in ("--unmounted", "--note", "--led"):
-        (phase if option == "--unmounted" else parser).add_argument(option, type=Path, help=argparse.SUPPRESS)
-    for option in ("--removed", "--mounted"):
-        (phase if option == "--removed" else parser).add_argument(option, action="store_true", help=argparse.SUPPRESS)
+    phase.add_argument("--unmounted", type=Path, help=argparse.SUPPRESS)
+    phase.add_argument("--removed", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--note", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--led", type=Path, help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:

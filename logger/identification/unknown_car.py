@@ -33,7 +33,7 @@ from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, e
 from logger.estimation.road_spectrum import PIVOT_CPM
 from logger.vehicle.linear_car import body_acceleration_response, frequency_response
 from logger.vehicle.models import half_car
-from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior
+from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior, share_of
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
@@ -87,7 +87,7 @@ class CarKnowledge:
     @cached_property
     def mean(self) -> Array:
         """Of all coordinates (p,)."""
-        share = 1 / (1 + np.exp(-self.prior.mean[NUMBERS.index("rear_share")]))
+        share = share_of(self.prior.mean[NUMBERS.index("rear_share")])
         ahead_m = (0.5 - share) * self.wheelbase_m if self.ahead_m is None else self.ahead_m
         return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, 0.0]])
 
@@ -112,7 +112,7 @@ class CarKnowledge:
     def car(self, x: Array, sprung_mass_kg: float, name: str) -> Vehicle:
         """The half car with these coordinates (p,), its sensor where it sits."""
         own, wheelbase_m = len(NUMBERS), float(np.exp(x[len(NUMBERS)]))
-        share = 1 / (1 + np.exp(-x[NUMBERS.index("rear_share")]))
+        share = share_of(x[NUMBERS.index("rear_share")])
         sensor = SensorPlace(float(x[own + 1] + (share - 0.5) * wheelbase_m))
         return car_of(x[:own], wheelbase_m, sprung_mass_kg, sensor, name)
 

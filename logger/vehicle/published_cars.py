@@ -170,11 +170,16 @@ def _one_more(values: Array) -> tuple[Array, Array]:
     return values.mean(axis=0), values.var(axis=0, ddof=1) * (1 + 1 / n) * (n - 1) / (n - 3)
 
 
+def share_of(coordinate: float) -> float:
+    """The share that a coordinate stands for: the inverse of the logit."""
+    return float(1 / (1 + np.exp(-coordinate)))
+
+
 def car_of(coordinates: Array, wheelbase_m: float, sprung_mass_kg: float = USUAL_MASS_KG,
            sensor: SensorPlace = AT_CENTRE_OF_GRAVITY, name: str = GENERIC) -> Vehicle:
     """The half car with these coordinates (p,), as ``CarPrior`` has them; ``sprung_mass_kg`` of one side."""
     x = np.asarray(coordinates, float)
-    share = float(1 / (1 + np.exp(-x[NUMBERS.index("rear_share")])))
+    share = share_of(x[NUMBERS.index("rear_share")])
     front_m, rear_m = wheelbase_m * share, wheelbase_m * (1 - share)
     inertia = float(np.exp(x[NUMBERS.index("dynamic_index")])) * sprung_mass_kg * front_m * rear_m
     count = len(OF_AXLE)

@@ -25,6 +25,7 @@ from logger.api.lab.words import (
     error_words,
     errors_json,
     falling,
+    not_tried,
     removed_json,
     removed_section,
     removed_words,
@@ -406,7 +407,7 @@ def looks_like(found: LabDiagnosis) -> list[str]:
 
 def untested(found: LabDiagnosis) -> list[str]:
     """Effects that these runs cannot show, and which drive would."""
-    lines = [f"{name}: not tried; {why}." for name, why in found.not_tried.items()]
+    lines = not_tried(found.not_tried)
     lines += [f"{one.effect.name}: detectability {one.deviations:.1f} ({DETECTABLE_SIGMA:g} needed){_alike(one)}. "
               f"To see it: {one.effect.shown_by}."
               for one in found.undetectable[:_MOST_HIDDEN]]
@@ -706,8 +707,7 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
              for one, other in found.doubtful]
     if found.absorbed_by_road:
         lines.append(f"{', '.join(found.absorbed_by_road)}: another road, as nobody measured it, would look the same.")
-    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: not tried; {why}."
-              for why in dict.fromkeys(found.untried.values())]
+    lines += not_tried(found.untried)
     lines += [f"{name}: detectability {deviations:.1f} ({DETECTABLE_SIGMA:g} needed)."
               for name, deviations in found.hidden.items()]
     return [*lines, *(f"The car's parameters: {one.words}" for one in found.confounded)]

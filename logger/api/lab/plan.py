@@ -16,6 +16,7 @@ import numpy as np
 from logger.api.lab.bench import Bench, among, bench_with, planned_bench, tolerance_of, word_of
 from logger.api.lab.checks import LEAST_S
 from logger.api.lab.question import PlanQuestion
+from logger.api.lab.words import not_tried
 from logger.api.question import each, function
 from logger.api.roads import read_profile
 from logger.api.shown import CommandResult
@@ -178,9 +179,7 @@ def summary(found: LabPlan) -> list[str]:
     hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
         lines.append(f"Too faint in these drives: {', '.join(hidden)}.")
-    reasons = dict.fromkeys(found.obstacles.values())
-    return lines + [f"Not tried, as {why}: {', '.join(name for name, one in found.obstacles.items() if one == why)}."
-                    for why in reasons]
+    return lines + not_tried(found.obstacles)
 
 
 def rows(found: LabPlan) -> list[tuple[str, str, str, str, str]]:

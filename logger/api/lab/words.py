@@ -4,7 +4,7 @@ frequencies were compared, and what a residual looks like; in sentences, as rows
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,12 @@ from logger.report.quantities import enumerated
 from logger.runs import shortened
 
 _WHEEL_RADII_M = (0.22, 0.5)
+
+
+def not_tried(reasons: Mapping[str, str]) -> list[str]:
+    """Effects that were not tried, and why, by name: a sentence for each reason."""
+    return [f"{', '.join(name for name, one in reasons.items() if one == why)}: not tried; {why}."
+            for why in dict.fromkeys(reasons.values())]
 
 
 def looks_like(shape: Shape) -> list[str]:

@@ -228,7 +228,7 @@ class RecordError:
         others = prediction[len(main) :].reshape(-1, len(main)) * (1 + self.signal_gains(k))[:, None]
         return np.concatenate([found, others.ravel()])
 
-    @property
+    @cached_property
     def _zero_slope(self) -> Array:
         """What a zero of 1 adds to the samples (n,)."""
         return self.run.in_band(np.ones(self.run.count))

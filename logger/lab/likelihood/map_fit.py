@@ -19,7 +19,7 @@ import numpy.typing as npt
 from logger.fitting.levenberg_marquardt import Damping, minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
-from logger.lab.likelihood.posterior import Posterior, State, derivatives
+from logger.lab.likelihood.posterior import NotSimulated, Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter
@@ -239,7 +239,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
             with np.errstate(over="ignore", invalid="ignore"):
                 predictions = predict(effects, logs, record)
                 found = linear.fit_record_errors(predictions, record)
-        except (np.linalg.LinAlgError, OverflowError):
+        except NotSimulated:
             if not evaluated:  # where a fit begins is a car
                 raise
             return replace(evaluated[0], cost=np.inf)

@@ -22,6 +22,8 @@ from logger.vehicle.vehicle import Vehicle
 Array = npt.NDArray[np.float64]
 Predict = Callable[[Sequence[Chosen], Array, Sequence[Array]], list[Array]]
 """Predictions (n,) per run by effects, the car's numbers and the record's errors."""
+NotSimulated = (np.linalg.LinAlgError, OverflowError)
+"""What a prediction raises of a car that cannot be simulated, as its numbers are too far off."""
 
 
 @dataclass(frozen=True, eq=False)

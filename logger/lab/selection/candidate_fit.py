@@ -11,7 +11,7 @@ import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, relinearise
-from logger.lab.likelihood.posterior import State
+from logger.lab.likelihood.posterior import NotSimulated, State
 from logger.lab.selection.evidence import probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
@@ -99,6 +99,6 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | Non
                       linear.state.record, linear.size, [])
     try:
         state = optimise_numbers(linear, state, free_parameters_of(state.effects))
-    except (np.linalg.LinAlgError, OverflowError):
+    except NotSimulated:
         return None
     return CandidateFit.of(score, relinearise(posterior, state, linear.numbers, score))

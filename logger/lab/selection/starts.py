@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, align, fit, optimise_numbers
-from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.repeats import repeat_each_other
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
@@ -81,7 +81,7 @@ class _BySquares:
             with np.errstate(all="ignore"):
                 state = self.posterior.state_at(effects, logs, record, near.size)
                 squares = self.squares(state)
-        except (np.linalg.LinAlgError, OverflowError):
+        except NotSimulated:
             return None
         return (squares, state) if np.isfinite(squares) else None
 
@@ -96,7 +96,7 @@ class _BySquares:
                     found = optimise_numbers(linear, best, free_parameters_of(best.effects))
                     found = self.posterior.state_at(found.effects, found.logs, found.record, found.size)
                     squares = self.squares(found)
-            except (np.linalg.LinAlgError, OverflowError):
+            except NotSimulated:
                 break
             if not squares < least:
                 break
@@ -187,7 +187,7 @@ class UnknownNumbers(MeasuredRoad):
         try:
             with np.errstate(all="ignore"):
                 found = fit(begun, begun.numbers, at_most=12)
-        except (np.linalg.LinAlgError, OverflowError):
+        except NotSimulated:
             return begun
         leads_away = posterior.error(found.state) > (1 + UNEXPLAINED) * posterior.error(start)
         return begun if leads_away else found

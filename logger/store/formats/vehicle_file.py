@@ -87,7 +87,7 @@ _SHORTEST_WHEELBASE_M = 0.01
 _USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5,
           "contact_patch_m": 0.15, _ANTI_ROLL_KEY: 1e4}
 _NUMBERS = {*_LIMITS, *_LIMITS_PER_KG, *(name for own in OWN_NAMES.values() for name in own)}
-_MAY_BE_NOTHING = {PRELOAD, *(name for name in OWN_NAMES["component"] if name != "mass_kg")}
+_MAY_BE_NOTHING = {name for name in OWN_NAMES["single_mass"] if name != "mass_kg"}
 _ROUNDING = 1e-12
 _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40
 
@@ -213,32 +213,43 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
 
 
 def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
-    """The number of a node without how well it is known, which is added to ``known``; not that of a preload, which any
-    fit finds as a constant of its record. BadInput for what says neither."""
-    is_signed = name == PRELOAD
+    """The number of a node without how well it is known, which is added to ``known``. BadInput for what says neither.
+    """
+    if name == PRELOAD:
+        return _plain_preload(node)
     if isinstance(node.content, tuple):
-        ends = [one.number() if is_signed else one.number(above=0.0) for one in node.content]
-        if len(ends) != 2 or not ends[0] < ends[1]:
-            raise node.wrong("a range, [low, high]")
-        one = None if is_signed else Known.within(*ends)
-        value = sum(ends) / 2
+        one = Known.within(*_ends(node, [end.number(above=0.0) for end in node.content]))
     elif isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
         number, deviation = (replace(node, content=text, plain=True) for text in said.groups()[:2])
-        value = number.number() if is_signed else number.number(low=0.0)
-        spread, percent = deviation.number(above=0.0), bool(said[3])
-        if value == 0 and (percent or name not in _MAY_BE_NOTHING):
-            raise node.wrong("a number above 0 before +-" if name not in _MAY_BE_NOTHING else
-                             "a standard deviation in the unit of the number, as a share of 0 is 0")
-        one = None if is_signed else Known.about(value, spread, percent)
-        if one is not None and value > 0 and one.deviation > 1:
+        value, spread, percent = number.number(low=0.0), deviation.number(above=0.0), bool(said[3])
+        if value == 0 and name not in _MAY_BE_NOTHING:
+            raise node.wrong("a number above 0 before +-")
+        if value == 0 and percent:
+            raise node.wrong("a standard deviation in the unit of the number, as a share of 0 is 0")
+        one = Known.about(value, spread, percent)
+        if value > 0 and one.deviation > 1:
             raise node.wrong(f"a standard deviation up to the number itself, or {UNKNOWN}")
-    elif is_signed and _is_unknown(node):
-        one, value = None, 0.0
     else:
         return node
-    if one is not None:
-        known[name], value = one, one.value
-    return replace(node, content=repr(value), plain=True)
+    known[name] = one
+    return replace(node, content=repr(one.value), plain=True)
+
+
+def _plain_preload(node: Node) -> Node:
+    """A preload without how well it is known: any fit finds it as a constant of its record. It has either sign."""
+    if isinstance(node.content, tuple):
+        return replace(node, content=repr(sum(_ends(node, [end.number() for end in node.content])) / 2), plain=True)
+    if isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
+        replace(node, content=said[2], plain=True).number(above=0.0)
+        return replace(node, content=said[1], plain=True)
+    return replace(node, content="0.0", plain=True) if _is_unknown(node) else node
+
+
+def _ends(node: Node, ends: Sequence[float]) -> Sequence[float]:
+    """The ends of a range. BadInput for what is none."""
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise node.wrong("a range, [low, high]")
+    return ends
 
 
 def _is_unknown(node: Node) -> bool:
