@@ -112,11 +112,11 @@ def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.Cap
     page = tmp_path / "page.html"
     assert diagnose(*write_runs(tmp_path / "runs", [], more=out_of_balance), "--out", str(page)) == 0
     reported = " ".join(capsys.readouterr().out.split())
-    assert "Something is missing that no candidate explains" in reported
-    assert "It repeats every 2.07 m of the way" in reported  # the circumference of 0.33 m
+    assert "Something is missing that no known effect explains" in reported
+    assert "It repeats every 2.07 m of road" in reported  # the circumference of 0.33 m
     assert "A wheel of 0.33 m radius" in reported
     assert "Nothing is missing" not in reported
-    assert "What repeats along the way" in page.read_text("utf-8")
+    assert "What repeats along the road" in page.read_text("utf-8")
 
 
 @pytest.mark.slow

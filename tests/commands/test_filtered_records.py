@@ -65,7 +65,8 @@ def test_a_comparison_says_where_the_record_ends_and_finds_nothing(
     assert found["low_passed_at_hz"] == pytest.approx(25.0, rel=0.05)
     low_hz, high_hz = found["pass_band_hz"]  # type: ignore[misc]
     assert low_hz == 0 and 18 < high_hz < 25
-    assert "The record was low-passed at about 25 Hz: above" in words(capsys, "compare", *drives["filtered"])
+    said = words(capsys, "compare", *drives["filtered"])
+    assert "The recorder low-passed at about 25 Hz, so measurement and model are compared" in said
 
 
 @pytest.mark.slow

@@ -96,7 +96,8 @@ def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     whole.feed(html)
     assert not whole.open and not {"script", "img", "link"} & whole.seen
     assert not re.search(r"\b(nan|inf)\b", html)
-    for words in ("How the error fell", "with sensor_offset", "Before and after", "What the car&#x27;s numbers",
+    for words in ("NRMSE, model by model", "with sensor_offset", "Before and after",
+                  "What the missing effects had biased",
                   escape(shipped_effects()["sensor_offset"].source)):
         assert words in html
 
@@ -119,7 +120,7 @@ def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.Ca
     assert len(asked) == 2 and "Add sensor_offset?" in asked[0]
     reported = capsys.readouterr().out
     assert "Expected yes, no, or one of " in reported
-    assert "left out as you wished: sensor_offset" in reported
+    assert "Missing, but not added as you wished: sensor_offset." in reported
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
 
 
@@ -189,7 +190,7 @@ def test_no_more_files_are_written_than_were_looked_at(
     words = " ".join(capsys.readouterr().out.split())
     added = read_model(tmp_path / "out" / "vehicle-1.yaml").effects[0].effect.name
     left = ({"sensor_offset", "time_offset"} - {added}).pop()
-    assert f"Found missing and not added: {left}." in words and "Nothing more is missing" not in words
+    assert f"Missing, but not added: {left}." in words and "Nothing more is missing" not in words
 
 
 def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

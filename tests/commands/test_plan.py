@@ -65,8 +65,8 @@ def test_in_words_a_louder_sensor_names_less(road: Path, capsys: pytest.CaptureF
     quiet = capsys.readouterr().out
     assert plan(*drive, "--noise", 2, "--step", 1) == 0
     loud = capsys.readouterr().out
-    assert "can be named" in quiet and "Next, the drive that adds most first:" in quiet
-    assert "noise 2.02 m/s2" in loud  # a step of 1 adds a twelfth of its square
+    assert "can be named" in quiet and "Drives that would add most:" in quiet
+    assert "noise of 2.02 m/s2" in " ".join(loud.split())  # a step of 1 adds a twelfth of its square
     assert loud.count("can be named") < quiet.count("can be named")
 
 
@@ -81,7 +81,7 @@ def test_runs_that_were_driven_bring_their_own_noise_and_effects(road: Path, tmp
     assert found.detectability.keys() == {"sensor_offset", "cg_shift"}
     alone = ridelog.plan(car, run, candidates=["sensor_offset", "cg_shift"])
     assert all(alone.detectability[name] < found.detectability[name] for name in found.detectability)
-    assert "driven" in found.as_json()["drives"][0]["drive"] and "Stands out by" in repr(found)
+    assert "driven" in found.as_json()["drives"][0]["drive"] and "Detectability" in repr(found)
 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [

@@ -57,7 +57,7 @@ def test_who_wants_to_go_on_is_warned(runs: list[str], tmp_path: Path, capsys: p
     wrong = with_track(runs[0], tmp_path, Track(own.spacing_m, np.roll(own.elevation_m, 900), own.start_m))
     assert main(["compare", "--vehicle", "rav4-2009", wrong, "--anyway"]) == 0
     said = capsys.readouterr()
-    assert "does not follow it" in said.err and "error" in said.out
+    assert "does not follow it" in said.err and "NRMSE" in said.out
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def test_another_cars_file_is_refused_but_by_identify(
     other = file_that_is_off(tmp_path, 0.5, (2.0, 1.4), 0.6)
     assert main(["compare", "--vehicle", str(other), *runs]) == 0
     words = " ".join(capsys.readouterr().out.split())
-    assert "numbers beyond their tolerance" in words and "front.suspension_stiffness_n_per_m by -" in words
+    assert "parameters beyond their tolerance" in words and "front.suspension_stiffness_n_per_m by -" in words
     other = file_that_is_off(tmp_path, 2.0, (0.5, 0.5), 2.2)
     with pytest.raises(BadInput, match=r"found one of another car: .* ridelog identify fits .*\(--anyway goes on\)"):
         main(["compare", "--vehicle", str(other), *runs])
