@@ -158,17 +158,17 @@ def assess(
     car = known_car(composed)
     gridded, readings, distance_m = on_grid(sensor, drive.rate_hz, drive.accel_z_mps2,
                                             composed.driven(drive.distance_m))
-    noise = None
+    noise, noise_log_std = None, 0.0
     if learns_noise:
         noise = learnt_noise(car, gridded, window_m, readings, distance_m)
     if noise is not None:
-        gridded = Sensor(noise.noise_rms_mps2, gridded.step_mps2)
+        gridded, noise_log_std = Sensor(noise.noise_rms_mps2, gridded.step_mps2), noise.log_std
         noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)
         if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
             noise = noise.without_rounding(sensor.step_mps2)
         sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)
     windows, road = estimated(car, gridded, window_m, readings, distance_m, cars_off(vehicle, effects, errors),
-                              vehicle.name != GENERIC)
+                              vehicle.name != GENERIC, noise_log_std)
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     road_effects = tuple(one.effect.name for one in effects if isinstance(one.effect, RoadEffect))
     if track is not None:

@@ -86,12 +86,14 @@ def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> A
 
 def estimated(
     car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array,
-    off: Sequence[KnownCar] = (), is_measured: bool = True,
+    off: Sequence[KnownCar] = (), is_measured: bool = True, noise_log_std: float = 0.0,
 ) -> tuple[Windows, RoadProfile | None]:
     """Windows and road of a drive on the grid of 100 Hz, arrays (t,) as ``RoadEstimator.push`` takes them; ``off``,
-    ``is_measured`` the cars that it may be instead, as ``RoadEstimator`` has them."""
+    ``is_measured`` the cars that it may be instead, and ``noise_log_std`` how well the noise is known, as
+    ``RoadEstimator`` has them."""
     pieces: list[RoadPiece] = []
-    estimator = RoadEstimator(car, sensor, window_m, on_road=pieces.append, off=off, is_measured=is_measured)
+    estimator = RoadEstimator(car, sensor, window_m, on_road=pieces.append, off=off, is_measured=is_measured,
+                              noise_log_std=noise_log_std)
     count = len(reading_mps2)
     found = estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
     found += estimator.finish()

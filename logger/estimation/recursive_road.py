@@ -89,13 +89,15 @@ class FollowedRoad:
 
     sensor           of single readings, of which there may be several per sample: y of t samples
     vehicle_error    share that each axle's gain may be off, because no file fits a car
-    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's is right
+    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's is right, but
+    noise_log_std    for this standard error of its logarithm
     """
 
     def __init__(
-        self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
+        self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None,
+        noise_log_std: float = 0.0,
     ) -> None:
-        self._vehicle_error = vehicle_error
+        self._vehicle_error, self._noise_log_std = vehicle_error, noise_log_std
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
         self._spacing_m = spacing_m
@@ -151,10 +153,15 @@ class FollowedRoad:
         return belief if self._is_coarse else belief.without_rounding(self._step_mps2)
 
     @property
+    def noise_log_std(self) -> float:
+        """Standard error of the logarithm of the sensor's noise."""
+        belief = self.noise
+        return self._noise_log_std if belief is None else belief.log_std
+
+    @property
     def scale_log_std(self) -> float:
         """Share by which road and ride may be off because the noise is not known better."""
-        belief = self.noise
-        return 0.0 if belief is None else self._like_noise * belief.log_std
+        return self._like_noise * self.noise_log_std
 
     def _take_over(self) -> None:
         """Go on with the noise that was learnt. Where it blurs the steps, rounding is in it."""

@@ -13,8 +13,10 @@ From an estimate of v, made with d, and the share r of it that the readings reso
 log d is (v^2 / d - r) / 2 (MacKay 1992), and its expected curvature r^2 / 2, mean over all waves: it is that of a sum
 of squares v^2 - (r - r^2) d with r^2 degrees of freedom. With w integrated over, that of L is that of a Student t. A
 Newton step per round finds the most probable L (Laplace's approximation); w follows from it as (common + v^2 / exp(L))
-/ (common + r), sums over neighbours. What was found of cells that no block shows any more is carried by a Kalman
-filter, for such processes are Markov's. Their variances are learnt by scoring in the evidence.
+/ (common + r), sums over neighbours. Readings tell the mean variance of places that they do not resolve, for they feel
+many at once: L is its logarithm there, half the variance of log w above the mean logarithm. Of places that they resolve
+L is that of the mean precision, as much below. What was found of cells that no block shows any more is carried by a
+Kalman filter, for such processes are Markov's. Their variances are learnt by scoring in the evidence.
 """
 
 from __future__ import annotations
@@ -107,7 +109,7 @@ class Roughness:
         self._cell = round(_CELL_M / spacing_m)
         self._cell_m = self._cell * spacing_m
         self._first = 0
-        self._log_scale, self._scale_error = np.empty(0), np.empty(0)
+        self._log_scale, self._scale_error, self._excess = np.empty(0), np.empty(0), np.empty(0)
         self._level: _Level | None = None
         self._log_variances = np.log(_COMMON_VARIANCES)
         self._curvature: Array | float = 0.0
@@ -128,7 +130,7 @@ class Roughness:
 
     def at(self, first: int, count: int) -> Array:
         """Mean log variance (count,) of the same points; beyond what is known the level goes on as there."""
-        return self.solved_with(first, count) + 0.5 * self._kept(self._scale_error, first, count)
+        return self.solved_with(first, count) + self._kept(self._excess, first, count)
 
     def log_std(self, first: int, count: int) -> float:
         """Standard error of the log variance of these points: of the mean level, and of a scale."""
@@ -187,6 +189,7 @@ class Roughness:
         fresh = np.clip(_TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level), _SMALLEST_LOG, _LARGEST_LOG)
         self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
         self._scale_error = 2 / (self._common + weight)
+        self._excess = 0.5 * self._scale_error * (weight - self._common) / (weight + self._common)
 
     def _learn_level(self, first: int, squares: Array, freedom: Array, each: Array, learns: bool) -> None:
         """One step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a part of

@@ -141,6 +141,7 @@ class RoadEstimator:
                      cars are like
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
+    noise_log_std    of a noise that is not learnt: standard error of its logarithm
     """
 
     def __init__(
@@ -159,6 +160,7 @@ class RoadEstimator:
         is_measured: bool = True,
         driven_share: float = 1.0,
         reads: int = 1,
+        noise_log_std: float = 0.0,
     ) -> None:
         if reads > 1 and not sensor.is_coarse:
             raise ValueError("expected one reading per sample, for the noise blurs the steps")
@@ -176,7 +178,7 @@ class RoadEstimator:
         self._on_road = on_road
         self._ride_response = ride_response
         self._ride: RidePosterior | None = None
-        self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise)
+        self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise, noise_log_std)
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
@@ -339,7 +341,7 @@ class RoadEstimator:
                 piece = self._piece(slope[inside], unseen[inside], rise, speed_mps, variance, *level)
                 if weighted is not None:
                     # Of a sample, which has that share of a reading's noise.
-                    log_std = self.noise.log_std / self._reads if self.noise is not None else 0.0
+                    log_std = self._road.noise_log_std / self._reads
                     place = RidePlace(speed_mps, variance, *level, self._road.sensor, log_std,
                                       self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))

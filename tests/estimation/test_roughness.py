@@ -184,6 +184,26 @@ def test_the_error_of_a_road_whose_processes_are_as_believed() -> None:
     assert 0.7 < np.sqrt(np.mean(score**2)) < 1.3
 
 
+@pytest.mark.parametrize("longest_lost_m", [0.0, 5.0, 10.0])
+def test_the_mean_variance_of_a_gaussian_road_is_right_however_little_is_resolved(longest_lost_m: float) -> None:
+    """By an exact Wiener filter for the waves that are longer: as steps hide the short ones of a slow drive."""
+    count, true, gain_there = 4096, 0.5, 20.0
+    rng, found = np.random.default_rng(4), Roughness(SPACING_M)
+    gain = gain_there * (np.fft.rfftfreq(count, SPACING_M) * longest_lost_m < 1)
+    means = []
+    for _ in range(12):
+        white = np.fft.rfft(np.sqrt(true) * rng.standard_normal(count) + rng.standard_normal(count)
+                            / np.sqrt(gain_there))
+        log_before = found.solved_with(0, count)
+        strength = gain * np.exp(log_before.mean())
+        innovations = np.fft.irfft(white * strength / (1 + strength), count)
+        for _ in range(4):
+            found.learn(0, innovations, log_before, gain, np.ones(count))
+        # log normal, of this mean logarithm and variance
+        means.append(np.exp(found.at(0, count) + 0.5 * found.log_std(0, count) ** 2).mean())
+    assert np.mean(means[4:]) == pytest.approx(true, rel=0.15)
+
+
 def test_a_step_of_the_level_is_followed_within_some_metres() -> None:
     """Eight times smoother behind a joint of two surfaces: no roughness leaks into what comes 10 m after it."""
     block, _, seen = a_block()
