@@ -6,6 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from logger.estimation.assessment import Estimable, assess
+from logger.estimation.batch import estimated
 from logger.estimation.car_response import CarResponse
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad
@@ -22,7 +24,8 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
 
-STRUCTURE = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+RAV4 = vehicle_file("rav4-2009")
+STRUCTURE = structure_of(read_vehicle(RAV4))
 CAR = LinearCar(STRUCTURE, body_point(STRUCTURE))
 SPEED_MPS, SPACING_M, COUNT = 14.0, 0.1524, 2048
 NOISE_MPS2 = 0.12
@@ -81,6 +84,32 @@ def test_the_ride_is_open_as_far_as_another_noise_makes_another_ride(step_mps2: 
     found = np.log(change) / np.log(more / less)
     stated = scaled(step_mps2, readings(step_mps2))
     assert stated == pytest.approx(abs(found), abs=0.35 if toggles else 0.15)  # twice the r.m.s. of such drives
+
+
+def test_the_desk_counts_how_well_the_noise_is_known() -> None:
+    """In all windows as the same share of the IRI, and where the steps blur that share is small."""
+    shares = []
+    for step_mps2 in (ALIKE, 0.5):
+        reading, way = readings(step_mps2)[:3000], felt()[1][:3000]
+        sure, unsure = (estimated(CAR, Sensor(NOISE_MPS2, step_mps2), 7.62, reading, way, noise_log_std=std)[0]
+                        for std in (0.0, 0.3))
+        assert np.array_equal(sure.iri_m_per_km, unsure.iri_m_per_km, equal_nan=True)
+        known = np.isfinite(sure.iri_m_per_km)
+        added = np.sqrt(unsure.iri_std_m_per_km**2 - sure.iri_std_m_per_km**2)[known]
+        shares.append(float(np.mean(added / sure.iri_m_per_km[known])))
+    alike = scaled(ALIKE, readings(ALIKE))
+    assert shares[0] == pytest.approx(0.3 * alike, rel=0.3)
+    assert shares[1] < 0.3 * shares[0]
+
+
+@pytest.mark.slow
+def test_an_assessment_whose_noise_was_learnt_is_less_sure_than_one_whose_noise_was_given() -> None:
+    recorded, vehicle = Estimable(100.0, readings(ALIKE)[:2500], felt()[1][:2500], 0.0), read_vehicle(RAV4)
+    learnt = assess(recorded, vehicle, Sensor(NOISE_MPS2, ALIKE), 7.62, None, learns_noise=True)
+    given = assess(recorded, vehicle, learnt.sensor, 7.62, None)
+    known = np.isfinite(given.windows.iri_m_per_km)
+    assert known.any()
+    assert (learnt.windows.iri_std_m_per_km[known] > 1.001 * given.windows.iri_std_m_per_km[known]).all()
 
 
 def test_what_is_taken_off_a_nonlinear_cars_readings_is_on_no_other_steps() -> None:
