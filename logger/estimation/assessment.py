@@ -158,7 +158,8 @@ def assess(
     car = known_car(composed)
     gridded, readings, distance_m = on_grid(sensor, drive.rate_hz, drive.accel_z_mps2,
                                             composed.driven(drive.distance_m))
-    noise, noise_log_std = None, 0.0
+    noise = None
+    noise_log_std = 0.0
     if learns_noise:
         noise = learnt_noise(car, gridded, window_m, readings, distance_m)
     if noise is not None:
