@@ -175,7 +175,7 @@ def test_no_file_imports_itself_through_others() -> None:
 
 def test_what_runs_on_board_never_loads_what_belongs_to_the_desk() -> None:
     on_board = closure(ON_BOARD)
-    assert "logger.dsp.sections" in on_board
+    assert "logger.dsp.filters" in on_board
     assert not {module for module in on_board if "scipy" in {name.split(".")[0] for name in imports(module)}}
     assert not {module for module in on_board if module.startswith("logger.") and floor_of(module) in DESK}
 

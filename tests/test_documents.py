@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.exchange.format import formats
+from logger.exchange.layer import formats
 from logger.store.log.row_format import COLUMN_MEANINGS, COLUMNS
 
 from .support import reference

@@ -54,8 +54,7 @@ class Conversion(CommandResult):
 
 def converted(question: ConvertQuestion) -> Conversion:
     """The answer to ``ConvertQuestion``, which says what is raised."""
-    from logger.exchange.format import format_of, write_layer
-    from logger.exchange.layer import windows_layer
+    from logger.exchange.layer import format_of, windows_layer, write_layer
     from logger.store.log.log_reader import find_logs_in, read_found
 
     path, smoothness = Path(question.to), question.smoothness

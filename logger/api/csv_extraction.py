@@ -2,7 +2,7 @@
 
 Problem: such a recording has its own names, units and axes, an uneven clock, and was made by a phone that lay anyhow.
 Solution: columns are recognised or named (``store.formats.logger_csv``), the time is repaired, and gravity shows up and
-the unit (``extraction.even_samples``); what is left is cut, laid on a profile and written as a dump is
+the unit (``extraction.recorded_columns``); what is left is cut, laid on a profile and written as a dump is
 (``api.extraction``). What cannot be known is refused, with the option that says it.
 
 Speed and place out of the CSV files of a logger: fixes, and how late they are.
@@ -62,7 +62,7 @@ from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.estimation.receiver_delay import Belief
-    from logger.extraction.even_samples import EvenSamples
+    from logger.extraction.recorded_columns import EvenSamples
 
 
 Array = npt.NDArray[np.float64]
@@ -119,7 +119,7 @@ def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | Non
 
 def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
     """All of a recording. BadInput as ``extract_csv``."""
-    from logger.extraction.even_samples import SEEN, even_samples
+    from logger.extraction.recorded_columns import SEEN, even_samples
     from logger.service import wiring
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
@@ -274,7 +274,7 @@ def _listed(table: LoggerTable) -> str:
 
 def _accelerations(tables: _Tables, asked: CsvSettings, notes: list[str]) -> tuple[Array, Array, bool]:
     """Times (n,) [s], samples (n, axes) [m/s2], and whether gravity is in them."""
-    from logger.extraction.even_samples import felt
+    from logger.extraction.recorded_columns import felt
 
     table = tables.acceleration
     roles = AXES if "x" in table.columns else ("up",)
@@ -309,7 +309,7 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
            roles: tuple[str, ...], asked: CsvSettings, notes: list[str]) -> tuple[Array, bool]:
     """Samples in m/s2, and whether gravity is in them. A unit that is said holds; the size of gravity shows one only
     where none is. ``is_linear``: gravity was taken out, as the layout or --up says."""
-    from logger.extraction.even_samples import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
+    from logger.extraction.recorded_columns import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
 
     path, of_g = table.header.path, ACCELERATION_UNITS["g"]
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
@@ -371,7 +371,7 @@ def _left_out(even: EvenSamples, count: int, still_s: float) -> tuple[LeftOut, .
 
 
 def _repairs(even: EvenSamples) -> list[str]:
-    from logger.extraction.even_samples import SEEN
+    from logger.extraction.recorded_columns import SEEN
 
     notes = []
     if even.repeats > 0:
@@ -395,7 +395,7 @@ def _repairs(even: EvenSamples) -> list[str]:
 
 def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tuple[EvenSamples, float]:
     """Without what a sensor said that stood still from the beginning, while the car drove; and how long it did [s]."""
-    from logger.extraction.even_samples import LONGEST_HOLE_S
+    from logger.extraction.recorded_columns import LONGEST_HOLE_S
 
     still = even.time_s <= still_until_s(even.time_s, even.samples)
     still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
@@ -407,7 +407,7 @@ def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tu
 
 def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: list[str]) -> GridReadings:
     """What points up, part by part where the recorder turned in its mount."""
-    from logger.extraction.even_samples import turns, upwards
+    from logger.extraction.recorded_columns import turns, upwards
 
     time_s, present = even.time_s, even.present.copy()
     accel = np.zeros(len(time_s))
@@ -483,7 +483,7 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
 
     Raises BadInput with the line for what cannot be, and for a speed of a unit that is not known.
     """
-    from logger.extraction.held_fixes import hidden_m, new_rows, speeds_of_places
+    from logger.extraction.recorded_columns import hidden_m, new_rows, speeds_of_places
 
     has_places = set(PLACE) <= set(table.columns)
     has_speed = "speed" in table.columns
@@ -527,7 +527,7 @@ def _speed_scale(table: LoggerTable) -> float:
 
 def check_speed(table: LoggerTable, fixes: Fixes) -> None:
     """BadInput where places belie the speed: its unit is another one."""
-    from logger.extraction.held_fixes import way_over_speed
+    from logger.extraction.recorded_columns import way_over_speed
 
     if "speed" not in table.columns or not fixes.have_places:
         return

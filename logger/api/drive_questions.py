@@ -289,7 +289,7 @@ class ModesCommand(ModesQuestion):
 
 
 COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort_of", (PICTURES,))
-CALIBRATE = Verb(CalibrateQuestion, "logger.api.calibration:calibration_of", (
+CALIBRATE = Verb(CalibrateQuestion, "logger.api.vehicles:calibration_of", (
     Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
 ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
     Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),

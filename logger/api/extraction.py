@@ -134,7 +134,7 @@ class _NoRows:
 
 def _fixes(kept: Any, later_s: float) -> Fixes:
     """Fixes of a drive, ``later_s`` earlier than they were placed on the way [s]."""
-    from logger.extraction.held_fixes import fix_times_s
+    from logger.extraction.recorded_columns import fix_times_s
 
     whole = [timed for timed in kept.fixes if timed.fix.valid and timed.fix.speed_mps is not None
              and timed.fix.lat_deg is not None and timed.fix.lon_deg is not None]
@@ -359,7 +359,7 @@ def even_drives(recorded: Recorded, source: Path) -> list[drive_file.Drive]:
 
 def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:
     """The runs of a dump, and what was left out of it."""
-    from logger.extraction.even_samples import stretches
+    from logger.extraction.recorded_columns import stretches
 
     config, fixes, readings = recorded.config, recorded.fixes, recorded.readings
     found: list[_Drive] = []

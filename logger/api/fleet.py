@@ -49,7 +49,7 @@ class FleetSummary(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write all rows in the format of the file's ending."""
-        from logger.exchange.format import write_layer
+        from logger.exchange.layer import write_layer
 
         write_layer(self.layer(), path)
 

@@ -22,8 +22,7 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.exchange.format import write_layer
-from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title, write_layer
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
 from logger.records import WindowRecord

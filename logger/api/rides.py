@@ -1,7 +1,4 @@
-"""How a ride feels: acceleration records, and their ISO 2631-1 values.
-
-The comfort and health values of a ride, for a person and for a program.
-"""
+"""How a ride feels: acceleration records, their ISO 2631-1 values of comfort and health, and frequency weightings."""
 
 from __future__ import annotations
 
@@ -17,7 +14,6 @@ from scipy.signal import welch
 from logger.api.drive_questions import ComfortQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
-from logger.api.weightings import weighting_named, weightings
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.comfort import iso2631
 from logger.comfort.iso2631 import (
@@ -34,12 +30,28 @@ from logger.comfort.iso2631 import (
     ride_comfort,
     total,
 )
+from logger.dsp.weightings.weighting import Weighting
 from logger.errors import BadInput
+from logger.plugins import catalogue
 from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
 from logger.store.formats.drive_file import facts_beside
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_record, with_marks
+
+
+def weightings() -> Mapping[str, Weighting]:
+    """All there are, by name."""
+    return catalogue("logger.dsp.weightings", "WEIGHTING")
+
+
+def weighting_named(name: str) -> Weighting:
+    """A weighting by its name, in capitals or not: ``wk``, ``Wk``. Raises BadInput for one that there is not."""
+    known = weightings()
+    if name.lower() not in known:
+        raise BadInput(f"weighting {name!r}: expected one of {', '.join(known)}")
+    return known[name.lower()]
+
 
 Given = record_file.AccelerationRecord | drive_file.Drive | Path | str
 _SPECTRUM_S = 5.12

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.bounds import time_hint
-from logger.dsp.sections import BlockFilter
+from logger.dsp.filters import BlockFilter
 from logger.dsp.weightings.weighting import Weighting
 
 Floats = npt.NDArray[np.float64]

@@ -13,12 +13,27 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from zipfile import ZipFile
 
+from logger.api.lab.question import CompareQuestion
+from logger.commands.lab import say, take, walk
+from logger.commands.options import on_screen, progress, warned, wipe
 from logger.commands.replay import replay
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import make_folder, write_file
+from logger.files import make_folder, together, write_file, write_text
+from logger.report.quantities import columns, wrapped
+
+if TYPE_CHECKING:
+    from logger.api.drives import Run
+    from logger.api.extraction import Extracted
+    from logger.api.lab.loop import Say
+    from logger.estimation.assessment import Assessment
+    from logger.lab.session import Story
+
 
 REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
 DRIVE_DIR, LAB_DIR, FIELD_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field"
@@ -44,12 +59,8 @@ def run(args: argparse.Namespace) -> int:
     if args.unpack and not (args.lab or args.field):
         raise BadInput("demo: expected --lab or --field with --unpack")
     if args.lab:
-        from logger.commands.demo_lab import lab
-
         lab(args.out or Path(LAB_DIR), args.unpack, args.json)
     elif args.field:
-        from logger.commands.demo_field import field
-
         field(args.out or Path(FIELD_DIR), args.unpack, args.json)
     else:
         _drive(args.out or Path(DRIVE_DIR), args.json)
@@ -72,3 +83,318 @@ def _drive(out: Path, as_json: bool) -> None:
         print(outcome.text())
         print(f"Recording: {dump} (ridelog replay and ridelog extract read it)")
         print(f"Report: {report} (open it in a browser; it needs no network)")
+
+
+_INTRODUCTION = (
+    "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on the one and briskly on the other, "
+    "with an accelerometer on the body. Both streets were measured beforehand, and the file of the car, rav4-2009, "
+    "comes with ridelog. This car has something that its file does not know, and the lab finds out what."
+)
+_LAB_EXPLAINED = {
+    "compare": "First question: does the model fail at all, or are only its parameters a little off? Nominal masses "
+               "and springs are never exact, so compare refits them within a few per cent; only the residual after "
+               "that is evidence.",
+    "diagnose": "Second question: which physical effect would explain the residual? diagnose simulates each effect "
+                "that ridelog knows, fits it together with the car's parameters on two thirds of each drive, and "
+                "judges it on the other third.",
+    "add": "add-effect fits the effect on all drives, with the car's parameters. The table shows how the missing "
+           "effect had biased masses, springs and dampers: they looked like results, and were wrong.",
+    "again": "The same comparison once more, with the new vehicle file.",
+}
+
+
+def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
+    """Unpack the drives into ``out`` and find what is missing."""
+    from logger.api.lab.bench import bench_with, require_compiler, sought_effects
+    from logger.api.lab.loop import unsaid_lines
+    from logger.demo.lab_drives import VEHICLE
+
+    if not unpack_only:
+        require_compiler("ridelog demo --lab", sought_effects().values())
+    folders = unpack(out)
+    drives = " ".join(map(str, folders))
+    if unpack_only:
+        print(json.dumps({"vehicle": VEHICLE, "runs": list(map(str, folders))}) if as_json else
+              f"Two drives: {drives}\nNext: ridelog compare --vehicle {VEHICLE} {drives}")
+        return
+    if not as_json:
+        print(wrapped([_INTRODUCTION]))
+    given = bench_with(CompareQuestion(VEHICLE, folders, warn=warned))
+    found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
+    print(json.dumps(found.as_json(), allow_nan=False) if as_json else "\n".join(_answer(found.story)))
+
+
+def _explained(chapter: str, _effect: str, _vehicle: str) -> str:
+    return wrapped([_LAB_EXPLAINED[chapter]]) if chapter in _LAB_EXPLAINED else ""
+
+
+def unpack(out: Path) -> list[Path]:
+    """Write the drives below ``out``, as ``unpacked``; their folders."""
+    return sorted({path.parent for path in unpacked("lab.zip", out)}, reverse=True)
+
+
+def _answer(story: Story) -> list[str]:
+    """What the simulated car truly was, and what was found."""
+    from logger.api.lab.loop import chapter
+    from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
+
+    sentence, table = truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
+    return [*chapter("The answer"), wrapped([sentence]), "", *table]
+
+
+def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Mapping[str, float]
+                 ) -> tuple[str, list[str]]:
+    """What a simulated car truly was, and what was found: a sentence, and the lines of a table.
+
+    effect, values    that it had
+    off               by which factor its numbers were not those of its file
+    """
+    from logger.report.quantities import numbers_of
+
+    found = {one.effect.name for one in story.last.effects}
+    rows = [("Number", "True", "Without", "With")]
+    rows += [(one.name, f"{off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
+              f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
+    numbers = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
+    mine = numbers_of(story.rounds[-1].addition.new[-1]) if effect in found else "nothing of the kind"
+    return (f"The drives were simulated. The car had {effect}, {numbers}; found: {mine}. Its numbers differed from its "
+            "file, in per cent:", columns(rows))
+
+
+PAGE, RUNS = "field.html", "runs"
+_ABOUT = (
+    "A box in a RAV4 recorded three drives along one street, slowly, briskly and fast, and a fourth over the street "
+    "beyond. The second and the fourth have the BMA220 of the box, with its steps of 0.6 m/s2; for the first and the "
+    "third a serial accelerometer was plugged in. Both streets had been measured. All of it is simulated: car, "
+    "streets and receiver, down to the bytes.",
+    "This car has something that its file, rav4-2009, does not know, and it makes the IRI wrong. The lab finds it from "
+    "the first three drives; the fourth tells whether it was right.",
+)
+_EXPLAINED = {
+    "extract": "First the bytes become runs. Look at the positions: GPS fixes are late and wrong by a metre or two, "
+               "but the car felt the measured road, and that tells where it was.",
+    "before": "What does the box say of the fourth street? Look at the bias, and at the share of windows within two "
+              "standard errors (ideal: 95%). On a street that nobody measured, nothing would show that it is wrong.",
+    "compare": "Does the model fail on the three drives, or are only its parameters a little off? compare first refits "
+               "them within a few per cent. Look at the residual that remains, and where it is.",
+    "diagnose": "Which physical effect would explain that? Look at the p-value, and at the NRMSE on held-out "
+                "stretches: with the right effect it falls to the noise floor.",
+    "add": "ridelog fits the effect and the car's parameters on all three drives. Look at the parameters that the "
+           "missing effect had biased.",
+    "again": "Is that all? Look for anything that is more than noise.",
+    "after": "The fourth drive once more, which the lab has never seen, with the new file.",
+}
+
+
+def field(out: Path, unpack_only: bool, as_json: bool) -> None:
+    """Unpack the drives into ``out``, find what is missing, and judge the fourth with and without it."""
+    from logger.api.lab.bench import require_compiler
+    from logger.api.lab.loop import as_json as story_json
+    from logger.api.lab.loop import unsaid_lines
+    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
+    from logger.store.formats.effect_file import shipped_effects
+
+    if not unpack_only:
+        require_compiler("ridelog demo --field", shipped_effects().values())
+    unpacked("field.zip", out)
+    first, fourth = [_dump(out, name) for name in DRIVES], _dump(out, FOURTH)
+    commands = _Commands(out, first, fourth, VEHICLE)
+    if unpack_only:
+        print(json.dumps({"vehicle": VEHICLE, "dumps": [*map(str, first), str(fourth)],
+                          "lines": [str(out / LINE), str(out / BEYOND)]}) if as_json else
+              f"Four drives and two measured lines in {out}\nNext: {commands.extract()[0]}")
+        return
+    tell: Say = unsaid_lines if as_json else say
+    tell([wrapped(_ABOUT)])
+    tell(_headed("Extract", "extract", *commands.extract()))
+    extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]
+    before = _judged(out / RUNS / FOURTH, VEHICLE, "The fourth drive, by the file as it is", "before", commands, tell)
+    story = _story(commands, out, tell)
+    last = story.rounds[-1].file if story.rounds else VEHICLE
+    after = _judged(out / RUNS / FOURTH, last, "The fourth drive, by the last file", "after", commands, tell)
+    page, sentence, table = out / PAGE, *_truth(story)
+    _write_page(page, out, story, before, after, sentence)
+    tell(_ending(story, before, after, page))
+    tell(["", "=== The answer ===", "", wrapped([sentence]), "", *table])
+    if as_json:
+        print(json.dumps({"runs": [one.as_json() for each in extracted for one in each.runs], **story_json(story),
+                          "fourth": _fourth_json(before, after), "truth": _truth_json(), "page": str(page)},
+                         allow_nan=False))
+
+
+def unpacked(archive: str, out: Path) -> list[Path]:
+    """Write the files of an archive of this folder below ``out``, where they may be already; their paths.
+
+    Raises BadInput, and writes nothing, where something else of one of their names is there; OSError as ``open``.
+    """
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"--out {out}: expected a folder")
+    with resources.as_file(resources.files("logger.demo") / archive) as file, ZipFile(file) as kept:
+        contents = {out / name: kept.read(name) for name in kept.namelist()}
+    for path, content in contents.items():
+        if path.parent.exists() and not path.parent.is_dir():
+            raise BadInput(f"{path.parent}: expected a folder, or nothing; choose another folder with --out")
+        if path.exists() and not (path.is_file() and path.read_bytes() == content):
+            raise BadInput(f"{path}: expected nothing there, or the demo's own file, found something else; choose "
+                           "another folder with --out")
+    with together():
+        for path, content in contents.items():
+            make_folder(path.parent)
+            write_file(path, [content])
+    return list(contents)
+
+
+# --- steps ---
+
+
+class _Commands:
+    """What a person types for each step."""
+
+    def __init__(self, out: Path, first: list[Path], fourth: Path, vehicle: str) -> None:
+        self._out, self._first, self._fourth, self.vehicle = out, first, fourth, vehicle
+        self.runs = [out / RUNS / _name(one) for one in first]
+        self._listed = " ".join(map(str, self.runs))
+
+    def extract(self) -> tuple[str, str]:
+        from logger.demo.field_drives import BEYOND, LINE
+
+        runs = self._out / RUNS
+        return (f"ridelog extract {' '.join(map(str, self._first))} --out {runs} --profile {self._out / LINE}",
+                f"ridelog extract {self._fourth} --out {runs} --profile {self._out / BEYOND}")
+
+    def estimate(self, folder: Path, vehicle: str) -> str:
+        return f"ridelog estimate {folder} --vehicle {vehicle}"
+
+    def explain(self, chapter: str, effect: str, vehicle: str) -> str:
+        """Of the steps of ``loop.go_through``."""
+        command = {
+            "compare": f"ridelog compare --vehicle {vehicle} {self._listed}",
+            "diagnose": f"ridelog diagnose --vehicle {vehicle} {self._listed}",
+            "add": f"ridelog add-effect {effect} --vehicle {self.vehicle} --out {vehicle} {self._listed}",
+            "again": f"ridelog compare --vehicle {vehicle} {self._listed}",
+        }[chapter]
+        if chapter == "again":
+            self.vehicle = vehicle  # what the next effect is added to
+        return _typed(chapter, command)
+
+
+def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
+    from logger.api.extraction import extract_dump, read_measured_profile
+    from logger.commands.extract import lines
+
+    try:
+        found = extract_dump(dump, out / RUNS, None, read_measured_profile(out / line), on_screen())
+    finally:
+        wipe()
+    tell(lines(dump, found))
+    return found
+
+
+def _story(commands: _Commands, out: Path, tell: Say) -> Story:
+    from logger.api.lab.bench import bench_with
+    from logger.api.lab.loop import go_through, make_ready
+
+    given = bench_with(CompareQuestion(commands.vehicle, commands.runs, warn=warned))
+    make_ready(given, out, "--out")
+    return go_through(given, out, take, tell, progress, commands.explain)[0]
+
+
+def _run(folder: Path) -> Run:
+    from logger.api.drives import checked_run
+    from logger.store.formats.record_checks import RecordRules
+
+    return checked_run(folder, RecordRules(None, None))[0]
+
+
+def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
+    """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
+    from logger.api.drives import as_json, assessed, lines, sensor_of
+    from logger.shipped import vehicle_path
+    from logger.store.formats.vehicle_file import read_model
+    from logger.units import WINDOW_M
+
+    tell(_headed(title, why, commands.estimate(folder, vehicle)))
+    with progress() as say:
+        say("estimating the road")
+        drive = _run(folder)
+        found = assessed(drive, read_model(vehicle_path(vehicle)), *sensor_of(drive), WINDOW_M)
+    tell(_essential(lines(found, as_json(str(folder), found))))
+    return found
+
+
+def _essential(lines: list[str]) -> Iterator[str]:
+    """Of what ``ridelog estimate`` prints: the mean, and the table's head, last row and remark."""
+    yield next(line for line in lines if line.startswith(("IRI", "No IRI")))
+    table = [line for line in lines[lines.index("") :] if "bias" in line or line.lstrip().startswith("all ")]
+    yield from ["", *table, lines[-1]]
+
+
+# --- what it came to ---
+
+
+def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
+    from logger.api.extraction import RATE_HZ
+    from logger.api.lab.loop import field_page
+    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
+    from logger.report.maps import MapWay
+    from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
+    from logger.store.formats.profile_file import read_places
+
+    measured = [MapWay(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
+    driven = []
+    for name in (*DRIVES, FOURTH):
+        _, columns = read_columns(out / RUNS / name / DRIVE)
+        lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
+        driven.append(MapWay(name, lat_deg, lon_deg))
+    write_text(file, field_page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story,
+                                before,
+                          after, [sentence.partition(" Its numbers")[0]]))
+
+
+def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
+    from logger.api.lab.loop import HEADS, IN_HINT, ending, rows
+
+    return ["", "=== The end ===", "", wrapped(ending(story)), "", *columns([HEADS, *rows(before, after)]), "",
+            wrapped([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
+
+
+def _truth(story: Story) -> tuple[str, list[str]]:
+    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
+
+    return truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
+
+
+def _truth_json() -> dict[str, Any]:
+    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
+
+    return {"effect": EFFECT, "parameters": dict(EFFECT_VALUES), "numbers_times": dict(OFF)}
+
+
+def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:
+    from logger.api.lab.loop import figures_of
+
+    return {"before": figures_of(before), "after": figures_of(after)}
+
+
+# --- words ---
+
+
+def _headed(title: str, why: str, *commands: str) -> list[str]:
+    from logger.api.lab.loop import chapter
+
+    return chapter(title, _typed(why, *commands))
+
+
+def _typed(why: str, *commands: str) -> str:
+    """What a step is for, and what to type for it."""
+    return "\n".join([wrapped([_EXPLAINED[why]]), "", *(f"    {one}" for one in commands)])
+
+
+def _dump(out: Path, name: str) -> Path:
+    return out / f"{name}.dump.gz"
+
+
+def _name(dump: Path) -> str:
+    from logger.api.extraction import name_of
+
+    return name_of(dump)

@@ -37,7 +37,7 @@ from logger.api.shown import check_outs
 from logger.errors import BadInput, CheckFailed
 from logger.files import together, write_file
 from logger.printable import printable, word
-from logger.report.drawing import ENDINGS
+from logger.report.charts import ENDINGS
 from logger.report.quantities import WIDTH
 from logger.units import LENGTH_UNITS_M
 
@@ -287,7 +287,7 @@ def _write(paths: Sequence[Path], page: Callable[[], str], charts: Sequence[Char
 def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
     if not charts:
         raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
-    from logger.report.drawing import drawn
+    from logger.report.charts import drawn
 
     return drawn(charts, path)
 

@@ -16,7 +16,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
-from logger.report.drawing import ENDINGS
+from logger.report.charts import ENDINGS
 from logger.report.maps import MapWay
 from logger.report.page import notices, page
 from logger.report.placed import of_files

@@ -1,8 +1,8 @@
-"""How a simulated car moves: its speed and way over time, the road under it, and what its body does on that road.
+"""A drive that never took place, as the bytes a recorder would have written.
 
-What a simulated GPS receiver sends: NMEA 0183 sentences and a few UBX frames, each byte at its time on the wire.
-
-A drive that never took place, as the bytes a recorder would have written.
+``python -m logger.demo.simulated_drive FILE`` makes the one that ships with ridelog (``PLAN``): not quite six minutes
+and 4.5 km in a 2009 RAV4 near College Park, Maryland: town streets, a red light, a fast smooth road with a long loss of
+GPS, a rough lane with a speed bump, and home.
 
 The logger needs drives whose truth is known: to show itself without hardware, and to be measured. A plan (speeds,
 roughness, bumps, lost fixes) becomes motion; the road moves a half car; its body acceleration and its position pass
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import os
 import struct
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -38,6 +39,8 @@ from drivers.readings import GPS
 from logger.profiles.track import Track
 from logger.roads import iri, iso8608
 from logger.roads.obstacles import speed_bump
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import KMH_MPS, KNOT_MPS, STANDARD_GRAVITY_MPS2, US_PER_S
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen
@@ -480,3 +483,30 @@ def _read_in_chunks(source: str, data: bytes, arrival_us: Array, rng: np.random.
         events.append(Event(t_us, source, data[begin:end]))
         begin = end
     return events
+
+
+PLAN = DrivePlan(
+    speed_knots=(
+        (0, 0), (4, 0), (13, 12), (38, 13), (50, 11), (58, 11), (68, 0), (88, 0),      # town, red light for 20 s
+        (99, 15), (125, 16), (137, 24.5), (205, 25), (220, 12), (245, 11), (251, 5),   # the fast road, down to the lane
+        (259, 5), (264, 9), (295, 8), (302, 13), (330, 14), (340, 0), (345, 0),        # bump, rough lane, home
+    ),
+    stretches=(
+        RoadStretch(420, 60), RoadStretch(250, 140), RoadStretch(530, 40), RoadStretch(2070, 12), RoadStretch(290, 220),
+        RoadStretch(180, 120),
+        RoadStretch(270, 800), RoadStretch(100, 300), RoadStretch(500, 90),
+    ),
+    bumps=(SpeedBump(3695, 0.08, 1.6),),
+    reception=Reception(first_fix_s=8, lost=((114, 118), (165, 190)), corrupted_s=30),
+    offset_mps2=(0.21, -0.13, 0.16),
+    seed=2009,
+)
+
+
+def main() -> None:
+    """Write the drive to the file named on the command line."""
+    record(simulate_drive(PLAN, read_vehicle(vehicle_file("rav4-2009"))), sys.argv[1])
+
+
+if __name__ == "__main__":
+    main()

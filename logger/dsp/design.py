@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.sections import Floats, butterworth_sos, frequency_response
+from logger.dsp.filters import Floats, butterworth_sos, frequency_response
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Sections, Weighting
 
 TOLERANCE_DB = 0.02

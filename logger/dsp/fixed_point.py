@@ -89,7 +89,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.sections import BlockFilter, Floats, SectionRows
+from logger.dsp.filters import BlockFilter, Floats, SectionRows
 from logger.units import STANDARD_GRAVITY_MPS2
 
 BLIND = 1e-12

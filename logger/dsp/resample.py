@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import kaiser_half_length, low_pass_taps
+from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.units import US_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -237,7 +237,7 @@ class Decimator:
     readings themselves are given along.
     Raises ValueError for a factor below 1.
 
-    The work is laid out like that of ``logger.dsp.sections``: one matrix for a fixed block, zeros for what has
+    The work is laid out like that of ``logger.dsp.filters``: one matrix for a fixed block, zeros for what has
     not arrived, so that no split of the input changes a bit.
     """
 

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import kaiser_half_length, kaiser_window, low_pass_taps
+from logger.dsp.filters import kaiser_half_length, kaiser_window, low_pass_taps
 
 Array = npt.NDArray[np.float64]
 

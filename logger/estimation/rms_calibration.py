@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.sections import frequency_response
+from logger.dsp.filters import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
 from logger.roads.iri import golden_car_sections

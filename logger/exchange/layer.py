@@ -1,10 +1,7 @@
-"""What other programs are given: layers of rows with values and places, and their geometry.
+"""What other programs are given: layers of rows with values and places, their geometry, and the formats they go out in.
 
-Lines on the ground, in the order of maps: longitude before latitude, cut at the 180th meridian.
-
-Geometries as well-known binary (OGC 06-103r4, section 8): little-endian, longitude before latitude.
-
-Rows of logs as a layer: the columns of the log by their names there, and the file that the row is from.
+Geometries are lines on the ground in the order of maps: longitude before latitude, cut at the 180th meridian; as bytes
+well-known binary (OGC 06-103r4, section 8), little-endian.
 
 Problem: a row has one place, its middle; a map wants the stretch of road that the row is about. Solution: a row's line
 runs from half-way to the row before, through its middle, half-way to the next; where a neighbour does not join (a gap,
@@ -14,17 +11,29 @@ lost GPS) it ends at the middle, and a row without neighbours is a point. Nothin
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from enum import Enum
+from functools import cache
 from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from logger.errors import BadInput
+from logger.files import write_file
 from logger.geodesy import east_deg
+from logger.plugins import catalogue
 from logger.printable import word
 from logger.records import WindowRecord
 from logger.store.log.log_reader import LoggedFile, iso_utc, joined, split_drives
 from logger.store.log.row_format import COLUMNS
 from logger.units import US_PER_S
+
+if TYPE_CHECKING:
+    import pyarrow
+
 
 Place = tuple[float, float]
 """Longitude and latitude [degrees]."""
@@ -240,3 +249,71 @@ def _of_piece(piece: Sequence[WindowRecord]) -> Iterator[Geometry]:
     ends = [half_way(one, next_) for one, next_ in pairwise(places)]
     for index, place in enumerate(places):
         yield cut((*ends[max(index - 1, 0) : index], place, *ends[index : index + 1]))
+
+
+class Format(ABC):
+    """A way to write a layer.
+
+    name     as the file's of this package, and the ending of what it writes
+    title    in a few words
+    """
+
+    name: str
+    title: str
+
+    @abstractmethod
+    def content(self, layer: Layer, file: str) -> Iterable[bytes]:
+        """A file with all rows, in pieces. BadInput, with the name of the ``file`` that it is for, where a library that
+        it takes is missing."""
+
+
+@cache
+def formats() -> dict[str, Format]:
+    """All there are, by the ending of their files."""
+    return catalogue("logger.exchange.formats", "FORMAT")
+
+
+def format_of(path: Path) -> Format:
+    """The format that a file's ending asks for. BadInput for one that there is not."""
+    known = formats()
+    ending = path.suffix.removeprefix(".").lower()
+    if ending not in known:
+        expected = ", ".join(f".{name}" for name in known)
+        raise BadInput(f"{path}: expected a file that ends in one of {expected}")
+    return known[ending]
+
+
+def write_layer(layer: Layer, path: Path) -> None:
+    """Write a file that is there whole, in place of an old one, or not at all; its texts are words that can be seen
+    (``logger.printable``). BadInput as ``format_of`` and ``Format.content``, and where it cannot be written."""
+    form = format_of(path)
+    try:
+        write_file(path, form.content(layer.printable(), str(path)))
+    except OSError as error:
+        raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None
+
+
+GEOMETRY = "geometry"
+EXTRA = "{}: expected the 'maps' extra: pip install 'ridelog[maps]' ({})"
+
+
+def arrow_table(layer: Layer, file: str) -> pyarrow.Table:
+    """One row a feature, with well-known binary as ``geometry``. BadInput that names the file where the extra is
+    missing."""
+    try:
+        import pyarrow
+    except ImportError as error:
+        raise BadInput(EXTRA.format(file, error)) from None
+    columns = list(zip(*(one.values for one in layer.features), strict=True)) or [()] * len(layer.fields)
+    table = {field.name: _column(pyarrow, field, values)
+             for field, values in zip(layer.fields, columns, strict=True)}
+    table[GEOMETRY] = pyarrow.array([wkb(one.geometry) for one in layer.features], pyarrow.binary())
+    return pyarrow.table(table)
+
+
+def _column(pyarrow: Any, field: Attribute, values: tuple[Any, ...]) -> Any:
+    if field.kind is Kind.TIME:
+        times = [None if value is None else datetime.fromisoformat(value) for value in values]
+        return pyarrow.array(times, pyarrow.timestamp("ms", "UTC"))
+    kinds = {Kind.WORDS: pyarrow.string(), Kind.COUNT: pyarrow.int64(), Kind.NUMBER: pyarrow.float64()}
+    return pyarrow.array(values, kinds[field.kind])

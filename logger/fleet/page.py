@@ -32,8 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.exchange.format import format_of
-from logger.exchange.layer import Attribute, Feature, Geometry, Kind, Layer, cut, iri_title
+from logger.exchange.layer import Attribute, Feature, Geometry, Kind, Layer, cut, format_of, iri_title
 from logger.files import make_folder, whole_folder, write_file, write_text
 from logger.fleet.dataset import DAY_US, Engine
 from logger.fleet.ingest import Counts

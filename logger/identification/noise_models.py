@@ -27,8 +27,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
+from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
-from logger.dsp.low_pass import DecimatingLowPass
 
 Array = npt.NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import DecimatingLowPass
+from logger.dsp.filters import DecimatingLowPass
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
     NOTHING_BY_DIFFERENCES,

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import DecimatingLowPass
+from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel, SimulatedModel, VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down

@@ -15,7 +15,6 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "logger.api.calibration": "Calibration Slopes calibrate",
     "logger.api.conversion": "Conversion convert",
     "logger.api.drives": "Estimate Run estimate make_run read_run simulate write_run",
     "logger.api.fleet": "FleetReport FleetSummary Ingested fleet_ingest fleet_report fleet_summarise",
@@ -31,7 +30,7 @@ _HOMES = {
     "logger.api.roads": "Iri Profile RoadClass classify iri random_road read_profile write_profile",
     "logger.api.lab.diagnose": "Candidate Diagnosis SameRoadDiagnosis diagnose diagnose_same_road",
     "logger.api.sections": "Sections sections",
-    "logger.api.vehicles": "EffectInfo Effects Model read_vehicle vehicles write_vehicle",
+    "logger.api.vehicles": "Calibration EffectInfo Effects Model Slopes calibrate read_vehicle vehicles write_vehicle",
     "logger.errors": "BadInput",
     "logger.identification.identifiability": "NotIdentifiable",
 }

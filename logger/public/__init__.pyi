@@ -1,7 +1,4 @@
 # What type checkers know of the names in __init__.py.
-from logger.api.calibration import Calibration as Calibration
-from logger.api.calibration import Slopes as Slopes
-from logger.api.calibration import calibrate as calibrate
 from logger.api.conversion import Conversion as Conversion
 from logger.api.conversion import convert as convert
 from logger.api.drives import Estimate as Estimate
@@ -62,9 +59,12 @@ from logger.api.roads import read_profile as read_profile
 from logger.api.roads import write_profile as write_profile
 from logger.api.sections import Sections as Sections
 from logger.api.sections import sections as sections
+from logger.api.vehicles import Calibration as Calibration
 from logger.api.vehicles import EffectInfo as EffectInfo
 from logger.api.vehicles import Effects as Effects
 from logger.api.vehicles import Model as Model
+from logger.api.vehicles import Slopes as Slopes
+from logger.api.vehicles import calibrate as calibrate
 from logger.api.vehicles import effects as effects
 from logger.api.vehicles import read_vehicle as read_vehicle
 from logger.api.vehicles import vehicles as vehicles

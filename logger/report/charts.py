@@ -1,22 +1,25 @@
-"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, bars, falling steps.
+"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, bars, falling steps; and as files.
 
 A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
-are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground.
-
-A result of a command as a page that stands alone: its words and its charts.
+are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground. Pages need no
+library; a picture file (``drawn``) is made by matplotlib, which the ``report`` extra brings, for papers and slides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import pairwise
 from math import ceil, floor, log10
+from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
-from logger.chart_data import SERIES, Array, Bars, Chart, Curves, Field, Line
+from logger.chart_data import CLASS_COLOURS, SERIES, Array, Bars, Chart, Curves, Field, Line
+from logger.errors import BadInput
 from logger.report.document import EMPTY, Html, concatenated, document, heading, html, section
 
 WIDTH = 1000
@@ -339,3 +342,71 @@ def _part(text: str) -> Html:
     if any(_COLUMN_GAP in line.strip() for line in lines):
         return html('<pre class="whole">{}</pre>', "\n".join(lines))
     return html('<p class="lines">{}</p>', "\n".join(lines))
+
+
+ENDINGS = (".png", ".svg", ".pdf")
+_WIDTH_IN, _HEIGHT_IN, _DPI = 8.0, 3.6, 150
+_LEAST_BARS = 5  # fewer leave room below, and are no thicker
+_LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
+
+
+def drawn(charts: Sequence[Chart], path: Path) -> bytes:
+    """Charts under each other, as the file that this name's ending asks for. BadInput where the extra is missing."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise BadInput(f"{path}: expected the 'report' extra: pip install 'ridelog[report]' ({error})") from None
+    figure = Figure(figsize=(_WIDTH_IN, _HEIGHT_IN * len(charts)), dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    for one, axes in zip(charts, np.atleast_1d(figure.subplots(len(charts), squeeze=False)[:, 0]), strict=True):
+        axes.set_title(one.title, loc="left", fontsize=10, fontweight="bold")
+        axes.set_xlabel(one.value_name if isinstance(one, Bars) else one.x_name)
+        axes.set_ylabel("" if isinstance(one, Bars) else one.y_name)
+        if isinstance(one, Bars):
+            _draw_bars(axes, one)
+        elif isinstance(one, Curves):
+            _draw_curves(axes, one)
+        else:
+            shades = axes.pcolormesh(one.x, one.y, np.asarray(one.values), vmin=0.0, vmax=one.top, cmap="Blues",
+                                     shading="nearest")
+            figure.colorbar(shades, ax=axes, label=one.value_name)
+    # A date in the file would make the same result another file.
+    ending = path.suffix.lower()
+    about = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[ending]
+    made = BytesIO()
+    figure.savefig(made, format=ending[1:], metadata=about)
+    return made.getvalue()
+
+
+def _draw_bars(axes: Any, one: Bars) -> None:
+    places = np.arange(len(one.bars))
+    axes.barh(places, [value for _, value in one.bars], color=_LINE_COLOURS[0], height=0.7)
+    axes.set_yticks(places, [name.replace(", ", ",\n") for name, _ in one.bars], fontsize=8)
+    axes.set_ylim(max(len(one.bars), _LEAST_BARS) - 0.5, -0.5)
+    if one.level is not None:
+        axes.axvline(one.level[0], color="0.5", linestyle=":", linewidth=1, label=one.level[1])
+        axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_curves(axes: Any, one: Curves) -> None:
+    for line in (line for line in one.lines if line.faint):
+        axes.plot(line.x, line.y, color="0.7", linestyle=":", linewidth=1)
+        axes.annotate(line.name, (line.x[-1], line.y[-1]), xytext=(4, 0), textcoords="offset points", va="center",
+                      color="0.4", fontsize=8, annotation_clip=False)
+    series = [line for line in one.lines if not line.faint]
+    for number, line in enumerate(series):
+        colour = _LINE_COLOURS[number % len(_LINE_COLOURS)]
+        if line.errors is not None:
+            axes.fill_between(line.x, line.y - line.errors, line.y + line.errors, color=colour, alpha=0.25, linewidth=0)
+        way = {"linestyle": "none", "marker": "o", "markersize": 3} if line.dots else {"linewidth": 1.2}
+        axes.plot(line.x, line.y, color=colour, label=line.name, **way)
+    if one.level is not None:
+        axes.axhline(one.level[0], color="0.5", linestyle=":", linewidth=1)
+        axes.annotate(one.level[1], (1.0, one.level[0]), xycoords=("axes fraction", "data"), ha="right", va="bottom",
+                      color="0.4", fontsize=8)
+    axes.set_xscale("log" if one.log_x else "linear")
+    axes.set_yscale("log" if one.log_y else "linear")
+    axes.grid(alpha=0.25)
+    if len(series) > 1:
+        axes.legend(frameon=False, fontsize=8)

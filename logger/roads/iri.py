@@ -10,8 +10,8 @@ from math import ceil, floor
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
-from logger.dsp.sections import BlockFilter
 from logger.units import KMH_MPS
 from logger.vehicle.linear_car import frequency_response
 from logger.vehicle.models import GOLDEN_CAR, quarter_car

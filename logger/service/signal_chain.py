@@ -28,9 +28,9 @@ import numpy.typing as npt
 from drivers.readings import AccelerationBlock
 from logger.comfort.iso2631 import RunningRms, comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RawFigures, RideFigures, Uncertain
+from logger.dsp.filters import BlockFilter, SectionRows, butterworth_sos, frequency_response
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.resample import Decimator, GridResampler, GridRun
-from logger.dsp.sections import BlockFilter, SectionRows, butterworth_sos, frequency_response
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
 from logger.dsp.windows import GridSamples, Window, joined
 from logger.estimation.noise_belief import NoiseBelief

@@ -25,8 +25,8 @@ from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
 from drivers.readings import BAUDS, GPS, RecordedWords
 from logger.comfort.uncertain_ride import NoiseFloor
+from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
-from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse

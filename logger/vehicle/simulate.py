@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import kaiser_half_length, low_pass_taps
+from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.profiles.track import Pushing, Way, WheelTracks, under_surface
 from logger.vehicle.structure import Forces, Output, Structure, driven_outputs, pushed, straight_step
 

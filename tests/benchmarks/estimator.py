@@ -41,7 +41,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
+from logger.dsp.filters import BlockFilter, butterworth_sos, frequency_response
 from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation, rms_relation

@@ -16,8 +16,8 @@ import numpy as np
 from scipy import signal
 
 from logger.demo.simulated_drive import DrivePlan, RoadStretch, simulate_drive
+from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
-from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
 from logger.roads.iri import golden_car_sections

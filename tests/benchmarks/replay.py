@@ -21,8 +21,7 @@ from itertools import product
 from pathlib import Path
 
 from drivers.accelerometers.bma220 import USUAL_OVERSAMPLE
-from logger.demo.make import PLAN
-from logger.demo.simulated_drive import LINES, DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import LINES, PLAN, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 

@@ -24,7 +24,7 @@ from math import log, pi, sqrt
 import numpy as np
 from scipy.special import erf, ndtr, ndtri
 
-from logger.dsp.sections import frequency_response
+from logger.dsp.filters import frequency_response
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.vehicle.vehicle import Vehicle
 

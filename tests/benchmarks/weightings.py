@@ -21,7 +21,7 @@ import numpy as np
 from scipy import signal
 
 from logger.dsp.design import design_error, design_sections
-from logger.dsp.sections import BlockFilter, frequency_response
+from logger.dsp.filters import BlockFilter, frequency_response
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Sections, Weighting
 from logger.plugins import catalogue
 

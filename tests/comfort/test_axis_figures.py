@@ -20,7 +20,7 @@ from logger.comfort.iso2631 import (
     total,
 )
 from logger.dsp.design import design_error, design_sections
-from logger.dsp.sections import BlockFilter
+from logger.dsp.filters import BlockFilter
 from logger.dsp.weightings.weighting import DELAY_SAMPLES
 from logger.plugins import catalogue
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.comfort.iso2631 import RunningRms, a_w, comfort_word, crest_factor, vdv
-from logger.dsp.sections import BlockFilter
+from logger.dsp.filters import BlockFilter
 from logger.dsp.weightings.weighting import DELAY_SAMPLES
 from logger.dsp.weightings.wk import WEIGHTING
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.commands.demo_lab import unpack
+from logger.commands.demo import unpack
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.shipped import vehicle_file

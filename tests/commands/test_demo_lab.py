@@ -9,7 +9,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 
-from logger.commands import demo_lab
+from logger.commands import demo
 from logger.demo import lab_drives
 from logger.store.formats.drive_file import read_run
 
@@ -27,12 +27,12 @@ def files_in(folder: Path) -> dict[str, bytes]:
 
 
 def test_the_drives_are_on_two_streets_and_the_texts_say_so(tmp_path: Path) -> None:
-    slow, brisk = map(read_run, demo_lab.unpack(tmp_path))
+    slow, brisk = map(read_run, demo.unpack(tmp_path))
     common = min(len(slow.track.elevation_m), len(brisk.track.elevation_m))
     apart_m = slow.track.elevation_m[:common] - brisk.track.elevation_m[:common]
     assert np.sqrt(np.mean(apart_m**2)) > 0.01
     assert slow.speed_mps.mean() < 0.7 * brisk.speed_mps.mean()
-    for text in (demo_lab._INTRODUCTION, DOC.read_text("utf-8"), str(lab_drives.__doc__)):
+    for text in (demo._INTRODUCTION, DOC.read_text("utf-8"), str(lab_drives.__doc__)):
         words = " ".join(text.split())
         assert "two poor town streets" in words
         assert not re.search(r"\bstreet\b|\btwice along", words)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from logger.commands.main import main
+from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
-from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.roads.iri import golden_car_sections

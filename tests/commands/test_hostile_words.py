@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.exchange.format import write_layer
-from logger.exchange.layer import Attribute, Feature, Kind, Layer
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, write_layer
 from logger.printable import LONGEST_WORD
 from logger.shipped import vehicle_file
 from logger.store.log.row_format import HEADER, format_row

@@ -23,8 +23,7 @@ from ..support.command import called
 
 def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file_or_asked() -> None:
     files = {module.name for module in pkgutil.iter_modules(logger.commands.__path__)}
-    helpers = {"main", "options", "screen", "demo_lab", "demo_field", "numbers",
-               "pictures"}
+    helpers = {"main", "options"}
     verbs = {verb.replace("-", "_") for verb in main.VERBS if verb not in main.ASKED}
     assert files - helpers == verbs and set(main.ASKED) <= set(main.VERBS)
 

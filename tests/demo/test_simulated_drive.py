@@ -10,9 +10,10 @@ from pynmeagps import NMEAParseError, NMEAReader
 from scipy import signal
 
 from drivers.dump import open_dump
-from logger.demo import make
+from logger.demo import simulated_drive
 from logger.demo.simulated_drive import (
     LEAD_M,
+    PLAN,
     SPACING_M,
     DemoDrive,
     DrivePlan,
@@ -28,14 +29,14 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
-SHIPPED = Path(make.__file__).parent / "drive.dump.gz"
+SHIPPED = Path(simulated_drive.__file__).parent / "drive.dump.gz"
 SHORT = DrivePlan(speed_knots=((0, 10), (10, 10), (20, 15), (30, 15)),
                   stretches=(RoadStretch(100, 50), RoadStretch(1, 200)))
 
 
 @pytest.fixture(scope="module")
 def shipped() -> DemoDrive:
-    return simulate_drive(make.PLAN, RAV4)
+    return simulate_drive(PLAN, RAV4)
 
 
 def sentences(drive: DemoDrive) -> list[tuple[int, bytes]]:
@@ -76,7 +77,7 @@ def test_the_shipped_drive_holds_what_it_promises(shipped: DemoDrive) -> None:
     roughness = shipped.road.iri(np.arange(0, motion.distance_m[-1], 100.0))
     assert roughness.min() < 3.05  # class A ...
     assert roughness.max() > 12.19  # ... to D
-    bump = make.PLAN.bumps[0]
+    bump = PLAN.bumps[0]
     assert np.interp(bump.at_m, motion.distance_m, motion.speed_mps) < 6
     over = (motion.distance_m > bump.at_m) & (motion.distance_m < bump.at_m + 8)
     assert np.abs(shipped.accel_mps2[over]).max() > 3
@@ -125,7 +126,7 @@ def test_sensor_bytes_are_six_bits_and_on_time(shipped: DemoDrive) -> None:
     raw = np.frombuffer(b"".join(event.data for event in events), np.uint8)
     assert not (raw & 3).any()
     counts = np.where(raw > 127, raw.astype(int) - 256, raw).reshape(-1, 3) / 4
-    assert np.mean(counts, axis=0) == pytest.approx(np.array(make.PLAN.offset_mps2) / 0.6129 + [0, 0, 16], abs=0.15)
+    assert np.mean(counts, axis=0) == pytest.approx(np.array(PLAN.offset_mps2) / 0.6129 + [0, 0, 16], abs=0.15)
     late_us = np.array([event.t_us for event in events]) - shipped.start_us - 10_000 * np.arange(len(events))
     assert late_us.min() >= 0
     assert np.median(late_us) < 100
@@ -194,6 +195,6 @@ def test_reception_and_sensor_are_as_planned(tmp_path: Path) -> None:
 
 
 def test_the_maker_writes_the_file_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.argv", ["make", str(tmp_path / "drive.dump.gz")])
-    make.main()
+    monkeypatch.setattr("sys.argv", ["simulated_drive", str(tmp_path / "drive.dump.gz")])
+    simulated_drive.main()
     assert (tmp_path / "drive.dump.gz").stat().st_size == pytest.approx(SHIPPED.stat().st_size, rel=0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, freqs, sosfreqz
 
-from logger.dsp.low_pass import butterworth
+from logger.dsp.filters import butterworth
 from logger.dsp.whole_record import HALF_WIDTH_HZ, in_band
 
 F_HZ = np.array([0.5, 3.0, 11.0, 24.0, 37.0, 49.0])

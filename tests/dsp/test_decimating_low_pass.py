@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.dsp.low_pass import DecimatingLowPass
+from logger.dsp.filters import DecimatingLowPass
 
 TIME_S = np.arange(2000) / 100
 

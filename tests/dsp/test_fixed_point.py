@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from logger.dsp.filters import butterworth_sos, frequency_response
 from logger.dsp.fixed_point import (
     FULL_SCALE_MPS2,
     FULL_SCALE_SLOPE,
@@ -20,7 +21,6 @@ from logger.dsp.fixed_point import (
     fixed_cascade,
     quiet,
 )
-from logger.dsp.sections import butterworth_sos, frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
 from logger.roads.iri import golden_car_sections, rectified_slope

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from logger.dsp.sections import BLOCK, BlockFilter, butterworth_sos, frequency_response
+from logger.dsp.filters import BLOCK, BlockFilter, butterworth_sos, frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 
 RATE_HZ = 100

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.dsp.design import design_error, design_sections
-from logger.dsp.sections import frequency_response
+from logger.dsp.filters import frequency_response
 from logger.dsp.weightings.weighting import Weighting
 from logger.plugins import catalogue
 

@@ -22,8 +22,7 @@ from hypothesis import strategies as st
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.exchange.format import formats
-from logger.exchange.layer import windows_layer
+from logger.exchange.layer import formats, windows_layer
 from logger.records import WindowRecord
 from logger.store.log.log_reader import LoggedFile
 from logger.store.log.row_format import COLUMNS, HEADER, format_row

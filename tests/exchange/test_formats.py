@@ -13,8 +13,7 @@ import pyogrio
 import pytest
 from pyogrio.errors import DataSourceError
 
-from logger.exchange.format import formats, write_layer
-from logger.exchange.layer import windows_layer
+from logger.exchange.layer import formats, windows_layer, write_layer
 from logger.store.log.log_reader import LoggedFile
 
 from .test_convert import drive, eastwards

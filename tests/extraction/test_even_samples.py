@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.even_samples import clipped_samples, even_samples
+from logger.extraction.recorded_columns import clipped_samples, even_samples
 
 
 def signal(time_s: np.ndarray) -> np.ndarray:

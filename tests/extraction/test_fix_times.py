@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.readings import Fix
-from logger.extraction.held_fixes import fix_times_s
+from logger.extraction.recorded_columns import fix_times_s
 from logger.service.timebase import Timebase
 
 

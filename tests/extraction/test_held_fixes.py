@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.held_fixes import hidden_m, new_rows, speeds_of_places, way_over_speed
+from logger.extraction.recorded_columns import hidden_m, new_rows, speeds_of_places, way_over_speed
 
 DEGREE_M = 111_195.0  # of a meridian, on a sphere of 6371 km
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.even_samples import felt, steady_mean, turns, upwards
+from logger.extraction.recorded_columns import felt, steady_mean, turns, upwards
 from logger.units import STANDARD_GRAVITY_MPS2 as G
 
 from ..support.drives.phones import rotation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.extraction.even_samples import stretches
+from logger.extraction.recorded_columns import stretches
 
 TIME_S = np.arange(0, 200, 0.01)
 FIX_S = np.arange(0.5, 200, 1.0)

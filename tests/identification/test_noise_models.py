@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from logger.dsp.low_pass import DecimatingLowPass
+from logger.dsp.filters import DecimatingLowPass
 from logger.identification.noise_models import Autoregressive, RoadNoise, White, Whitening
 
 Array = npt.NDArray[np.float64]

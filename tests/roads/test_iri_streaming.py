@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from logger.dsp.filters import frequency_response
 from logger.dsp.fixed_point import FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
-from logger.dsp.sections import frequency_response
 from logger.roads import iso8608
 from logger.roads.iri import GoldenCarFilter, IriWindow, IriWindows, golden_car_sections, rectified_slope, window_iri
 

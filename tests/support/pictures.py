@@ -15,7 +15,7 @@ import numpy as np
 
 from logger.api.lab.compare import Comparison, compare, worst_moment
 from logger.chart_data import Curves, Line
-from logger.report.drawing import drawn
+from logger.report.charts import drawn
 
 from .browser import CHROMIUM, NO_BROWSER
 from .command import called

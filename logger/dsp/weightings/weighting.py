@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 Polynomial = tuple[float, ...]
 
-# Rows b0, b1, b2, a0, a1, a2 for ``logger.dsp.sections.BlockFilter``.
+# Rows b0, b1, b2, a0, a1, a2 for ``logger.dsp.filters.BlockFilter``.
 Sections = tuple[tuple[float, float, float, float, float, float], ...]
 
 # Every set of sections runs this many whole samples behind the formula: output k + 5 belongs to the instant of input k.

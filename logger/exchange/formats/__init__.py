@@ -1,1 +1,1 @@
-"""One file a format, each offers ``FORMAT`` (``logger.exchange.format``). Its name is the ending of the files."""
+"""One file a format, each offers ``FORMAT`` (``logger.exchange.layer``). Its name is the ending of the files."""

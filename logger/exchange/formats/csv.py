@@ -7,8 +7,7 @@ import csv
 from collections.abc import Iterator
 from io import StringIO
 
-from logger.exchange.format import Format
-from logger.exchange.layer import Layer
+from logger.exchange.layer import Format, Layer
 from logger.printable import cell
 
 

@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from logger.exchange.format import Format
-from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Geometry, Layer, Line, type_of
+from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Format, Geometry, Layer, Line, type_of
 
 
 class GeoJson(Format):

@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from io import BytesIO
 
 from logger.errors import BadInput
-from logger.exchange.arrow_table import EXTRA, GEOMETRY, arrow_table
-from logger.exchange.format import Format
-from logger.exchange.layer import Layer
+from logger.exchange.layer import EXTRA, GEOMETRY, Format, Layer, arrow_table
 
 
 class GeoPackage(Format):

@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from xml.sax.saxutils import escape
 
-from logger.exchange.format import Format
-from logger.exchange.layer import DECIMALS, Feature, Layer
+from logger.exchange.layer import DECIMALS, Feature, Format, Layer
 
 _SPACE = "urn:x-ridelog:values:1"
 _IN_THE_POINT = {"lat_deg", "lon_deg", "t_utc"}

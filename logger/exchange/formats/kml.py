@@ -8,8 +8,7 @@ from itertools import groupby
 from xml.sax.saxutils import escape
 
 from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
-from logger.exchange.format import Format
-from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Feature, Geometry, Layer, Line, type_of
+from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Feature, Format, Geometry, Layer, Line, type_of
 from logger.roads.iso8608 import CLASS_GD_N0_CM3
 
 _UNKNOWN = "unknown"

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 from io import BytesIO
 from typing import Any
 
-from logger.exchange.arrow_table import GEOMETRY, arrow_table
-from logger.exchange.format import Format
-from logger.exchange.layer import TYPE_NAMES, Layer, type_of
+from logger.exchange.layer import GEOMETRY, TYPE_NAMES, Format, Layer, arrow_table, type_of
 
 
 class GeoParquet(Format):

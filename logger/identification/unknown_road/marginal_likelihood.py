@@ -36,7 +36,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import DecimatingLowPass
+from logger.dsp.filters import DecimatingLowPass
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM
 from logger.identification.noise_models import RoadNoise
 from logger.identification.unknown_road.road_operator import (

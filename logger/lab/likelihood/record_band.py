@@ -39,7 +39,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import butterworth
+from logger.dsp.filters import butterworth
 from logger.dsp.whole_record import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import butterworth
+from logger.dsp.filters import butterworth
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.record_band import cut_to_pass_band, is_steep, is_wide_enough
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine

@@ -1,7 +1,7 @@
 """A sensor follows slow motions and not quick ones.
 
 Its low-pass of first order is 1 / (1 + s / w); of second order, Butterworth's 1 / (1 + sqrt(2) s / w + (s / w)^2);
-higher orders are those of a filter that a program runs on the samples (``dsp.low_pass``). Such a one of low order
+higher orders are those of a filter that a program runs on the samples (``dsp.filters``). Such a one of low order
 too is another filter than a sensor's where its cut-off lies above a fifth or so of the sample rate: it takes all away
 at half of that, and nearly nothing where a sensor's takes some decibels. As a sensor's it would leave the difference,
 which looks like a resonance there.
@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.low_pass import butterworth
+from logger.dsp.filters import butterworth
 from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 
 Complex = npt.NDArray[np.complex128]

@@ -16,8 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from drivers.dump import DumpHeader, Event
-from logger.demo.make import PLAN
-from logger.demo.simulated_drive import GPS_BAUD, STEP_S, DriveMotion, Reception, simulate_drive, transmit
+from logger.demo.simulated_drive import GPS_BAUD, PLAN, STEP_S, DriveMotion, Reception, simulate_drive, transmit
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
