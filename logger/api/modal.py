@@ -22,7 +22,7 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, line
 from logger.errors import BadInput
-from logger.modal.analysis import FoundMode, ModalResult
+from logger.modal.mode import FoundMode, ModalResult
 from logger.printable import counted
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
@@ -97,7 +97,7 @@ def asked_modes(question: ModesCommand) -> CommandResult:
 
 def _modes_by(found: Found, name: str) -> Modes:
     """What was found of a record of this name, to be shown."""
-    from logger.modal.analysis import pole_rows
+    from logger.modal.mode import pole_rows
 
     result, kept, many = found.result, found.record, found.result.modes
     frequency_hz, frequency_std_hz, damping_ratio, damping_std = (

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.modal.analysis import (
+from logger.modal.mode import (
     Array,
     Complex,
     FoundMode,

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.modal.analysis import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
+from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
 from logger.roads.iso8608 import HIGHEST_CPM
 from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.models import structure_of

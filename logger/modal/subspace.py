@@ -35,7 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.modal.analysis import Array, Complex, OrderPoles
+from logger.modal.mode import Array, Complex, OrderPoles
 
 Estimate = Callable[["Moments"], OrderPoles]
 

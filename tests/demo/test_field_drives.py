@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from drivers.dump import open_dump
+from logger.commands.demo import unpacked
 from logger.demo import field_drives
 from logger.demo.simulated_drive import RoadStretch, body_acceleration, build_road, drive_along, sensed_acceleration
-from logger.demo.unpacking import unpacked
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.profile_file import read_places, read_profile

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.modal.analysis import FoundMode, decays, find_modes
+from logger.modal.analysis import decays, find_modes
 from logger.modal.five_storey import Masses, chain, free_decay, random_response, with_damping_ratios
+from logger.modal.mode import FoundMode
 
 from ..support.shapes import mac
 from ..support.slow import slow

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import eigh
 
 from logger.modal import five_storey
-from logger.modal.analysis import errors_of
 from logger.modal.decay import damping_of_two_peaks, log_decrement
 from logger.modal.five_storey import chain, free_decay, with_damping_ratios
+from logger.modal.mode import errors_of
 from logger.modal.subspace import segment_products, summed_spectrum
 
 from ..support.shapes import mac

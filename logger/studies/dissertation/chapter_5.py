@@ -18,7 +18,6 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.identification.identifiability import NotIdentifiable
 from logger.modal import five_storey
-from logger.modal.analysis import ModalResult
 from logger.modal.decay import damping_of_two_peaks, decay_modes, proposals
 from logger.modal.five_storey import (
     DAMPING_RATIO,
@@ -29,6 +28,7 @@ from logger.modal.five_storey import (
     released,
     structure,
 )
+from logger.modal.mode import ModalResult
 from logger.modal.subspace import summed_spectrum
 from logger.runs import Run
 from logger.studies.drives import (
