@@ -3,7 +3,8 @@
 Problem: a rig has no road. Its recorder samples how high the table stood, at a rate of its own, and between two samples
 the table moved smoothly: a straight line would take off a part of each quick motion (0.5 % at a twenty-fifth of the
 rate). Solution: cubic splines through the samples, whose means over steps of time are exact. So are derivatives: what
-stands on a table feels its acceleration.
+stands on a table feels its acceleration, and a damper on its bench its velocity. White noise of the sensor that took
+the samples, which would be most of these, is taken out first (``white_noise``).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.white_noise import without_white_noise
 from logger.profiles.track import Stance, Way
 
 if TYPE_CHECKING:
@@ -138,6 +140,7 @@ class Excitation:
         from scipy.interpolate import make_interp_spline
 
         time_s = self.start_s + np.arange(len(samples)) / self.rate_hz
+        samples = np.stack([without_white_noise(column)[0] for column in samples.T], axis=1)
         return make_interp_spline(time_s, samples, _CUBIC)
 
     @cached_property

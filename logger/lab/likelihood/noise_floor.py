@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.white_noise import EQUAL_SIGMA, OF_QUIETEST, pooled
 from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.repeats import find_repeats
@@ -24,9 +25,6 @@ from logger.runs import signal_errors
 
 Array = npt.NDArray[np.float64]
 
-# A band is louder than the noise from so many standard deviations of the difference on: of 20 bands of noise one is by
-# chance in eight cases (normal distribution, one-sided).
-_LOUDER_SIGMA = 2.5
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
 # over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).
 _FILTERED = 0.75
@@ -108,15 +106,11 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
               / freedoms[place] for place in places]
     highest = (power, freedom) if freedom else (levels[-1], freedoms[-1])
     by_level = sorted(zip(levels, freedoms, strict=True))
-    louder = _LOUDER_SIGMA
+    louder = EQUAL_SIGMA
     if power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
-        # The quietest of twenty is two of its own standard deviations below the others by chance.
-        louder = (_LOUDER_SIGMA + 2.0) / np.sqrt(2)
-    for level, n in by_level:
-        if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
-            break
-        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER_SIGMA
+        louder = OF_QUIETEST
+    power, freedom = pooled(by_level, power, freedom, louder)
     # Below 30 Hz all bands are full of what the road does.
     flat = freedom > _FLAT_SHARE * sum(freedoms) and all(one.edges_hz[-1] > 30.0 for one in bands)
     if not fitted and not (flat and highest[0] < _FILTERED_SHARE * power):

@@ -1,0 +1,70 @@
+"""Samples of a motion without the white noise of the sensor that took them.
+
+Problem: who derives a velocity from a place that was read multiplies the sensor's noise by the frequency. 20 um of it
+at 500 samples a second are 12 mm/s, and a damper that rubs looks as if its force rose over as much. Solution: noise is
+as loud at all frequencies, what moves is not. A plateau at the bottom of the spectrum is noise; each frequency keeps
+the share of its power that lies above it (N. Wiener, Extrapolation, Interpolation, and Smoothing of Stationary Time
+Series, 1949). Where the spectrum has no plateau nothing is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_BANDS, _LEAST_BANDS = 32, 16
+"""Of so many bands at least so many are equally loud where they are noise. Half: the spectrum of a random walk, as of a
+road, is flat in its last third to what a record shows, being 1 / sin^2 of the frequency (pi at the rate)."""
+_MOST_SHARE = 0.03
+"""Of the whole deviation, that noise is of no sensor which measures what drives a rig: a louder plateau is a motion
+that was made so, as white noise is on shakers. A judgement."""
+_NEAR, _ABOVE_SIGMA = 20, 4.0
+"""The power at a frequency is the mean of so many on either side, of half a period of the record each. Noise goes
+beyond so many standard deviations of that once in 30,000 frequencies (normal distribution)."""
+EQUAL_SIGMA = 2.5
+"""Bands are equally loud up to so many standard deviations of their difference: of 20 bands of noise one is louder by
+chance in eight cases (normal distribution, one-sided)."""
+
+OF_QUIETEST = (EQUAL_SIGMA + 2.0) / 2**0.5
+"""The same where the first is the quietest of all: of twenty that is two of its own standard deviations below the
+others by chance."""
+
+
+def pooled(levels: Iterable[tuple[float, float]], power: float, freedom: float, louder: float = EQUAL_SIGMA
+           ) -> tuple[float, float]:
+    """Mean power of what has a power and so many degrees of freedom, and of the bands that are no louder.
+
+    levels    power and degrees of freedom of each band, the quietest first
+    louder    as ``EQUAL_SIGMA``, of the first band
+    """
+    for level, n in levels:
+        if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
+            break
+        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, EQUAL_SIGMA
+    return power, freedom
+
+
+def without_white_noise(samples: Array) -> tuple[Array, float]:
+    """Samples (n,) without their white noise, and its standard deviation; themselves and 0 where they show none."""
+    count = len(samples)
+    if count <= _BANDS * _NEAR:
+        return samples, 0.0
+    line = np.linspace(samples[0], samples[-1], count)
+    odd = samples - line
+    spectrum = np.fft.rfft(np.concatenate([odd, -odd[-2:0:-1]]))
+    power = np.abs(spectrum)**2 / (2 * count)
+    bands = np.array_split(power[1:], _BANDS)
+    # A spectrum of an odd curve has one number at each frequency.
+    levels = sorted((float(one.mean()), float(len(one))) for one in bands)
+    noise, freedom = pooled(levels[1:], *levels[0], OF_QUIETEST)
+    if freedom < _LEAST_BANDS * levels[0][1] or not 0 < noise <= _MOST_SHARE**2 * float(power[1:].mean()):
+        return samples, 0.0
+    width = 2 * _NEAR + 1
+    local = np.convolve(np.pad(power, _NEAR, mode="reflect"), np.full(width, 1 / width), mode="valid")
+    gain = np.where(local > noise * (1 + _ABOVE_SIGMA * np.sqrt(2 / width)), 1 - noise / np.maximum(local, noise), 0.0)
+    kept = np.fft.irfft(spectrum * gain, 2 * (count - 1))[:count]
+    return line + kept, float(np.sqrt(noise))

@@ -1,0 +1,53 @@
+"""White noise of a sensor, told from what moves."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from logger.dsp.white_noise import without_white_noise
+from logger.profiles.excitation import Excitation
+from logger.profiles.track import Way
+
+RATE_HZ = 500.0
+
+
+def _sweep(count: int = 10_000) -> tuple[np.ndarray, np.ndarray]:
+    """A sweep from 0.5 to 12 Hz of 20 mm, and its velocity."""
+    time_s = np.arange(count) / RATE_HZ
+    rise = np.log(24.0) / time_s[-1]
+    phase = 2 * np.pi * 0.5 * np.expm1(rise * time_s) / rise
+    return 0.02 * np.sin(phase), 0.02 * np.cos(phase) * 2 * np.pi * 0.5 * np.exp(rise * time_s)
+
+
+def test_noise_of_a_sensor_is_found_and_taken_out() -> None:
+    place_m, _ = _sweep()
+    noise = 2e-5 * np.random.default_rng(1).standard_normal(len(place_m))
+    found, deviation = without_white_noise(place_m + noise)
+    assert deviation == pytest.approx(2e-5, rel=0.03)
+    assert np.std(found - place_m) < 0.5 * 2e-5  # 12 of 250 Hz keep 5 % of its power, and the sweep's flanks some
+
+
+def test_a_velocity_by_a_noisy_place_is_the_motion_s() -> None:
+    place_m, velocity_mps = _sweep()
+    noise = 2e-5 * np.random.default_rng(2).standard_normal(len(place_m))
+    excitation = Excitation(RATE_HZ, place_m + noise, moves_part=True)
+    stance = SimpleNamespace(behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.0, on_base=True)
+    time_s = np.arange(1000, 9000) / RATE_HZ
+    curves, _ = excitation.under_wheels(Way(np.zeros_like(time_s), time_s), stance)
+    # A curve through the samples is off by 12 mm/s.
+    assert np.std(curves[:, 1] - velocity_mps[1000:9000]) < 2e-3
+
+
+@pytest.mark.parametrize("samples", [
+    pytest.param(np.cumsum(np.random.default_rng(3).standard_normal(10_000)), id="a road, which has no plateau"),
+    pytest.param(np.random.default_rng(4).standard_normal(10_000), id="a force that is white"),
+    pytest.param(_sweep()[0][:200] + 1e-5 * np.random.default_rng(5).standard_normal(200), id="too short to say"),
+    pytest.param(np.zeros(10_000), id="at rest"),
+])
+def test_what_moves_is_left_as_it_is(samples: np.ndarray) -> None:
+    found, deviation = without_white_noise(samples)
+    assert deviation == 0.0
+    assert found is samples
