@@ -292,6 +292,11 @@ class Run:
         """Whether it is driven by time: a rig, with no road, no speed and no distance."""
         return self.track.timed
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether what the rig stands on rests, so that forces alone drive it."""
+        return isinstance(self.track, Excitation) and not np.ptp(self.track.elevation_m)
+
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
     """rms(measured - model) / rms(measured) over all samples that are not left out; predictions (n,) per run, whole, or

@@ -285,6 +285,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     runs = posterior.runs.runs
     two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
     by_road = all(run.facts.places_by == BY_ROAD for run in runs)
+    at_rest = posterior.vehicle.model == "single_mass" and all(run.at_rest for run in runs)
     there = {one.effect.name for one in present}
     sensors = [run.facts.main for run in runs]
     found = {}
@@ -294,6 +295,8 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
             why = f"no {' or '.join(sorted({str(one.kind) for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
             why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
+        if why is None and effect.against_ground and at_rest:
+            why = "its base rests: what acts against the ground acts against the base"
         if why is None and by_road and not effect.reshapes:
             why = LAID_BY_THE_ROAD
         if why is not None:

@@ -183,6 +183,8 @@ class Effect(ABC):
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
+    against_ground  whether it acts between what moves and the ground; where the base of a mass rests, it is what acts
+                 between that and the base
     not_of       kinds of sensors that cannot have it
     found_of     what sensors measure whose records have it in any model, to a per cent
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
@@ -202,6 +204,7 @@ class Effect(ABC):
     needs_road: bool = False
     needs_wheel: bool = False
     needs_body: bool = False
+    against_ground: bool = False
     not_of: tuple[str, ...] = ()
     found_of: tuple[str, ...] = ()
     also_by: tuple[str, ...] = ()
@@ -212,6 +215,10 @@ class Effect(ABC):
         """All its parameters as they are when nothing is said of them: at their defaults, or else at their starts."""
         return {one.name: one.start if one.default is None else one.default for one in self.parameters}
 
+    def on(self, vehicle: Vehicle) -> Effect:
+        """The effect as this vehicle can have it: another where that has fewer parts than the parameters speak of."""
+        return self
+
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         """Why it cannot be there in this vehicle on this road; None if it can."""
         return None
@@ -220,7 +227,7 @@ class Effect(ABC):
         """The same where runs may be driven by time (``timed``)."""
         if self.needs_wheel and vehicle.model in OWN_NAMES:
             return f"a {vehicle.model.replace('_', ' ')} has no wheel, no tire and no body that turns"
-        if self.needs_body and vehicle.model == "component":
+        if (self.needs_body or self.against_ground) and vehicle.model == "component":
             return "its bench moves it, whatever hangs on it"
         return ON_A_RIG if timed and self.needs_road else self.obstacle(vehicle, two_tracks)
 

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
-from logger.vehicle.structure import Structure, straight_step
+from logger.vehicle.structure import BASE_INPUTS, Structure, straight_step
 
 if TYPE_CHECKING:
     from logger.vehicle.stepping_loop import Asked
@@ -84,6 +84,7 @@ class Stepper:
     """A car with its laws in steps of one length: all that is the same on every road.
 
     state_and_seen    (R, 2 n) the motion that the loop carries on, out of the state
+    inputs_seen       (R, u) and out of what drives it: a base that moves under a mass
     others            as ``stepping_loop.steps`` has them
     """
 
@@ -91,6 +92,7 @@ class Stepper:
     laws: tuple[CornerLaws, ...]
     step_s: float
     state_and_seen: Array
+    inputs_seen: Array
     by_known: Array
     by_force: Array
     tabulated: tuple[Array, Array, Array]
@@ -110,18 +112,26 @@ class Stepper:
         rubbing = _rubbing(laws, 2 * n)
         held = (at_start[:, u:] + at_end[:, u:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
         seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
+        through = np.zeros((len(seen), u))
+        if structure.on_base:  # from which its place is counted
+            through[2 * w, BASE_INPUTS.index("height")] = through[3 * w, BASE_INPUTS.index("velocity")] = 1.0
         if any(one.body_friction_n for one in laws):
             seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
-        state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros(((-len(seen) - 2 * n) % LANES, 2 * n))])
+            through = np.vstack([through, through[w:2 * w] + through[3 * w:]])
+        rest = (-len(seen) - 2 * n) % LANES
+        state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros((rest, 2 * n))])
+        inputs_seen = np.pad(through, ((2 * n, rest), (0, 0)))
         known, forces = (
             np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
             for some in ([transition, at_start[:, u:], *inputs], [at_end[:, u:], held])
         )
+        known[-2 * u:] += np.tile(inputs_seen.T, (2, 1))  # at the end of a step: the mean over it, and the rise
         rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
                 for i, one in enumerate(rubbing)]
         return Stepper(
-            structure, tuple(laws), step_s, state_and_seen, known, forces, _tabulated(structure, laws, step_s),
-            np.array(rubs).reshape(-1, 3), np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
+            structure, tuple(laws), step_s, state_and_seen, inputs_seen, known, forces,
+            _tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
+            np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
 
     def march(self, elevation: Array, mean: Array, way: Way | None = None) -> Motion:
         """The motion on a road, as ``stepping.march``."""
@@ -133,7 +143,8 @@ class Stepper:
         stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
         return Motion(*steps(
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
-            _asked(structure, self.laws, way or stands), self.state_and_seen @ rest, 2 * n, around, elevation))
+            _asked(structure, self.laws, way or stands),
+            self.state_and_seen @ rest + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
 
 
 @dataclass(frozen=True)

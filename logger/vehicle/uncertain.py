@@ -179,8 +179,9 @@ def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Eff
     for all: with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Where
     ``scales`` are known of a bench, on which gravity drives nothing, forces, travels and times go by them. Places
     on the car go with its wheelbase. Factors of masses and places are powers of ten, those of times half ones, as
-    trials are that far apart: of every car they are 1.
+    trials are that far apart: of every car they are 1. It has the parameters that the vehicle has parts for.
     """
+    effect = effect.on(vehicle)
     if scales is None:
         mass, time, wheelbase = _factors(vehicle)
         scales = Scales(mass, time**2, time)

@@ -31,7 +31,8 @@ def noise(highest_hz: float, size: float, seed: int) -> CubicSpline:
 
 @dataclass(frozen=True)
 class Bench:
-    """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further force by its travel."""
+    """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further forces by its travel, and
+    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag."""
 
     mass: float = 0.3
     spring: float = 30.0
@@ -39,6 +40,8 @@ class Bench:
     cubic: float = 0.0
     wheel: float = 0.0
     tire: float = 0.0
+    guide_n: float = 0.0
+    guide_drag: float = 0.0
 
     @property
     def yaml(self) -> str:
@@ -60,7 +63,8 @@ class Bench:
             travel_m, rate_mps = body_m - wheel_m, body_mps - wheel_mps
             force = self.spring * travel_m + self.damper * rate_mps + self.cubic * travel_m**3
             wheel = (force - self.tire * (wheel_m - base(t)) + on_wheel(t)) / (self.wheel or 1.0)
-            return np.stack([(on_body(t) - force) / self.mass, wheel * (self.wheel > 0)])
+            guide = self.guide_n * np.tanh(body_mps / 0.001) + self.guide_drag * body_mps
+            return np.stack([(on_body(t) - force - guide) / self.mass, wheel * (self.wheel > 0)])
 
         y = solve_ivp(lambda t, y: np.concatenate([y[2:], accelerations(t, y)]), (0, TIME_S[-1]), [0.0] * 4,
                       t_eval=TIME_S, rtol=1e-8, atol=1e-11, max_step=0.004).y
@@ -133,6 +137,45 @@ def test_a_hardening_spring_under_a_force_is_what_the_integrator_says(tmp_path: 
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error < 0.01
     (tmp_path / "bench.yaml").write_text(bench.yaml)
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
+
+
+FRICTION = "{name: frame_friction, friction_force_n: 0.8, transition_velocity_m_per_s: 0.001}"
+DRAG = "{name: frame_damping, body_damping_n_s_per_m: 3}"
+
+
+@pytest.mark.parametrize("hidden", [{"guide_n": 0.8}, {"guide_drag": 3.0}, {"guide_n": 0.8, "guide_drag": 3.0}])
+def test_a_mass_that_goes_along_a_guide_on_the_ground_is_what_the_integrator_says(
+        hidden: dict[str, float], tmp_path: Path) -> None:
+    bench, base, push = Bench(1.2, 900.0, 4.0, **hidden), noise(12.0, 0.001, 5), noise(12.0, 0.5, 6)
+    seen = bench.moved(base, push, NOTHING)
+    run = written(tmp_path / "run", {"velocity_mps": seen["velocity_mps"]},
+                  {"elevation_m": base(TIME_S), "force_n": push(TIME_S)}, BODY)
+    effects = [FRICTION] * ("guide_n" in hidden) + [DRAG] * ("guide_drag" in hidden)
+    (tmp_path / "bench.yaml").write_text(f"{bench.yaml}effects: [{', '.join(effects)}]\n")
+    assert ridelog.compare(tmp_path / "bench.yaml", [run]).error < 0.01
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hidden", "name", "number", "moves"), [
+    ({"guide_n": 0.8}, "frame_friction", "friction_force_n", True),
+    ({"guide_drag": 12.0}, "frame_damping", "body_damping_n_s_per_m", True),
+    ({"guide_n": 0.8}, "dry_friction", "friction_force_n", False),  # of a base at rest nobody can tell its guide
+])
+def test_what_acts_on_a_single_mass_from_its_guide_is_named(
+        hidden: dict[str, float], name: str, number: str, moves: bool, tmp_path: Path) -> None:
+    bench = Bench(1.2, 900.0, 4.0, **hidden)
+    base, push = (noise(12.0, 0.001, 5), NOTHING) if moves else (NOTHING, noise(12.0, 1.0, 6))
+    velocity_mps = bench.moved(base, push, NOTHING)["velocity_mps"]
+    velocity_mps = velocity_mps + 0.001 * np.random.default_rng(7).standard_normal(len(velocity_mps))
+    driving = {"elevation_m": base(TIME_S)} if moves else {"force_n": push(TIME_S)}
+    run = written(tmp_path / "run", {"velocity_mps": velocity_mps}, driving, "source: me\n" if moves else BODY)
+    known = Bench(1.2, 880.0, 4.1).yaml.replace("1.2", "1.2 +- 1%")  # a base that moves shows ratios alone
+    (tmp_path / "bench.yaml").write_text(known)
+    found = ridelog.diagnose(tmp_path / "bench.yaml", [run])
+    assert found.verdict == (name,)
+    assert found.candidates[0].parameters[number] == pytest.approx(next(iter(hidden.values())), rel=0.04)
 
 
 def test_a_run_with_forces_is_written_as_it_was_read(tmp_path: Path) -> None:

@@ -172,21 +172,22 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
-    """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
-    if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body moves with the
-    road whatever is missing, but one run holds few such waves."""
+    """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be, or on a rig
+    the friction of a guide that nearly holds it, is a unit only if it is one, and all runs agree, and below the bounce
+    the median of the runs as well: there the body moves with the road whatever is missing, but one run holds few such
+    waves."""
     if not followed.pairs:
         return
-    clear = [(run.name, around.gain, below.gain) for (run, _), around, below in
+    clear = [(run, around.gain, below.gain) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
              if around.is_clear and run.facts.main.measures == "acceleration"]
-    for name, gain, _ in clear:
+    for run, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
-        of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
+        may_be_else = run.timed or _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
         gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
-        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for one in gains):
-            yield (f"{name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the model "
-                   f"says: {what} in {unit}")
+        if not may_be_else or all(abs(one / size - 1) < _NEAR for one in gains):
+            yield (f"{run.name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the "
+                   f"model says: {what} in {unit}")
 
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:

@@ -2,6 +2,8 @@
 
 The force against each is c u', with u' how fast it rises against the ground. On a road nothing holds a car against the
 ground: a search tries this effect on rigs alone, or where it is asked for by name.
+
+A single mass has one guide, which stands on the ground while its base moves.
 """
 
 from __future__ import annotations
@@ -9,8 +11,9 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought
-from logger.vehicle.structure import Structure
+from logger.vehicle.effect import BodyEffect, Effect, Parameter, Scale, Sought
+from logger.vehicle.structure import BASE_INPUTS, Structure
+from logger.vehicle.vehicle import Vehicle
 
 
 class FrameDamping(BodyEffect):
@@ -20,14 +23,17 @@ class FrameDamping(BodyEffect):
         Parameter("wheel_damping_n_s_per_m", 30.0, 0.0, 1e4, 0.0, Scale.LINEAR, (10.0, 60.0),
                   "of each wheel carrier against its guide"),
         Parameter("body_damping_n_s_per_m", 0.0, 0.0, 1e4, None, Scale.LINEAR, (0.0, 30.0),
-                  "of the body against its guide, at each suspension", default=0.0),
+                  "of the body against its guide, at each suspension, or of a single mass", default=0.0),
     )
-    needs_wheel = True
+    against_ground = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: drag of guides"
     signature = "wheel hop or bounce die away faster than the damper between wheel and body allows"
     shown_by = "shake the rig through bounce and wheel hop, strongly enough that nothing sticks"
     sought = Sought.ON_RIGS
     also_by = ("body_damping_n_s_per_m",)
+
+    def on(self, vehicle: Vehicle) -> Effect:
+        return _OF_MASS if vehicle.model == "single_mass" else self
 
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
         wheels, ends = structure.wheels, structure.travel + structure.wheels
@@ -35,4 +41,19 @@ class FrameDamping(BodyEffect):
         return replace(structure, damping=structure.damping + drag)
 
 
+class _OfMass(FrameDamping):
+    title = "on a rig: viscous drag of the mass against its guide"
+    parameters = (replace(FrameDamping.parameters[0], name="body_damping_n_s_per_m",
+                          meaning="of the mass against its guide"),)
+    signature = "the mass is damped against the ground, beyond what the damper to its base does"
+    shown_by = "shake the base slowly and quickly: a drag against the ground holds the mass back even below its bounce"
+    also_by = ()
+
+    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        road = structure.road.copy()  # its place is counted from the base, which moves against the guide
+        road[0, BASE_INPUTS.index("velocity")] -= p.body_damping_n_s_per_m
+        return replace(structure, damping=structure.damping + p.body_damping_n_s_per_m, road=road)
+
+
+_OF_MASS = _OfMass()
 EFFECT = FrameDamping()

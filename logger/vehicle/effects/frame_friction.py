@@ -6,6 +6,8 @@ it sticks, whatever keeps it stuck, up to F. It may grow with the speed as in ``
 A bench quarter car carries both plates, wheel and body, on rails of one kind, so both may rub: the wheel's guide by one
 force, the body's, at the body's end of each suspension, by a second, which is 0 unless it is said. On a road nothing
 holds a car against the ground: a search tries this effect on rigs alone, or where it is asked for by name.
+
+A single mass has one guide, which stands on the ground while its base moves.
 """
 
 from __future__ import annotations
@@ -13,8 +15,9 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import Effect, ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import CornerLaws
+from logger.vehicle.vehicle import Vehicle
 
 
 class FrameFriction(ForceEffect):
@@ -22,19 +25,22 @@ class FrameFriction(ForceEffect):
     title = "on a rig: Coulomb friction of wheel and body against their guides"
     parameters = (
         Parameter("friction_force_n", 20.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (5.0, 20.0, 80.0),
-                  "of each wheel carrier against its guide"),
+                  "of each wheel carrier, or of a single mass, against its guide"),
         Parameter("body_friction_force_n", 10.0, 0.0, 2000.0, None, Scale.LINEAR, (0.0, 10.0),
                   "of the body against its guide, at each suspension", default=0.0),
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "speed at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
                   step=0.0003),
     )
-    needs_wheel = True
+    against_ground = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
     signature = "small motions of wheel and body die away at once, even when the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
     sought = Sought.ON_RIGS
     also_by = ("body_friction_force_n",)
+
+    def on(self, vehicle: Vehicle) -> Effect:
+        return _OF_MASS if vehicle.model == "single_mass" else self
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0 and p.body_friction_force_n == 0:
@@ -44,4 +50,17 @@ class FrameFriction(ForceEffect):
                        guide_transition_mps=p.transition_velocity_m_per_s)
 
 
+class _OfMass(FrameFriction):
+    title = "on a rig: Coulomb friction of the mass against its guide"
+    parameters = tuple(one for one in FrameFriction.parameters if not one.name.startswith("body"))
+    signature = "small motions of the mass against the ground die away at once, even when its spring does not move"
+    shown_by = "shake the rig with small amplitudes, slowly, so that the mass hardly moves"
+    also_by = ()
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return super().laws(SimpleNamespace(friction_force_n=0.0, body_friction_force_n=p.friction_force_n,
+                                            transition_velocity_m_per_s=p.transition_velocity_m_per_s), laws)
+
+
+_OF_MASS = _OfMass()
 EFFECT = FrameFriction()
