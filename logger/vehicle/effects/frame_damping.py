@@ -19,7 +19,7 @@ from logger.vehicle.vehicle import Vehicle
 class FrameDamping(BodyEffect):
     name = "frame_damping"
     title = "on a rig: viscous drag of wheel and body against their guides"
-    parameters = (
+    parameters: tuple[Parameter, ...] = (
         Parameter("wheel_damping_n_s_per_m", 30.0, 0.0, 1e4, 0.0, Scale.LINEAR, (10.0, 60.0),
                   "of each wheel carrier against its guide"),
         Parameter("body_damping_n_s_per_m", 0.0, 0.0, 1e4, None, Scale.LINEAR, (0.0, 30.0),
@@ -30,7 +30,7 @@ class FrameDamping(BodyEffect):
     signature = "wheel hop or bounce die away faster than the damper between wheel and body allows"
     shown_by = "shake the rig through bounce and wheel hop, strongly enough that nothing sticks"
     sought = Sought.ON_RIGS
-    also_by = ("body_damping_n_s_per_m",)
+    also_by: tuple[str, ...] = ("body_damping_n_s_per_m",)
 
     def on(self, vehicle: Vehicle) -> Effect:
         return _OF_MASS if vehicle.model == "single_mass" else self

@@ -23,7 +23,7 @@ from logger.vehicle.vehicle import Vehicle
 class FrameFriction(ForceEffect):
     name = "frame_friction"
     title = "on a rig: Coulomb friction of wheel and body against their guides"
-    parameters = (
+    parameters: tuple[Parameter, ...] = (
         Parameter("friction_force_n", 20.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (5.0, 20.0, 80.0),
                   "of each wheel carrier, or of a single mass, against its guide"),
         Parameter("body_friction_force_n", 10.0, 0.0, 2000.0, None, Scale.LINEAR, (0.0, 10.0),
@@ -37,7 +37,7 @@ class FrameFriction(ForceEffect):
     signature = "small motions of wheel and body die away at once, even when the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
     sought = Sought.ON_RIGS
-    also_by = ("body_friction_force_n",)
+    also_by: tuple[str, ...] = ("body_friction_force_n",)
 
     def on(self, vehicle: Vehicle) -> Effect:
         return _OF_MASS if vehicle.model == "single_mass" else self
