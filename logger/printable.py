@@ -26,6 +26,7 @@ _COMPUTED = re.compile(r"(^|[,;])(?=\s*[-=+@＝＋－＠])")
 """Where a cell begins that some spreadsheet takes for more than text (OWASP, CSV Injection), also behind what separates
 cells in one of another country."""
 _LEFT_OUT = "..."
+_PLAIN_SIGNS = {"±": "+-", "²": "2", "³": "3", "·": "-", "°": "deg", "–": "-", "“": '"', "”": '"'}
 
 
 def printable(text: str, keep: str = "") -> str:
@@ -61,6 +62,17 @@ def words_in(content: Any) -> Any:
 def cell(text: str) -> str:
     """A word for a table that a spreadsheet may open: with an apostrophe before what it would compute."""
     return _COMPUTED.sub(r"\1'", text)
+
+
+def in_plain_signs(error: UnicodeError) -> tuple[str, int]:
+    """What is written where an encoding lacks a character (a handler of ``codecs.register_error``): ``+-`` for ``±``;
+    of what has no plain sign the number, ``\\u20ac``.
+    """
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end]
+    plain = "".join(_PLAIN_SIGNS.get(one) or one.encode("ascii", "backslashreplace").decode("ascii") for one in lacking)
+    return plain, error.end
 
 
 def counted(number: int, what: str) -> str:

@@ -493,7 +493,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
         return [f"This drive shows nothing of the noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
-    shown = (f"noise of {noise:.3g} +- {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
+    shown = (f"noise of {noise:.3g} ± {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
              f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot resolve it")
     return [f"Learnt from the drive: {shown}", f"Assumed: {rounded}"]
 

@@ -255,7 +255,7 @@ def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     off, std = float(found.x[at] - np.log(problem.knowledge.wheelbase_m)), float(found.std[at])
     if abs(off) > max(_SIGMA * std, _WRONG_WHEELBASE):
         metres = float(np.exp(found.x[at]))
-        raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: the drives show axles {metres:.2f} +- "
+        raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: the drives show axles {metres:.2f} ± "
                           f"{max(metres * std, 0.005):.2f} m apart: measure it again, between the hubs of one side "
                           "(with a trailer, or of two cars, drives show none)")
 
@@ -303,7 +303,7 @@ def _value(car: LearnedCar, name: str) -> str:
 
     at = _place(name)
     value = float(np.exp(car.x[at]))
-    return f"{value:.3g} +- {value * float(car.std[at]):.1g} {_WORDS[name.rpartition('.')[2]][1]}".strip()
+    return f"{value:.3g} ± {value * float(car.std[at]):.1g} {_WORDS[name.rpartition('.')[2]][1]}".strip()
 
 
 def _place(name: str) -> int:
@@ -455,7 +455,7 @@ def _head(used: Sequence[_Used], problem: UnknownCar, seconds: float) -> Iterato
 
 def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Iterator[str]:
     yield f"{'':26}{'front':>18}{'rear':>18}"
-    cells = {name: f"{value:.3f} +- {deviations[name]:.3f}" for name, value in values.items()}
+    cells = {name: f"{value:.3f} ± {deviations[name]:.3f}" for name, value in values.items()}
     for name in (one.removeprefix("front.") for one in cells if one.startswith("front.")):
         yield f"  {_with_unit(name):24}{cells[f'front.{name}']:>18}{cells[f'rear.{name}']:>18}"
     for name in (one for one in cells if "." not in one):
@@ -533,7 +533,7 @@ def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
         at = NUMBERS.index(name)
         change, std = float(car.x[at] - x[at]), float(np.hypot(car.std[at], spread[at]))
         if abs(change) > _CHANGED * std:
-            found.append(f"{_words_of(name)} {100 * np.expm1(change):+.0f} % (+- {100 * std:.0f})")
+            found.append(f"{_words_of(name)} {100 * np.expm1(change):+.0f} % (± {100 * std:.0f})")
     yield (f"Changed since {question.compare}: {', '.join(found)}." if found else
            f"Nothing has changed since {question.compare} by more than chance.")
 

@@ -438,7 +438,7 @@ def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
         shown += [f"{number:4}   {with_error(mode.frequency_hz, mode.frequency_std_hz):22} "
                   f"{with_error(100 * mode.damping_ratio, 100 * mode.damping_std):21} {_shape_words(mode)}"
                   for number, mode in enumerate(result.modes, start=1)]
-        shown += ["", f"+- is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
+        shown += ["", f"± is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
     else:
         shown.append("No mode: nothing in this record stands out of what noise would do.")
     if result.rejected:
@@ -456,7 +456,7 @@ def with_error(value: float, std: float) -> str:
     if not isfinite(std) or std <= 0:
         return f"{value:.4g}"
     decimals = min(9, max(0, 1 - floor(log10(std))))
-    return f"{value:.{decimals}f} +- {std:.{decimals}f}"
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
 
 
 def _shape_words(mode: FoundMode) -> str:

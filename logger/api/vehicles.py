@@ -421,7 +421,7 @@ def lines(found: Calibrated) -> list[str]:
     ]
     for speed in found.speeds:
         road, window = speed.iri_per_accel_rms, speed.window_iri_per_accel_rms
-        slope = f"{road.slope:.3f} +- {road.standard_error:.3f}"
+        slope = f"{road.slope:.3f} ± {road.standard_error:.3f}"
         shown.append(
             f"{speed.speed_mps:6.2f}{speed.speed_mps / MPH_MPS:5.0f} {slope:>16}{road.spread:9.1%}{road.r2:8.4f} "
             f"{window.slope:12.3f}{window.spread:8.1%}{window.r2:6.2f}{speed.accel_rms_per_root_gd.slope:9.5f}"

@@ -148,14 +148,14 @@ def lines(source: Path, found: Extracted) -> list[str]:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
             how = "matched to the road" if one.by_road else "by the receiver alone: the road was not recognised"
-            words += f" on the profile, places +- {one.place_std_m:.2g} m ({how})"
+            words += f" on the profile, places ± {one.place_std_m:.2g} m ({how})"
         if one.gaps:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         if one.delay_s or one.delay_std_s:
-            words += f"; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s"
+            words += f"; taken out: a receiver's delay of {one.delay_s:.2f} ± {one.delay_std_s:.2f} s"
         printed.append(words)
         if (scale := one.unusual_speed_scale) is not None:
-            printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} +- {100 * scale[1]:.2f} % of "
+            printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "
                            "those on the profile; a receiver's are not so far off: is the profile's distance_m right?")
     printed += [f"{source}: {words}" for words in left_out_lines(found.left_out)]
     if found.torn_tail:

@@ -12,7 +12,9 @@ import os
 import re
 import sys
 import textwrap
+from codecs import register_error
 from collections.abc import Callable, Iterable, Iterator
+from io import TextIOWrapper
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, NoReturn, TextIO, cast
@@ -20,7 +22,7 @@ from typing import Any, NoReturn, TextIO, cast
 from drivers.errors import DriverError
 from logger.errors import EXIT_BAD_INPUT, RidelogError, did_you_mean
 from logger.files import written_files
-from logger.printable import LONGEST_COMPLAINT, printable, word
+from logger.printable import LONGEST_COMPLAINT, in_plain_signs, printable, word
 
 GROUPS = {
     "Try it": {
@@ -205,6 +207,9 @@ def run() -> NoReturn:
     """The console script."""
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
+    register_error("plain signs", in_plain_signs)
+    for stream in (sys.stdout, sys.stderr):
+        cast(TextIOWrapper, stream).reconfigure(errors="plain signs")
     sys.stdout, sys.stderr = cast(TextIO, _Screen(sys.stdout, "\n\t")), cast(TextIO, _Screen(sys.stderr, "\n\t\r"))
     try:
         status = main(sys.argv[1:])

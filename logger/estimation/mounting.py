@@ -82,7 +82,7 @@ def tilt_complaint(now: Sitting, column: int, sign: float) -> str:
         felt = axis_word(now.gravity)
         return f"gravity is felt along {felt}, not along {word}: set vertical_axis: {felt}, or mount it as it was meant"
     if tilt_deg > TILT_DEG + std_deg:
-        return f"it is tilted by {tilt_deg:.0f} +- {std_deg:.0f} degrees: mount it level"
+        return f"it is tilted by {tilt_deg:.0f} ± {std_deg:.0f} degrees: mount it level"
     return ""
 
 

@@ -213,7 +213,7 @@ def estimate(known: Information) -> DelayEstimate:
     forward_std = max(sqrt(share * sum(angle**2 for angle in turned)), _curved_forward_std(a[index], known.gravity, w))
     if std_s > KNOWN_STD_S:
         return DelayEstimate(None, None, forward, forward_std, 1 / size, "too little braking and accelerating: the "
-                             f"delay is {delay_s:.2f} +- {std_s:.2f} s so far")
+                             f"delay is {delay_s:.2f} ± {std_s:.2f} s so far")
     return DelayEstimate(delay_s, std_s, forward, forward_std, 1 / size)
 
 

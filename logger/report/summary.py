@@ -206,11 +206,10 @@ def _apart_m(one: RoughWindow, other: RoughWindow) -> float:
 
 _BAR_CELLS = 30
 _EIGHTHS = " ▏▎▍▌▋▊▉█"
-_SIGNS = {"±": "+-", "²": "2", "·": "-"}
 
 
 def screen(summary: DriveSummary, encoding: str) -> str:
-    """The lines a person reads after a drive. Characters that ``encoding`` does not have are replaced."""
+    """The lines a person reads after a drive; bars of plain signs where ``encoding`` has no finer ones."""
     drawn = _can_encode(_EIGHTHS, encoding)
     lines = [_headline(summary)]
     values = [
@@ -222,11 +221,7 @@ def screen(summary: DriveSummary, encoding: str) -> str:
     lines += ["Road roughness (IRI, by the classes of ISO 8608)", *_bars(summary.iri_classes, class_words, drawn), ""]
     lines += ["Comfort inside (ISO 2631)", *_bars(summary.comfort, comfort_words, drawn), ""]
     lines += ["Roughest places", *_places(summary.roughest)]
-    text = "\n".join(lines) + "\n"
-    for sign, plain in _SIGNS.items():
-        if not _can_encode(sign, encoding):
-            text = text.replace(sign, plain)
-    return text
+    return "\n".join(lines) + "\n"
 
 
 def span_words(seconds: float) -> str:

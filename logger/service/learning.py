@@ -233,7 +233,7 @@ class NoiseLearning(Learning[KnownNoise]):
         if now is None:
             usual = self._config.kind.readings(self._config.settings).noise_mps2
             return f"{usual:.2g} m/s2 assumed{'; it is learnt while driving' if noise == AUTO else ''}"
-        return f"{now.belief.noise_rms_mps2:.2g} +- {now.belief.std_mps2:.1g} m/s2, {_drives_words(now.drives)}"
+        return f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, {_drives_words(now.drives)}"
 
 
 def delay_at_start(gps: GpsConfig, learnt: Belief | None) -> Belief:
@@ -289,7 +289,7 @@ class ReceiverLearning(Learning[Belief]):
         if now is not None:
             later = "" if known.drives else "; from the next start on"
             return f"{_belief_words(now)}{later}"
-        return f"{known.delay_s:.2f} +- {known.std_s:.2f} s, assumed: {self._alignment.estimate().reason}"
+        return f"{known.delay_s:.2f} ± {known.std_s:.2f} s, assumed: {self._alignment.estimate().reason}"
 
     def notices(self) -> tuple[str, ...]:
         """What is wrong with the mounting, and with a number in the settings that the drives contradict."""
@@ -302,7 +302,7 @@ class ReceiverLearning(Learning[Belief]):
 
 
 def _belief_words(belief: Belief) -> str:
-    return f"{belief.delay_s:.2f} +- {belief.std_s:.2f} s, {_drives_words(belief.drives)}"
+    return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, {_drives_words(belief.drives)}"
 
 
 def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict[str, Any]:
@@ -322,9 +322,9 @@ def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict
 
 def drive_words(fields: Mapping[str, Any], known: Belief) -> list[str]:
     """The same for a person, in lines; ``known``: what the rows were made with."""
-    used = f"the rows were made with {known.delay_s:.2f} s" + (f" +- {known.std_s:.2f} s" if known.std_s else "")
+    used = f"the rows were made with {known.delay_s:.2f} s" + (f" ± {known.std_s:.2f} s" if known.std_s else "")
     if fields["delay_s"] is None:
         lines = [f"Receiver's delay: not known, {fields['unknown_because']}; {used}"]
     else:
-        lines = [f"Receiver's delay: {fields['delay_s']:.2f} +- {fields['delay_std_s']:.2f} s by this drive; {used}"]
+        lines = [f"Receiver's delay: {fields['delay_s']:.2f} ± {fields['delay_std_s']:.2f} s by this drive; {used}"]
     return lines + [f"Accelerometer: {words}" for words in fields["mounting"]]

@@ -201,7 +201,7 @@ def test_the_noise_is_learnt_from_the_drive(
     assert result["comparison"]["r2"] > taken["comparison"]["r2"] - 0.01
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--step", str(step)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} +- "
+    assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} ± "
                         f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
     assert lines[2].startswith("Assumed: ")
 

@@ -54,7 +54,7 @@ def test_a_table_for_a_person(decay: Path, capsys: pytest.CaptureFixture[str]) -
     text = capsys.readouterr().out
     assert "decay.csv: 10 s at 100 Hz, 2 channels" in text
     assert "free decay" in text
-    assert "+- is one standard deviation" in text
+    assert "± is one standard deviation" in text
     assert "Found and not believed:" in text
 
 

@@ -88,7 +88,7 @@ def test_a_person_sees_errors_and_doubt(tmp_path: Path, capsys: pytest.CaptureFi
     assert lines[0] == "road.csv: 150.00 m, one sample every 50 mm"
     assert lines[2].endswith("it may be B or C")
     assert [line.split()[0] for line in lines[2:]] == ["class", "Gd(n0)", "waviness", "IRI"]
-    assert "+-" in lines[3]
+    assert "±" in lines[3]
     assert "Eq 4.39" in lines[5]
 
 

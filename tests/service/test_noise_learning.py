@@ -203,5 +203,5 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
 
     assert words(AccelerometerConfig(noise_mps2=0.15)) == "0.15 m/s2 by the settings"
     assert words(LEARNS) == "0.2 m/s2 assumed; it is learnt while driving"
-    assert words(LEARNS, known=KNOWN) == "0.15 +- 0.009 m/s2, learnt over 3 drives"
-    assert words(LEARNS, LEARNT) == "0.2 +- 0.008 m/s2, learnt over 1 drive"
+    assert words(LEARNS, known=KNOWN) == "0.15 ± 0.009 m/s2, learnt over 3 drives"
+    assert words(LEARNS, LEARNT) == "0.2 ± 0.008 m/s2, learnt over 1 drive"

@@ -159,12 +159,12 @@ def test_a_sidecar_says_what_its_rows_went_by() -> None:
 def test_status_says_it_in_words(tmp_path: Path) -> None:
     learnt = Belief(0.14, 0.02, 2)
     words = ReceiverLearning(tmp_path, NOTHING, learnt, learnt).words()
-    assert words == "0.14 +- 0.02 s, learnt over 2 drives"
+    assert words == "0.14 ± 0.02 s, learnt over 2 drives"
     assert ReceiverLearning(tmp_path, FOUND, learnt, learnt).words().endswith("learnt over 3 drives")
     first = ReceiverLearning(tmp_path, FOUND, UNKNOWN, None).words()
     assert first.endswith("learnt over 1 drive; from the next start on")
     assert ReceiverLearning(tmp_path, NOTHING, UNKNOWN, None).words() == \
-        "0.14 +- 0.07 s, assumed: too little has been driven"
+        "0.14 ± 0.07 s, assumed: too little has been driven"
     assert ReceiverLearning(tmp_path, NOTHING, delay_at_start(SET, None), None).words() == "0.25 s by the settings"
 
 

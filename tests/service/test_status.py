@@ -40,7 +40,7 @@ def test_what_was_written_is_what_is_read(tmp_path: Path) -> None:
     path = tmp_path / "status.json"
     assert read_status(path) is None
     write_status(path, replace(STATUS, last_window=None))
-    known = replace(STATUS, notices=("roll is not corrected", "another"), receiver_delay="0.14 +- 0.02 s",
+    known = replace(STATUS, notices=("roll is not corrected", "another"), receiver_delay="0.14 ± 0.02 s",
                     receiver_delay_s=0.14, receiver_delay_std_s=0.02)
     write_status(path, known)
     assert read_status(path) == known
@@ -87,8 +87,8 @@ def test_this_process_exists_and_an_ended_one_does_not() -> None:
 
 
 def test_the_screen_of_a_healthy_service_says_so() -> None:
-    late = replace(STATUS, receiver_delay="0.14 +- 0.02 s, learnt over 3 drives")
-    assert "  receiver delay  0.14 +- 0.02 s, learnt over 3 drives" in screen(late, None)
+    late = replace(STATUS, receiver_delay="0.14 ± 0.02 s, learnt over 3 drives")
+    assert "  receiver delay  0.14 ± 0.02 s, learnt over 3 drives" in screen(late, None)
     text = "\n".join(screen(STATUS, None))
     assert "is recording, up 1 h 2 min" in text
     assert "72 km/h, IRI 3.2 m/km, a little uncomfortable, time_unset" in text

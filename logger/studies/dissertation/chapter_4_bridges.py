@@ -131,8 +131,8 @@ def _f4_31(effort: Workload) -> Result:
     verdict = ("Exact at 38.1 mm and on a line, as printed, but not quite in proportion: the mass goes as the power "
                f"{powers[0]:.2f} of the height that is taken, {powers[1]:.2f} in the innovations form, for it also "
                "sets how fast the body swings back. That is what lets ours find both at once, "
-               f"{both.parameters[MASS]:.0f} +- {both.standard_errors[MASS]:.0f} kg and "
-               f"{1000 * both.parameters['step.height_m']:.1f} +- {1000 * both.standard_errors['step.height_m']:.1f} "
+               f"{both.parameters[MASS]:.0f} ± {both.standard_errors[MASS]:.0f} kg and "
+               f"{1000 * both.parameters['step.height_m']:.1f} ± {1000 * both.standard_errors['step.height_m']:.1f} "
                "mm, on a road without roughness. With the mass known, the car measures the step, as the source "
                "proposes. Its 48.3 m/s are 48.3 km/h.")
     picture = Picture(Curves("Mass, by the height that a step of 38.1 mm is taken for", "height taken [mm]",

@@ -385,7 +385,7 @@ def _f6_23(effort: Workload) -> Result:
                f"{sum(counts[mph] for mph in few)} segments, {counts[20]} at 20 mph and one alone at 15; {counts[25]} "
                f"are driven at 25 and {counts[30]} at 30 mph. That is few to be sure of a mean: over "
                f"{len(slow)} further roads of waviness {_WAVINESS:g} at the slow speeds the relation reads "
-               f"{slow_mean:+.1f} +- {slow_std:.1f} %, at the fast ones {fast.mean():+.1f} +- "
+               f"{slow_mean:+.1f} ± {slow_std:.1f} %, at the fast ones {fast.mean():+.1f} ± "
                f"{_standard_error(fast):.1f} %. The cause is that of Fig 6.11, and the 15 Hz low-pass takes a part of "
                "it away. The waviness was chosen: on roads of 2 there would be no such error (Fig 6.9). That a "
                f"majority of windows is comfortable agrees: {shares['not_uncomfortable']:.0f} % here, for roads of a "
