@@ -390,8 +390,8 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
     return tiles([
         ("Road, each direction", distance_words(float(segments.length_m.sum())), ""),
         ("Mean roughness (IRI)", f"{mean:.2f}", "m/km"),
-        ("Change of the mean road", f"{growth:+.1%}" if np.isfinite(growth) else "not known", "a year"),
-        ("Became worse", f"{int(sections.worse.sum()):,}" if sections.changes_known else "not known",
+        ("Change of the mean road", f"{growth:+.1%}" if np.isfinite(growth) else None, "a year"),
+        ("Became worse", f"{int(sections.worse.sum()):,}" if sections.changes_known else None,
          f"of {len(sections.key):,} sections"),
         ("To visit", f"{int((sections.visit != '').sum()):,}", "sections"),
     ])

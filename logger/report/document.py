@@ -195,10 +195,11 @@ def heading(title: str, under: str) -> Html:
     return html('<h1>{}</h1><p class="sub">{}</p>', title, under)
 
 
-def tiles(shown: Iterable[tuple[str, str, str]]) -> Html:
-    """Large figures: name, value, unit or a small word behind it."""
+def tiles(shown: Iterable[tuple[str, str | None, str]]) -> Html:
+    """Large figures: name, value or None where it is not known, unit or a small word behind it."""
     return html('<dl class="tiles">{}</dl>', concatenated(
-        html("<div><dt>{}</dt><dd>{} <small>{}</small></dd></div>", *tile) for tile in shown))
+        html("<div><dt>{}</dt><dd>{} <small>{}</small></dd></div>", name, value or "not known", behind if value else "")
+        for name, value, behind in shown))
 
 
 def section(title: str, body: str) -> Html:
