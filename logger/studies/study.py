@@ -139,10 +139,10 @@ T = TypeVar("T")
 Cell = str | float | None
 
 OFFER = "STUDIES"
-SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studies.field",
-           "roads": "logger.api.datasets"}
-"""Folders of studies: of the reference dissertation, of other papers that a reader knows, and of public records of
-roads."""
+SHELVES = {"dissertation": ("logger.studies.dissertation",), "field": ("logger.studies.field", "logger.api.rigs"),
+           "roads": ("logger.api.datasets",)}
+"""Folders of studies: of the reference dissertation, of other papers that a reader knows and of measured test rigs, and
+of public records of roads."""
 DISSERTATION = "N. Blum, dissertation, University of Maryland, 2015"
 
 
@@ -354,9 +354,9 @@ class Study:
 
 def studies(shelf: str | None = None) -> dict[str, Study]:
     """All of a shelf, or of all shelves, by the names that people write; the dissertation's in its order."""
-    packages = SHELVES.values() if shelf is None else [SHELVES[shelf]]
+    shelves = SHELVES.values() if shelf is None else [SHELVES[shelf]]
     found: list[Study] = []
-    for package in packages:
+    for package in (one for some in shelves for one in some):
         offered = (one for name in names(package, OFFER) for one in getattr(import_module(f"{package}.{name}"), OFFER))
         found += sorted(offered, key=lambda one: _order(one.name))
     return {one.called: one for one in found}

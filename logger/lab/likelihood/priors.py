@@ -177,9 +177,12 @@ class VehiclePrior:
         return np.asarray(self.deviations**-2.0)
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
-        """The vehicle with its numbers times the exponentials of these logarithms (p,)."""
-        return changed(vehicle, {name: read(vehicle, name) * float(np.exp(log))
-                                 for name, log in zip(self.names, logs, strict=True)})
+        """The vehicle with its numbers times the exponentials of these logarithms (p,); one of infinite numbers cannot
+        be simulated."""
+        with np.errstate(over="ignore"):
+            factors = np.exp(logs)
+        return changed(vehicle, {name: read(vehicle, name) * float(one)
+                                 for name, one in zip(self.names, factors, strict=True)})
 
     def logs(self, vehicle: Vehicle, other: Vehicle) -> Array:
         """Logarithms (p,) of another vehicle's numbers over those of this one."""

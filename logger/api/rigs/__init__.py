@@ -1,0 +1,1 @@
+"""Studies of measured test rigs that anybody can download."""

@@ -1,0 +1,112 @@
+"""EMPS: a measured linear axis with Coulomb friction, driven by a motor through a screw.
+
+A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, 2019 Workshop on Nonlinear System Identification
+Benchmarks. Their model: M q'' + Fv q' + Fc sign(q') + offset = force, by inverse dynamics and least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from logger.api.rig_sets import (
+    Improved,
+    columns_in,
+    improved,
+    pictures,
+    rig_from_folder,
+    scratch,
+    simulated,
+    write_rig_run,
+)
+from logger.chart_data import Array
+from logger.errors import BadInput
+from logger.files import write_text
+from logger.studies.study import Column, Item, Result, Statement, Study, Table, Value, Word, Workload
+
+RATE_HZ = 1000.0
+DRIVE_N_PER_V = 35.15065
+"""Force of the motor for each volt of its drive: the data's gtau."""
+VEHICLE = """name: emps
+model: component
+mass_kg: 100 +- 20%
+stiffness_n_per_m: 0
+damping_n_s_per_m: 250 +- 50%
+preload_n: unknown
+"""
+MASS_KG, VISCOUS, COULOMB_N = 95.1089, 203.5034, 20.3935
+_NEAR, _SHOWN_S, _SKIP_S, _FEWEST_S = 0.01, 2.0, 2.0, 8.0
+EFFECT, FRICTION = "dry_friction", "friction_force_n"
+
+
+def run(folder: Path, effort: Workload) -> Result:
+    """As ``rig_from_folder`` calls it."""
+    force_n, place_m = _record(folder)
+    count = effort.count(len(force_n), round(_FEWEST_S * RATE_HZ))
+    steps = effort.each(["diagnosed", "simulated"])
+    with scratch() as place:
+        axis = place / "axis.yaml"
+        write_text(axis, VEHICLE)
+        next(steps)
+        bench = write_rig_run(place / "axis", RATE_HZ, {"displacement_m": place_m[:count]},
+                              {"force_n": force_n[:count]})
+        found = improved(axis, [bench])
+        next(steps)
+        made = simulated(found, bench)
+    list(steps)
+    skip = round(_SKIP_S * RATE_HZ)
+    size = float(np.sqrt(np.mean(made.measured[skip:] ** 2)))
+    linear, better = (made.rms(one, skip) / size for one in (made.linear, made.better))
+    friction = {one.effect: one for one in found.added}.get(EFFECT)
+    numbers = found.best.numbers
+    ours = (numbers["mass_kg"], numbers["damping_n_s_per_m"],
+            friction.parameters[FRICTION] if friction else 0.0)
+    return Result((_beside(found, ours), found.effects), _verdict(found, linear, better),
+                  pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
+        Statement("dry_friction is named (1: yes)", "Coulomb friction", float(friction is not None), 1, 1),
+        Statement("error of the force over the force", "about 0.036 by inverse dynamics", better, 0.0, 0.04),
+        *(Value(name, printed, value, _NEAR * printed) for name, printed, value in zip(
+            ("mass [kg]", "viscous friction [N s/m]", "Coulomb friction [N]"), (MASS_KG, VISCOUS, COULOMB_N), ours,
+            strict=True))))
+
+
+def _record(folder: Path) -> tuple[Array, Array]:
+    """Force [N] and place [m], both (n,)."""
+    drive, place_m = columns_in(folder, "DATA_EMPS*", "the training record DATA_EMPS.mat", {
+        "csv": ("vir_V", "qm_m"), "mat": ("vir", "qm")})
+    if len(drive) < _FEWEST_S * RATE_HZ:
+        raise BadInput(f"{folder}: expected {_FEWEST_S * RATE_HZ:g} samples or more, found {len(drive)}")
+    return DRIVE_N_PER_V * drive, place_m
+
+
+def _verdict(found: Improved, linear: float, better: float) -> str:
+    names = " and ".join(found.diagnosis.verdict) or "nothing"
+    return (f"diagnose names {names}. The force that moves the axis is off by {better:.3f} of its r.m.s., {linear:.3f} "
+            "as a linear axis with mass and viscous friction alone.")
+
+
+def _beside(found: Improved, ours: Sequence[float]) -> Table:
+    """Published numbers and ours with standard errors."""
+    friction = next((one for one in found.added if one.effect == EFFECT), None)
+    errors = (found.standard_error("mass_kg"), found.standard_error("damping_n_s_per_m"),
+              friction.standard_errors.get(FRICTION) if friction else None)
+    rows = tuple((name, printed, value, error, 100 * (value / printed - 1)) for name, printed, value, error in zip(
+        ("mass [kg]", "viscous friction [N s/m]", "Coulomb friction [N]"), (MASS_KG, VISCOUS, COULOMB_N), ours, errors,
+        strict=True))
+    return Table("Numbers of the axis", (Column("number"), Column("published", ".5g"), Column("ours", ".5g"), Column(
+        "its standard error", ".2g"), Column("apart [%]", "+.1f")), rows)
+
+
+_DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
+STUDY = Study(
+    "emps", "A linear axis that rubs: what is missing of its force", "Numbers of the axis",
+    "The training record is written as a user would: a component whose bench moves it (the encoder's place) while its "
+    "force is measured, and a file with a mass known to 20 % and viscous friction to 50 %.",
+    rig_from_folder("the EMPS record", _DOWNLOAD, run),
+    (Item("EMPS numbers", Word.AGREES, "Mass, viscous and Coulomb friction come out as published, and friction is "
+          "found by name."),),
+    source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",
+    data=f"the EMPS record ({_DOWNLOAD})")
+STUDIES = (STUDY,)
