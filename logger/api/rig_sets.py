@@ -166,7 +166,8 @@ def pictures(title: str, found: Simulated, unit: str, seconds: float, skip: int)
                max(skip, len(whole) - round(seconds * found.rate_hz)))
     part = slice(most, most + round(seconds * found.rate_hz))
     closely = Curves(f"{title}: where it moves most", "time [s]", unit, (
-        Line("measured", whole[part], found.measured[part], dots=True), Line("as a linear rig", whole[part], found.linear[part]),
+        Line("measured", whole[part], found.measured[part], dots=True),
+        Line("as a linear rig", whole[part], found.linear[part]),
         Line("with what was named", whole[part], found.better[part]),
         Line("residual with it", whole[part], left["with what was named"][part])))
     over = Curves(f"{title}: residual", "time [s]", unit, tuple(
