@@ -133,7 +133,7 @@ table{border-collapse:collapse;width:100%;font-size:13.5px;font-variant-numeric:
 th{text-align:left;font-weight:600;color:var(--soft);font-size:12.5px;vertical-align:bottom}
 th,td{padding:5px 12px 5px 0;border-bottom:1px solid var(--faint)}
 td.n,th.n{text-align:right}
-td.n,td:first-child{white-space:nowrap}
+td.n{white-space:nowrap}
 td.bar{width:50%;min-width:60px}
 td.bar span{display:block;height:10px;border-radius:2px;min-width:2px}
 a{color:inherit;text-decoration-color:var(--soft);text-underline-offset:2px}

@@ -245,7 +245,7 @@ def next_words(one: LabNextDrive) -> str:
     shown = _most(one.gains)
     more = len(one.gains) - len(shown)
     gains = ", ".join(f"{name} {number(each)}" for name, each in shown.items())
-    count = f"names {one.more_named:.1f} effects more" if one.more_named >= 0.05 else "names no effect more"
+    count = f"names {one.more_named:.1f} more effects" if one.more_named >= 0.05 else "names no more effects"
     return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}"
             f"{f' and {more} more' if more else ''}.")
 
