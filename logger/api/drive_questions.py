@@ -12,10 +12,8 @@ from drivers.catalogue import names
 from logger.api.question import (
     ADDED,
     AUTO,
-    COMMON_IRI,
     COMMON_SPEED_MPS,
     DAILY_HOURS,
-    IRI,
     LENGTH,
     MODAL_METHODS,
     MODAL_METHODS_GONE,
@@ -184,8 +182,7 @@ class CalibrateQuestion(LongQuestion):
 
     vehicle: VehicleName
     _: KW_ONLY
-    window_m: Annotated[float, Option(
-        "length of a window [m], 2 to 200 (default: 7.62, 25 ft)", metavar="M")] = WINDOW_M
+    window_m: Annotated[float, InPython("length of a window [m], 2 to 200 (default: 7.62, 25 ft)")] = WINDOW_M
     passengers: Annotated[int, Option(
         "people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a quarter car "
         "a quarter", PASSENGERS, "N")] = 0
@@ -218,7 +215,7 @@ class ModesQuestion(Question):
 
       ridelog modes push.csv --method era
       ridelog modes drive.csv --vehicle mycar.yaml
-      ridelog modes --vehicle mycar.yaml --iri 6 --speed 20
+      ridelog modes --vehicle mycar.yaml --speed 20
 
     A drive needs the vehicle: the road, and the second axle that follows the first, put peaks into its spectrum that
     are no modes. Its springs, dampers and masses are fitted to the spectrum, and the modes are those of the numbers
@@ -226,7 +223,8 @@ class ModesQuestion(Question):
     --speed.
 
     With --vehicle and no FILE they are those of a vehicle's file with its effects; the standard deviations follow from
-    the standard errors that the file carries. Laws that are not linear are what they come to on a road at a speed.
+    the standard errors that the file carries. Laws that are not linear are what they come to at a speed, on a road of
+    IRI 2.5 m/km.
 
     In Python: the record has 100 samples or more; of a vehicle alone as ``vehicle_modes``. Raises BadInput for what
     does not fit together, a record that is too short for it, and as ``read_channels``. Source: P. van Overschee and
@@ -267,14 +265,9 @@ class ModesCommand(ModesQuestion):
 
     record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
         "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
-    _: KW_ONLY
-    iri_m_per_km: Annotated[float | None, Option(
-        f"of a vehicle alone: road for laws that are not linear (default: {COMMON_IRI:g})", IRI, "M_PER_KM")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.iri_m_per_km is not None and (self.vehicle is None or self.record is not None):
-            raise self.wrong("iri_m_per_km", ": expected `vehicle` with it, and no FILE")
         if self.record is None and self.vehicle is None:
             raise self.complaint("modes: expected a FILE (try 'ridelog modes --help')")
         if self.record is None:

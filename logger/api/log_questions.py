@@ -12,7 +12,6 @@ from logger.api.question import LIMIT, Argument, Localized, Option, Out, Questio
 from logger.units import FOOT_M, LENGTH_UNITS_M
 
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
-SYSTEMS = ("si", "us")
 FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
 
 
@@ -69,7 +68,7 @@ class LogsQuestion(Question):
 class SectionsQuestion(LogsQuestion):
     """Logs in sections of one length, as road agencies file them: mean IRI with its standard error, condition, comfort.
 
-      ridelog sections /media/RIDELOG --length 0.1mi --units us
+      ridelog sections /media/RIDELOG --length 0.1mi
       ridelog sections drive-logs/ --length 100m --out sections.geojson
       ridelog sections drive-logs/ --length 100m --route route.geojson
 
@@ -89,9 +88,8 @@ class SectionsQuestion(LogsQuestion):
     """
 
     length: Annotated[str | float, Option(
-        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m)", metavar="LENGTH",
-        read=str, check=length_of)] = 100.0
-    units: Annotated[str, Option("of what is printed", choices=SYSTEMS)] = SYSTEMS[0]
+        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m); with miles or feet all is "
+        "printed in US units", metavar="LENGTH", read=str, check=length_of)] = 100.0
     route: Annotated[Path | str | None, Option(
         "count by the measures of this line, along and against it", metavar="LINE.geojson", read=Path)] = None
     localized_m_per_km: Localized = None

@@ -90,8 +90,7 @@ modes = function("modes", ModesQuestion, modes_of)
 def asked_modes(question: ModesCommand) -> CommandResult:
     """What the terminal asked: modes of a record, or of a vehicle alone."""
     if question.vehicle is not None and question.record is None:
-        return vehicle_modes(model_of(question.vehicle), question.iri_m_per_km or COMMON_IRI,
-                             question.speed_mps or COMMON_SPEED_MPS)
+        return vehicle_modes(model_of(question.vehicle), speed_mps=question.speed_mps or COMMON_SPEED_MPS)
     return modes_of(question)
 
 

@@ -4,7 +4,7 @@
   ridelog study table-4-4
   ridelog study fig-4-27 --out fig-4-27.html
   ridelog study all --quick --out studies
-  ridelog study all --shelf field --out studies
+  ridelog study field --out studies
   ridelog study lira-cd DIR --vehicle mycar.yaml
 
 Each printed item ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation
@@ -36,11 +36,11 @@ _BAR = 30
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", metavar="NAME", help="the study, as --list names it, or all")
+    parser.add_argument("name", nargs="?", metavar="NAME",
+                        help="the study, as --list names it; dissertation, field (other papers) or roads (public "
+                             "records): all of that shelf; or all")
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="the data of a study that needs some")
     parser.add_argument("--list", action="store_true", help="list the studies there are")
-    parser.add_argument("--shelf", choices=SHELF_NAMES,
-                        help="only this shelf: the dissertation's, other papers', or public records of roads")
     parser.add_argument("--quick", action="store_true", help="a tenth of the draws and grid points")
     parser.add_argument("--out", type=Path, metavar="PLACE",
                         help="also write a page with tables and pictures; for all: a folder of pages with index.html")
@@ -52,9 +52,10 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog study``."""
     from logger.studies.study import studies, study_of
 
-    known = studies(args.shelf)
+    shelf = args.name if args.name in SHELF_NAMES else None
+    known = studies(shelf)
     if args.list:
-        if args.name is not None:
+        if args.name != shelf:
             raise BadInput(f"study --list: expected no NAME with it, found {args.name}")
         for option, value in (("--quick", args.quick), ("--out", args.out)):
             if value:
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DONE
     if args.name is None:
         raise BadInput("study: expected the NAME of a study, all, or --list")
-    if args.name == "all":
+    if args.name in ("all", shelf):
         return _all(list(known.values()), args)
     return _one(study_of(args.name, known), args)
 

@@ -219,7 +219,7 @@ def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [["diagnose", "--same-road", "--all"], ["diagnose", "--all"], ["lab"]],
+@pytest.mark.parametrize("more", [["diagnose", "--same-road"], ["diagnose"], ["lab"]],
                          ids=["same road", "diagnose", "lab"])
 def test_a_search_is_the_commands(
     more: list[str], names: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str],
@@ -241,7 +241,7 @@ def test_a_search_is_the_commands(
     assert main([*more, "--vehicle", "rav4-2009", *map(str, folders), *out, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose(
-        "rav4-2009", folders, same_road=is_one_road, list_all=True)
+        "rav4-2009", folders, same_road=is_one_road)
     assert json.loads(json.dumps(found.as_json())) == printed
     assert found.figures() and found._repr_html_().count("<svg") == 1
     if is_one_road:

@@ -18,8 +18,6 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linearise import known_vehicle
 
-from ..support.slow import slow
-
 CONTRACT = ["speed_mps", "iri_per_accel_rms", "spread"]
 TEXT = vehicle_file("rav4-2009").read_text(encoding="utf-8")
 
@@ -97,7 +95,7 @@ def test_the_second_time_it_is_found(
 
 
 @pytest.mark.usefixtures("few_roads")
-@pytest.mark.parametrize("more", [["--passengers", "1"], *slow(["--window", "30.48"])])
+@pytest.mark.parametrize("more", [["--passengers", "1"]])
 def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
     first = Call(capsys, car, "--json")
     other = Call(capsys, car, "--json", *more)
@@ -178,8 +176,6 @@ def test_a_load_as_json_and_csv(car: Path, tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--window", "0"], "--window: window of 0 m: expected 2 to 200 m"),
-    (["--window", "nan"], "--window"),
     (["--passengers", "-1"], "--passengers -1: expected 0 to 60"),
 ])
 def test_numbers_out_of_range(car: Path, arguments: list[str], message: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from logger.api.modal import vehicle_modes
 from logger.commands.main import main
 from logger.profiles.track import Track
 from logger.roads import iso8608
@@ -102,9 +103,9 @@ def test_a_gain_is_in_the_calibration_and_friction_in_the_modes(
               for car in ("rav4-2009", louder)]
     assert ratios[1] == pytest.approx(ratios[0] / 2, rel=1e-6)
     car = file_of(tmp_path, EFFECTS["bent"], "standard_errors: {sprung_mass_kg: 30}\n")
-    smooth, rough = (reported(capsys, "modes", "--vehicle", car, "--iri", iri)["modes"][0] for iri in (2, 9))
-    assert smooth["damping_ratio"] > 1.1 * rough["damping_ratio"]
-    assert 0 < rough["frequency_std_hz"] < 0.05
+    smooth, rough = (vehicle_modes(car, iri) for iri in (2.0, 9.0))
+    assert smooth.damping_ratio[0] > 1.1 * rough.damping_ratio[0]
+    assert 0 < rough.frequency_std_hz[0] < 0.05
     assert reported(capsys, "modes", "--vehicle", "rav4-2009")["modes"][0]["frequency_std_hz"] is None
 
 

@@ -103,8 +103,6 @@ def test_an_input_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     (["FILE", "--method", "decrement"], "expected one column"),
     (["--vehicle", "rav4-2009", "--method", "ssi"], "--method: expected a FILE with it, not --vehicle rav4-2009"),
     (["--vehicle", "rav4-2009", "--from", "0"], "--from: expected a FILE with it"),
-    ([".", "--vehicle", "rav4-2009", "--iri", "3"], "--iri: expected --vehicle with it, and no FILE"),
-    (["--vehicle", "rav4-2009", "--iri", "0"], "--iri 0: expected"),
 ])
 def test_wrong_use(decay: Path, arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):

@@ -27,7 +27,7 @@ def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(listed[0]) == {"name", "where", "title", "covers", "words", "items"}
     assert set(listed[0]["items"][0]) == {"item", "word", "because"}
     assert [one["item"] for one in listed[0]["items"]] == listed[0]["covers"]
-    assert main(["study", "--list", "--shelf", "field"]) == 0
+    assert main(["study", "field", "--list"]) == 0
     assert "table-4-4" not in capsys.readouterr().out
 
 

@@ -487,7 +487,7 @@ def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     """What a person reads."""
     steps = f"{fit.iterations} steps"
     yield (f"Converged in {steps}." if fit.converged else
-           f"NOT CONVERGED in {steps}: do not use these values; try other starts (--start, --tries) or fewer numbers.")
+           f"NOT CONVERGED in {steps}: do not use these values; try other starts (--start) or fewer numbers.")
     if len(fit.ends) > 1:
         yield _ends(fit)
     yield (f"Error, rms of measured minus model over rms of measured: {fit.error_before:.4f} before, "

@@ -14,6 +14,7 @@ from logger.api.question import (
     Argument,
     InPython,
     LongQuestion,
+    LowPass,
     Option,
     Out,
     Runs,
@@ -65,7 +66,7 @@ class IdentifyQuestion(LongQuestion):
 
       ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
       ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
-          --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --low-pass 20 --out fitted.yaml
+          --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --out fitted.yaml
 
     The numbers of an effect that the vehicle's file has are free by the effect's name:
 
@@ -122,9 +123,8 @@ class IdentifyQuestion(LongQuestion):
     noise: Annotated[str, Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=NOISE_MODELS)] = "auto"
-    low_pass_hz: Annotated[float | None, Option(
-        "leave out frequencies above it, for example 20; so does the pass_band_hz of a run.yaml", metavar="HZ")] = None
-    tries: Annotated[int, Option("so many further starts, spread around", TRIES, "N")] = 0
+    low_pass_hz: LowPass = None
+    tries: Annotated[int, InPython("so many further starts, spread around", TRIES)] = 0
     road: Annotated[str, Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={

@@ -547,7 +547,7 @@ def diagnosis_lines(found: LabDiagnosis, most: int | None) -> list[str]:
     if len(rows) > 1:
         shown += ["", "One effect at a time on the refitted model; p-values account for all of them:", *columns(rows)]
     if more > 0:
-        shown.append(f"and {more} more (ridelog diagnose --all)")
+        shown.append(f"and {more} more (--json lists all)")
     if found.no_better:
         shown.append(wrapped([f"No better than the refit alone: {', '.join(found.no_better)}."]))
     if hidden := untested(found):

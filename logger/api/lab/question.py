@@ -109,7 +109,7 @@ class DiagnoseQuestion(LabQuestion):
     _: KW_ONLY
     candidates: Candidates = None
     effect_files: EffectFiles = ()
-    list_all: Annotated[bool, Option("list all candidates, not the first 8", flag="--all")] = False
+    list_all: Annotated[bool, "the words list all candidates, not the first 8"] = False
     same_road: Annotated[bool, Option(
         "without a profile: two runs or more (folders, or drive.csv files) over one road at different speeds; "
         "nonlinear effects are tried in linearised form")] = False
