@@ -12,6 +12,7 @@ from logger.api.question import LIMIT, Argument, Localized, Option, Out, Questio
 from logger.units import FOOT_M, LENGTH_UNITS_M
 
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
+SYSTEMS = ("si", "us")
 FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
 
 
@@ -88,8 +89,10 @@ class SectionsQuestion(LogsQuestion):
     """
 
     length: Annotated[str | float, Option(
-        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m); with miles or feet all is "
-        "printed in US units", metavar="LENGTH", read=str, check=length_of)] = 100.0
+        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m)", metavar="LENGTH",
+        read=str, check=length_of)] = 100.0
+    units: Annotated[str | None, Option(
+        "of what is printed (default: us where the length is in miles or feet, else si)", choices=SYSTEMS)] = None
     route: Annotated[Path | str | None, Option(
         "count by the measures of this line, along and against it", metavar="LINE.geojson", read=Path)] = None
     localized_m_per_km: Localized = None

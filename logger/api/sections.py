@@ -93,7 +93,7 @@ class Sections(CommandResult):
 def sections_of(question: SectionsQuestion) -> Sections:
     """The answer to ``SectionsQuestion``, which says what is raised."""
     length_m, route, places = length_of(question.length), question.route, question.places
-    units = "us" if str(question.length).endswith(("mi", "ft")) else "si"
+    units = question.units or ("us" if str(question.length).endswith(("mi", "ft")) else "si")
     localized_m_per_km = question.localized_m_per_km
     files = read_found(find_logs_in(places))
     if not any(one.records for one in files):

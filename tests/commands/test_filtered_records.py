@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-import ridelog
 from logger.commands.main import main
 from logger.errors import BadInput
 
@@ -82,7 +81,7 @@ def test_what_is_asked_is_left_out_of_the_record_and_of_the_model(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     """Of white noise of 0.05 m/s2 two fifths lie below 20 Hz of 50."""
     run = drives["plain"][0]
-    whole, found = answer(capsys, "compare", run), ridelog.compare("rav4-2009", run, low_pass_hz=20.0).as_json()
+    whole, found = answer(capsys, "compare", run), answer(capsys, "compare", run, "--low-pass", "20")
     assert found["pass_band_hz"] == [0, 20] and found["low_passed_at_hz"] is None
     assert found["error"] == pytest.approx(float(str(whole["error"])) * np.sqrt(0.4), rel=0.05)
     (Path(run) / "run.yaml").write_text("pass_band_hz: [0, 20]\n", "utf-8")
@@ -90,8 +89,8 @@ def test_what_is_asked_is_left_out_of_the_record_and_of_the_model(
         assert answer(capsys, "compare", run)["error"] == pytest.approx(found["error"])
     finally:
         (Path(run) / "run.yaml").unlink()
-    with pytest.raises(BadInput, match="low_pass_hz 70: expected above 0 and below 50 Hz"):
-        ridelog.compare("rav4-2009", run, low_pass_hz=70.0)
+    with pytest.raises(BadInput, match="low-pass 70: expected above 0 and below 50 Hz"):
+        main(["compare", "--vehicle", "rav4-2009", run, "--low-pass", "70"])
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def test_localized_roughness_slides_along_each_drive(logs: Path, capsys: pytest.
     assert max(one["worst_m_per_km"] for one in found) == pytest.approx(worst)
     assert main(["sections", str(logs), "--localized", "45"]) == 0
     assert "nowhere is the IRI over 25 ft above 45 m/km" in capsys.readouterr().out
-    assert main(["sections", str(logs), "--localized", "2", "--length", "0.1mi"]) == 0
+    assert main(["sections", str(logs), "--localized", "2", "--units", "us"]) == 0
     words = capsys.readouterr().out
     assert "above 127 in/mi" in words
     head, first = words[words.index("Localized"):].splitlines()[1:3]
