@@ -172,14 +172,13 @@ class RecordedBus:
         events: Iterable[Event],
         now_us: Callable[[], int],
         cues: Iterable[Cue] = (),
-        address: int = 0x0A,
         first_us: int | None = None,
     ) -> Self:
         """A bus on which ``events`` (of this sensor only) happen from now on, the first at once unless ``first_us``
         names another start on the recording's scale. A sample of the wrong length is a DumpError when it is its
         turn."""
         recording = _Recording(events, now_us, first_us)
-        bus = cls(chip, cues, recording.now_us, address)
+        bus = cls(chip, cues, recording.now_us)
         bus._recording = recording
         bus.chip.sample = bus._take_latest
         return bus
@@ -198,7 +197,7 @@ class RecordedBus:
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         self._transfer(i2c_addr, register)
-        return list(self.chip.read(register, length))
+        return list(self.chip.read(register, length=length))
 
     def close(self) -> None:
         """Nothing to let go of."""

@@ -234,7 +234,7 @@ WRITERS_OF_FILES = {
     "logger.installation": "a link, put into place",
     "logger.service.status": "a file in memory, every second, without waiting for a disk",
     "logger.store.export.directory_handle": "sticks, which a hand may pull",
-    "logger.store.export.export": "the same", "logger.store.export.stick_status": "an LED of the board",
+    "logger.store.export.export": "the same", "logger.store.export.sticks": "an LED of the board",
     "logger.store.log.atomic_file": "the car's small files, through drivers.disk",
     "logger.store.log.disk_quota": "the same",
     "logger.store.log.recovery": "the same",

@@ -24,8 +24,7 @@ from logger.report.placed import column, damaged, iri_errors, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import LEAST_COVERED, passes_of, scatter_of, suggestion, way_means
-from logger.roads.road_matching import match
-from logger.roads.road_network import Array, RoadNetwork, on_sphere
+from logger.roads.road_matching import Array, RoadNetwork, match, on_sphere
 from logger.roads.sections import WindowErrors
 from logger.store.formats.road_lines import MapWay
 from logger.store.log.log_reader import split_drives

@@ -8,7 +8,7 @@ from re import fullmatch
 from typing import Annotated
 
 from drivers.catalogue import names
-from logger.api.question import LIMIT, Argument, Localized, Option, Out, Question, Range, Verb, limit_of
+from logger.api.question import LIMIT, Argument, Localized, Option, Out, Question, Range, Verb, Verbs, limit_of
 from logger.units import FOOT_M, LENGTH_UNITS_M
 
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
@@ -275,3 +275,12 @@ INGEST = Verb(IngestQuestion, "logger.api.fleet:ingested")
 SUMMARISE = Verb(SummariseQuestion, "logger.api.fleet:summarised", (Out(
     f"write all rows as {' '.join(FORMATS)}", metavar="FILE", others=FORMATS, many=False, is_drawn=False),))
 REPORT = Verb(ReportQuestion, "logger.api.fleet:reported")
+FLEET = Verbs('''Many cars over years: logs into a dataset, the figures of its roads and cars, and a map of them.
+
+  ridelog fleet ingest /media/RIDELOG --to county --car "van 7"
+  ridelog fleet summarise county --by section --since 2026-01-01 --out sections.parquet
+  ridelog fleet report county --out map/
+
+docs/fleet.md describes all of it, from the stick in a depot to the map.
+''', {"ingest": (INGEST, "add logs to a dataset"), "summarise": (SUMMARISE, "figures of roads and cars"),
+      "report": (REPORT, "a map in a folder")})

@@ -47,8 +47,7 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import lay
-from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
+from logger.roads.road_matching import RoadNetwork, directions, east_and_north, lay, on_sphere
 from logger.roads.sections import FAIR_TO_IN_PER_MI, WindowErrors
 from logger.store.log.log_reader import LoggedFile, find_logs_in, iso_utc, read_found, split_drives, utc
 from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S

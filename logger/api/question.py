@@ -87,7 +87,7 @@ class IriLimit(Range):
 
     def fault(self, value: Any) -> str:
         """As of ``Range``."""
-        from logger.roads.plausible import HIGHEST_LIMIT_M_PER_KM, limit_hint
+        from logger.roads.iri import HIGHEST_LIMIT_M_PER_KM, limit_hint
 
         found = Range(self.low, HIGHEST_LIMIT_M_PER_KM, self.unit).fault(value)
         hint = limit_hint(value) if found else ""
@@ -212,10 +212,10 @@ def _alternatives(kind: Any, unit: str, several: int) -> Iterator[str]:
     elif origin is Callable:
         yield "a function"
     elif origin is not None and issubclass(origin, Mapping):
-        yield f"{'dicts' if several else 'a dict'} of {_named(inside[1], unit, 1)}"
+        yield f"{'dicts' if several else 'a dict'} of {_named(inside[1], unit, several=1)}"
     elif origin is not None and issubclass(origin, Collection):
         how = "pairs" if several else "a pair" if origin is tuple and inside[-1] is not ... else "a list"
-        yield how if inside[0] is Any else f"{how} of {_named(inside[0], unit, 1)}"
+        yield how if inside[0] is Any else f"{how} of {_named(inside[0], unit, several=1)}"
     else:
         words = _WORDS.get(kind, (f"a {getattr(kind, '__name__', kind)}",) * 2)[several]
         yield words + f" in {unit}" * bool(unit and kind in (int, float))
@@ -531,6 +531,14 @@ class Verb:
     answers: str
     outs: Sequence[Out] = ()
     refusal: str = ""
+
+
+@dataclass(frozen=True)
+class Verbs:
+    """A verb with verbs below it, by name, each with what it does; ``words``: its help."""
+
+    words: str
+    below: Mapping[str, tuple[Verb, str]]
 
 
 Vehicle = Union["Model", Path, str]

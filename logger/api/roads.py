@@ -18,9 +18,18 @@ from logger.report.quantities import area_lines, area_values
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608
 from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, track_class
-from logger.roads.iri import Area, ProfileIri, areas, continuous_iri, profile_iri
+from logger.roads.iri import (
+    Area,
+    ProfileIri,
+    areas,
+    continuous_iri,
+    doubts_of,
+    profile_iri,
+    spacing_hint,
+    unit_complaint,
+    unit_doubt,
+)
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, iri_from_gd_n0
-from logger.roads.plausible import doubts_of, spacing_hint, unit_complaint, unit_doubt
 from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
 from logger.units import INCH_PER_MILE_M_PER_KM, WINDOW_M

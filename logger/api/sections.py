@@ -39,8 +39,7 @@ from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_value
 from logger.report.summary import counts, expected_square
 from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
-from logger.roads.road_matching import ALONG, measures, on_route, route_network
-from logger.roads.road_network import RoadNetwork
+from logger.roads.road_matching import ALONG, RoadNetwork, measures, on_route, route_network
 from logger.roads.sections import FEDERAL_WORDS, Windows, even_edges, federal_condition
 from logger.roads.sections import Sections as RoadSections
 from logger.roads.sections import sections as in_sections

@@ -24,8 +24,17 @@ from logger.files import read_bounded
 from logger.printable import counted, printable
 from logger.service.config import Config, find_config, load_config, load_pairing
 from logger.store.export.export import ExportResult, Progress, export
-from logger.store.export.pairing import OFF, PAIRED_NAME, Pairing
-from logger.store.export.stick_status import StickNote, StickState, read_note, show_on_led, stick_of, write_note
+from logger.store.export.sticks import (
+    OFF,
+    PAIRED_NAME,
+    Pairing,
+    StickNote,
+    StickState,
+    read_note,
+    show_on_led,
+    stick_of,
+    write_note,
+)
 from logger.store.formats.yaml_nodes import MAX_BYTES
 from logger.store.log.atomic_file import is_taken
 

@@ -82,6 +82,7 @@ ASKED = {
     "learn": "lab.question:LEARN",
     "plan": "lab.question:PLAN",
     "convert": "log_questions:CONVERT",
+    "fleet": "log_questions:FLEET",
     "sections": "log_questions:SECTIONS",
     "passes": "log_questions:PASSES",
     "iri": "drive_questions:EXACT_IRI",

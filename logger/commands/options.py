@@ -29,6 +29,7 @@ from logger.api.question import (
     Range,
     Switches,
     Verb,
+    Verbs,
     WrongOption,
     askings,
     help_of,
@@ -47,19 +48,23 @@ if TYPE_CHECKING:
 
 
 class QuestionVerb:
-    """A verb that is declared by its question, as the modules of this folder declare one."""
+    """A verb that is declared by its question, or verbs below it by theirs, as the modules of this folder declare
+    one."""
 
     def __init__(self, place: str) -> None:
-        self._verb: Verb = _named(place)
-        self.__doc__ = help_of(self._verb.question)
+        self._verb: Verb | Verbs = _named(place)
+        self.__doc__ = self._verb.words if isinstance(self._verb, Verbs) else help_of(self._verb.question)
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare its arguments."""
-        declare(parser, self._verb)
+        if isinstance(self._verb, Verbs):
+            add_verbs(parser, "below", self._verb.below)
+        else:
+            declare(parser, self._verb)
 
     def run(self, args: argparse.Namespace) -> int:
         """Carry it out."""
-        return run(self._verb, args)
+        return run(self._verb.below[args.below][0] if isinstance(self._verb, Verbs) else self._verb, args)
 
 
 def declare(parser: argparse.ArgumentParser, verb: Verb) -> None:

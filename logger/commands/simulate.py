@@ -203,7 +203,7 @@ def _road(question: SimulateCommand) -> Track:
     import numpy as np
 
     from logger.profiles.track import Track
-    from logger.roads.plausible import doubt_of
+    from logger.roads.iri import doubt_of
     from logger.simulation.virtual_drive import Obstacle, with_obstacles
     from logger.store.formats.drive_file import track_of
     from logger.store.formats.profile_file import read_profile

@@ -19,7 +19,7 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
-from logger.store.export.stick_status import FOLDER, StickNote, read_notes
+from logger.store.export.sticks import FOLDER, StickNote, read_notes
 from logger.store.log.atomic_file import READ_ONLY
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"

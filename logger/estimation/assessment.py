@@ -33,7 +33,7 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
-from logger.roads.plausible import likely_unit
+from logger.roads.iri import likely_unit
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import known_car

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.road_network import on_sphere
+from logger.roads.road_matching import on_sphere
 from logger.units import MILE_M
 
 Array = npt.NDArray[np.float64]

@@ -162,7 +162,7 @@ def _tiles(summary: DriveSummary) -> Html:
     return tiles([
         ("Distance", distance_words(summary.distance_m), ""),
         ("Time", span_words(summary.duration_s), ""),
-        ("Mean speed", _number(summary.mean_speed_mps, 0, 3.6), "km/h"),
+        ("Mean speed", _number(summary.mean_speed_mps, 0, factor=3.6), "km/h"),
         ("Mean roughness (IRI)", _number(summary.mean_iri_m_per_km, 1), "m/km"),
         (Html("Comfort inside (a<sub>w</sub>)"), _number(summary.a_w_mps2, 2), "m/s²"),
     ])
@@ -187,7 +187,7 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
 def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
     rows = [(number_button(index, number), str(place.drive),
              _instant(place.utc_us), _geo(place), distance_words(place.along_m), iri_words(place),
-             _number(place.speed_mps, 0, 3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
+             _number(place.speed_mps, 0, factor=3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
              " ".join(place.flags))
             for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:

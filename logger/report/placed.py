@@ -17,8 +17,7 @@ from logger.left_out import LeftOut, counting
 from logger.records import WindowRecord
 from logger.report.summary import counts
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
-from logger.roads.road_matching import lay
-from logger.roads.road_network import Ints, RoadNetwork, Trace
+from logger.roads.road_matching import Ints, RoadNetwork, Trace, lay
 from logger.roads.sections import WindowErrors
 from logger.store.log.log_reader import LoggedFile
 from logger.units import US_PER_S, WINDOW_M

@@ -22,7 +22,7 @@ from drivers.nmea import ROLLOVERS_MAX
 from drivers.readings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
-from logger.store.export.pairing import MODES, NOT_PAIRED, Pairing
+from logger.store.export.sticks import MODES, NOT_PAIRED, Pairing
 from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.units import WINDOW_M
 from logger.vehicle.vehicle import GENERIC

@@ -16,7 +16,7 @@ from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, Event
 from logger.service.status import StorageStatus
 from logger.store.export.export import exported_names
-from logger.store.export.pairing import NOT_PAIRED, Pairing
+from logger.store.export.sticks import NOT_PAIRED, Pairing
 from logger.store.log.atomic_file import names_set_aside
 from logger.store.log.disk_quota import DiskQuota, DumpRecording, QuotaLimits, repair_recordings
 from logger.store.log.log_writer import BufferedLog, SegmentLog, next_session, repair

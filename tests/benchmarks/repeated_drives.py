@@ -13,8 +13,7 @@ import time
 import numpy as np
 
 from logger.roads.repeated_drives import Passes, means, passes_of, scatter_of
-from logger.roads.road_matching import DOUBTFUL, lay
-from logger.roads.road_network import RoadNetwork
+from logger.roads.road_matching import DOUBTFUL, RoadNetwork, lay
 from logger.roads.sections import WindowErrors
 
 from ..support.drives.parallel_town import WINDOW_M, judged, road_values, town_drives

@@ -15,7 +15,7 @@ from logger.errors import BadInput, CheckFailed
 from logger.service.config import Config, LogConfig
 from logger.store.export import export as export_of_store
 from logger.store.export.export import exported_names
-from logger.store.export.stick_status import read_note
+from logger.store.export.sticks import read_note
 
 pytestmark = pytest.mark.usefixtures("folders_as_sticks")
 

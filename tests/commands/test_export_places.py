@@ -12,7 +12,7 @@ import pytest
 
 from logger.commands.main import main
 from logger.store.export.export import exported_names
-from logger.store.export.pairing import HOMES_NAME, IDENTITY_NAME
+from logger.store.export.sticks import HOMES_NAME, IDENTITY_NAME
 from logger.store.log.log_reader import find_logs
 from logger.store.log.log_writer import SegmentLog
 

@@ -10,9 +10,9 @@ import pytest
 from logger.bounds import time_hint
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.roads.iri import likely_unit, limit_hint, unit_complaint, unit_doubt
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, generate
 from logger.roads.obstacles import OBSTACLES
-from logger.roads.plausible import likely_unit, limit_hint, unit_complaint, unit_doubt
 from logger.store.formats.profile_file import read_profile
 from logger.units import FOOT_M
 

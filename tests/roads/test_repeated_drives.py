@@ -19,8 +19,17 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import AGAINST, ALONG, NO_WAY, lay, measures, on_route, route_network
-from logger.roads.road_network import RoadNetwork, Trace
+from logger.roads.road_matching import (
+    AGAINST,
+    ALONG,
+    NO_WAY,
+    RoadNetwork,
+    Trace,
+    lay,
+    measures,
+    on_route,
+    route_network,
+)
 from logger.roads.sections import WindowErrors
 
 from ..support.drives.parallel_town import WINDOW_M, judged, town_drives

@@ -13,7 +13,7 @@ from logger.errors import BadInput
 from logger.service.config import Config, find_config, load_config
 from logger.service.wiring import gps_decoder
 from logger.shipped import shipped, vehicle_file, vehicle_names
-from logger.store.export.pairing import Pairing
+from logger.store.export.sticks import Pairing
 
 SHIPPED = shipped("config") / "ridelog.yaml"
 

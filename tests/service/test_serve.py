@@ -15,7 +15,7 @@ from logger.service.config import Config, LogConfig
 from logger.service.main_loop import HANG_US, Listener, monotonic_us
 from logger.service.storage import Storage
 from logger.service.systemd_notify import Stop
-from logger.store.export.pairing import Pairing
+from logger.store.export.sticks import Pairing
 from logger.store.log.disk_quota import QuotaLimits
 
 

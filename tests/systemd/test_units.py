@@ -21,7 +21,7 @@ from logger.service.main_loop import HANG_US
 from logger.service.serve import LONGEST_BEAT_S
 from logger.service.systemd_notify import PRIORITY
 from logger.shipped import shipped
-from logger.store.export import stick_status
+from logger.store.export import sticks
 
 SERVICE, EXPORT = "ridelog.service", "ridelog-export@.service"
 MOST_EXPOSURE = 1.5
@@ -152,7 +152,7 @@ def test_folders_are_those_of_the_settings() -> None:
     assert Path("/var/lib", *service["StateDirectory"]) == Path("/var/lib", *export["StateDirectory"])
     assert Path("/var/lib", *service["StateDirectory"]) == config.log.directory
     assert Path("/run", *service["RuntimeDirectory"]) == config.status_file.parent
-    assert Path("/run", *export["RuntimeDirectory"]) == stick_status.FOLDER
+    assert Path("/run", *export["RuntimeDirectory"]) == sticks.FOLDER
     assert str(MACHINE_CONFIG) in service["ExecStart"][0]
 
 
@@ -304,7 +304,7 @@ def test_each_time_that_a_stick_is_plugged_in_is_an_instance_of_its_own() -> Non
 
 def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_time() -> None:
     lines = [inner(line) for line in command_lines(EXPORT)]
-    note = f"{stick_status.FOLDER}/%i.json"
+    note = f"{sticks.FOLDER}/%i.json"
     assert lines[0] == ["/usr/bin/touch", note]
     stopping = [inner(shlex.split(line.lstrip("-+"))) for line in settings(EXPORT)["ExecStopPost"]]
     assert stopping[:2] == [["/usr/bin/rm", "--force", note],
@@ -319,4 +319,4 @@ def test_one_stick_at_a_time_gets_the_logs() -> None:
     assert all(line[0] == ONE_AT_A_TIME for line in ours)
     places = {next(Path(word) for word in line if word.startswith("/run/")): "--to" in line for line in ours}
     assert sorted(places.values()) == [False, True]
-    assert {place.parent for place in places} == {stick_status.FOLDER}
+    assert {place.parent for place in places} == {sticks.FOLDER}

@@ -298,7 +298,7 @@ def check_distances(drive: Drive, file: Path) -> None:
     import numpy as np
 
     from logger.bounds import SPEED
-    from logger.roads.plausible import likely_unit
+    from logger.roads.iri import likely_unit
 
     distance_m = drive.distance_m
     for wrong, words in (

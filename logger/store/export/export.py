@@ -42,7 +42,7 @@ from logger.errors import BadInput
 from logger.store.export import manifest
 from logger.store.export.directory_handle import DirectoryHandle, OpenFile
 from logger.store.export.manifest import Manifest, list_blocks, list_lines, manifest_blocks, read_manifest
-from logger.store.export.pairing import (
+from logger.store.export.sticks import (
     NOT_PAIRED,
     Pairing,
     logger_identity,

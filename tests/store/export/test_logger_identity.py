@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.export import pairing as module
+from logger.store.export import sticks as module
 from logger.store.export.directory_handle import DirectoryHandle
-from logger.store.export.pairing import HOMES_NAME, IDENTITY_NAME, logger_identity
+from logger.store.export.sticks import HOMES_NAME, IDENTITY_NAME, logger_identity
 
 from ...support.faults.small_files import at_most_s
 

@@ -9,7 +9,7 @@ import pytest
 from logger.errors import CheckFailed
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.export import ExportResult, export, exported_names, read_marks
-from logger.store.export.pairing import FIRST_STICK, KEY_FILE, KEY_NAME, OFF, PAIRED_NAME, STICK_NAME, Pairing
+from logger.store.export.sticks import FIRST_STICK, KEY_FILE, KEY_NAME, OFF, PAIRED_NAME, STICK_NAME, Pairing
 
 from ...support.faults.sticks import NAMES, a_card, a_stick, contents, own, quiet
 
@@ -103,7 +103,7 @@ def test_a_card_that_was_put_into_another_machine_knows_its_stick(
     plug_in(logs, sticks[0], FIRST)
     before = own(logs, sticks[0])
     (tmp_path / "serial").write_text("another board")
-    monkeypatch.setattr("logger.store.export.pairing.BOARD_SERIAL", tmp_path / "serial")
+    monkeypatch.setattr("logger.store.export.sticks.BOARD_SERIAL", tmp_path / "serial")
     assert plug_in(logs, sticks[0], FIRST).copied == NAMES
     assert own(logs, sticks[0]) != before
     assert exported_names(logs, FIRST) == set(NAMES)

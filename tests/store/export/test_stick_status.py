@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.export import stick_status
-from logger.store.export.stick_status import StickNote, StickState, read_note, read_notes, show_on_led, write_note
+from logger.store.export import sticks
+from logger.store.export.sticks import StickNote, StickState, read_note, read_notes, show_on_led, write_note
 
 COPYING = StickNote("sda1", "copying", True, "copying, 1 of 4 files")
 DONE = StickNote("sda1", "ready", True, "4 files copied; it may be pulled")
@@ -54,7 +54,7 @@ def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
 def test_a_stick_whose_note_is_still_empty_waits(led: Path, notes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The unit makes it before anything else, so that a stick is never without a note, nor with that of another."""
     (notes / "sda1.27.json").touch()
-    monkeypatch.setattr(stick_status, "is_plugged_in", lambda path: True)
+    monkeypatch.setattr(sticks, "is_plugged_in", lambda path: True)
     waiting, = read_notes(notes)
     assert (waiting.stick, waiting.state, waiting.ok) == ("sda1", "waiting", True)
     assert read_note(notes / "sda1.27.json") == waiting
@@ -72,7 +72,7 @@ def test_the_note_of_a_stick_that_was_pulled_counts_no_more(
     block.mkdir()
     for name, place in (("sda", disk), ("sda1", disk / "sda1")):
         (block / name).symlink_to(place)
-    monkeypatch.setattr(stick_status, "BLOCK_DEVICES", block)
+    monkeypatch.setattr(sticks, "BLOCK_DEVICES", block)
     for name in ("sda1.27", "sda.28", "sda1.28", "sdb1.27", "by-hand"):
         write_note(notes / f"{name}.json", replace(FAILED, stick=name))
     assert [note.stick for note in read_notes(notes)] == ["by-hand", "sda.28", "sda1.28"]

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
-from logger.store.formats.erd_file import parse_erd
-from logger.store.formats.profile_file import Profile, read_profile
+from logger.store.formats.profile_file import Profile, parse_erd, read_profile
 
 LEFT = np.array([0.0, 1.0, -2.0, 3.5])
 RIGHT = np.array([10.0, 20.0, 30.0, -40.0])

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.road_matching import Matched
-from logger.roads.road_network import RoadNetwork, Trace
+from logger.roads.road_matching import Matched, RoadNetwork, Trace
 
 WINDOW_M = 7.62
 LANE_M = 1.75

@@ -24,7 +24,7 @@ from logger.store.export import directory_handle, manifest
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.export import MARKS_NAME, ExportResult, Mark, Progress, export, exported_names, mark_exported
 from logger.store.export.manifest import read_manifest
-from logger.store.export.pairing import FIRST_STICK, HOMES_NAME, IDENTITY_NAME, NOT_PAIRED, PAIRED_NAME, Pairing
+from logger.store.export.sticks import FIRST_STICK, HOMES_NAME, IDENTITY_NAME, NOT_PAIRED, PAIRED_NAME, Pairing
 
 from .trials import Found, Hazard, found
 
@@ -454,7 +454,7 @@ def card_that_cannot_be_written_to(folder: Path, error: int) -> Found:
     def refuse(*_: object) -> int:
         raise OSError(error, os.strerror(error))
 
-    with (patch("logger.store.export.pairing.MACHINE_ID", folder / "machine-id"),
+    with (patch("logger.store.export.sticks.MACHINE_ID", folder / "machine-id"),
           patch.object(DirectoryHandle, "open_lock_file", refuse)):
         result, again = run(logs, stick), run(logs, stick)
     assert result.complete

@@ -25,7 +25,7 @@ from logger.service import learning
 from logger.service.config import Config
 from logger.service.status import read_status
 from logger.store.export.manifest import Manifest, list_blocks, manifest_blocks, read_manifest
-from logger.store.export.stick_status import read_note
+from logger.store.export.sticks import read_note
 from logger.store.formats import record_checks, vehicle_file
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.drive_file import read_columns, read_run, read_run_facts, read_speeds

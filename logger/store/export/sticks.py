@@ -1,42 +1,52 @@
-"""Who a folder of logs belongs to, and which sticks get its logs.
+"""Who a folder of logs belongs to, which sticks get its logs, and what a person at the car sees of them.
 
-Who a folder of logs belongs to: the number that names its folder on every stick.
+The number that names the logger's folder on every stick. Problem. The logs of two cars have the same names, and never
+may they meet on a stick; but a card is copied whole for a second car, number and all, a folder is copied on one
+machine, and one card may be read in several. Solution. The number is random, made at the first export, and kept for a
+machine and a place: another machine, or a copy beside a folder that is still there, makes a number of its own. A folder
+that was moved on its machine keeps it. The machine is known by its board's serial number, which no copy of a card takes
+along, or else by its machine-id. A card that has gone read-only or is full can still be emptied: then the number comes
+from the machine's own. ``logger-id`` holds the number of who exported last, ``logger-homes`` a line for each machine:
+number, machine, place. Where there is only the former, as older versions left it, the machine that finds it takes it
+over.
 
-Problem. The logs of two cars have the same names, and never may they meet on a stick; but a card is copied whole for a
-second car, number and all, a folder is copied on one machine, and one card may be read in several. Solution. The number
-is random, made at the first export, and kept for a machine and a place: another machine, or a copy beside a folder that
-is still there, makes a number of its own. A folder that was moved on its machine keeps it. The machine is known by its
-board's serial number, which no copy of a card takes along, or else by its machine-id. A card that has gone read-only or
-is full can still be emptied: then the number comes from the machine's own.
-
-``logger-id`` holds the number of who exported last, ``logger-homes`` a line for each machine: number, machine, place.
-Where there is only the former, as older versions left it, the machine that finds it takes it over.
-
-Which sticks get the logs, and whose copies let a log be removed.
-
-Problem. A log is a track of where somebody was. Whoever can plug a stick with the right label into the car would get
-all of them, and the copy would make the owner's logs removable. Solution: a setting, ``pairing``:
+Which sticks get the logs. Problem. A log is a track of where somebody was. Whoever can plug a stick with the right
+label into the car would get all of them, and the copy would make the owner's logs removable. Solution: a setting,
+``pairing``:
 
 off            every stick gets the logs, and every copy counts
 first_stick    the first one that is plugged in gets a random number, which the card remembers; no other stick is served
 key_file       sticks that hold the same key, in the file ``KEY_NAME``, as the logger in a file of its own
 
 Number and key can be read by anyone who has such a stick in hand: it is to be kept like a key.
+
+A note per stick, and a light for all. Problem. Somebody stands at the car with a hand on the stick. They have no
+screen, or look once at ``ridelog status``; and there may be two sticks. Solution: a small file in memory each time a
+stick is plugged in, empty until its export begins, written by the export and removed when the stick is; and one LED of
+the board that shows what matters most of all notes: it beats while any stick must stay, blinks evenly when one of them
+did not get everything, and is steady when all may be pulled. When the last stick has gone the LED does again what it
+did before.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import json
+import os
 import re
 import secrets
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Literal, get_args
 
+from drivers.disk import open_regular
 from logger.errors import CheckFailed
+from logger.files import replace_bytes
 from logger.store.export import manifest
 from logger.store.export.directory_handle import DirectoryHandle
 
@@ -263,3 +273,111 @@ def _own_key(path: Path) -> str:
 def _fingerprint(key: bytes) -> str:
     """A name made from a key, which does not reveal it; empty for one that is too short to be one."""
     return hashlib.sha256(b"ridelog stick " + key).hexdigest()[:2 * _ID_BYTES] if len(key) >= LEAST_KEY_BYTES else ""
+
+
+FOLDER = Path("/run/ridelog-export")
+BLOCK_DEVICES = Path("/sys/class/block")
+LED_MEMORY = "led-trigger"
+LARGEST_BYTES = 10_000
+"""Most that is read of a note; what is cut there is none."""
+
+WAITING = "plugged in, waits for its turn"
+
+StickState = Literal["waiting", "copying", "unmounting", "ready"]
+
+
+@dataclass(frozen=True)
+class StickNote:
+    """One stick.
+
+    stick    its device, such as sda1
+    state    waiting; copying; unmounting; ready: it may be pulled
+    ok       everything is on it, as far as is known
+    text     one line for the person
+    """
+
+    stick: str
+    state: StickState
+    ok: bool
+    text: str
+
+
+def stick_of(path: Path) -> str:
+    """The device whose note this is: the name without the number of its plugging in (``sda1.27.json``: sda1)."""
+    return path.name.partition(".")[0]
+
+
+def write_note(path: Path, note: StickNote) -> None:
+    """Put a note, ``FOLDER/<stick>.<number>.json``, into place in one step. Raises ``OSError``."""
+    replace_bytes(path, f"{json.dumps(asdict(note))}\n".encode())
+
+
+def read_note(path: Path) -> StickNote | None:
+    """A note; None where there is none that can be read. An empty one is that of a stick whose export waits."""
+    try:
+        with open_regular(path) as file:
+            text = file.read(LARGEST_BYTES)
+        note = StickNote(**json.loads(text)) if text else StickNote(stick_of(path), "waiting", True, WAITING)
+    except (OSError, ValueError, TypeError, RecursionError):
+        return None
+    return note if note.state in get_args(StickState) else None
+
+
+def read_notes(folder: Path = FOLDER) -> list[StickNote]:
+    """All notes of sticks that are plugged in, by their names."""
+    return [note for path in sorted(folder.glob("*.json"))
+            if is_plugged_in(path) and (note := read_note(path)) is not None]
+
+
+def is_plugged_in(path: Path) -> bool:
+    """False for the note of a disk that has gone, or is another by now; a note without a number is somebody's own."""
+    device, _, number = path.stem.partition(".")
+    if not number.isdecimal():
+        return True
+    place = (BLOCK_DEVICES / device).resolve()
+    for disk in (place, place.parent):  # a partition lies in its disk
+        with suppress(OSError):
+            return (disk / "diskseq").read_text("ascii").strip() == number
+    return False
+
+
+def show_on_led(led: Path, folder: Path) -> None:
+    """Let a light, a folder such as /sys/class/leds/ACT, show the notes of a folder.
+
+    A light that is not there, or may not be changed, shows nothing: the notes are still true. Source: Linux,
+    Documentation/leds/leds-class.rst.
+    """
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            _show(led, folder / LED_MEMORY, read_notes(folder))
+        finally:
+            os.close(descriptor)
+
+
+def _show(led: Path, memory: Path, notes: list[StickNote]) -> None:
+    if not notes:
+        if memory.exists():
+            _trigger(led, memory.read_text("ascii"))
+            memory.unlink()
+        return
+    if not memory.exists():
+        memory.write_text(_present_trigger(led), "ascii")
+    if any(note.state != "ready" for note in notes):
+        _trigger(led, "heartbeat")
+    elif all(note.ok for note in notes):
+        _trigger(led, "none")
+        (led / "brightness").write_text((led / "max_brightness").read_text("ascii"), "ascii")
+    else:
+        _trigger(led, "timer")
+
+
+def _present_trigger(led: Path) -> str:
+    """The kernel lists all triggers and puts the present one into brackets."""
+    listed = (led / "trigger").read_text("ascii").split()
+    return next((word.strip("[]") for word in listed if word.startswith("[")), "none")
+
+
+def _trigger(led: Path, name: str) -> None:
+    (led / "trigger").write_text(name, "ascii")
