@@ -22,6 +22,7 @@ from logger.api.question import (
     Range,
     Switches,
     Verb,
+    Verbs,
     askings,
     function,
     help_of,
@@ -115,8 +116,10 @@ def test_the_function_has_the_questions_fields_and_words() -> None:
 
 
 def every_option() -> list[tuple[str, Asking]]:
-    return [(verb, one) for verb, place in ASKED.items()
-            for one in askings(options._named(f"logger.api.{place}").question)]
+    asked = {verb: options._named(f"logger.api.{place}") for verb, place in ASKED.items()}
+    return [(verb, one) for verb, found in asked.items()
+            for verbs in [[below for below, _ in found.below.values()] if isinstance(found, Verbs) else [found]]
+            for each in verbs for one in askings(each.question)]
 
 
 def test_each_option_is_explained_and_each_number_has_its_unit() -> None:
