@@ -10,6 +10,7 @@ Series, 1949). Where the spectrum has no plateau nothing is changed.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -48,23 +49,40 @@ def pooled(levels: Iterable[tuple[float, float]], power: float, freedom: float, 
     return power, freedom
 
 
-def without_white_noise(samples: Array) -> tuple[Array, float]:
-    """Samples (n,) without their white noise, and its standard deviation; themselves and 0 where they show none."""
+@dataclass(frozen=True, eq=False)
+class Denoised:
+    """Samples (n,) without their white noise, its standard deviation, 0 where they show none, and noise (n,) like what
+    is still in them."""
+
+    samples: Array
+    deviation: float
+    left: Array
+
+
+def without_white_noise(samples: Array) -> Denoised:
+    """Samples (n,) without their white noise."""
     count = len(samples)
+    as_they_are = Denoised(samples, 0.0, np.zeros(count))
     if count <= _BANDS * _NEAR:
-        return samples, 0.0
+        return as_they_are
     line = np.linspace(samples[0], samples[-1], count)
-    odd = samples - line
-    spectrum = np.fft.rfft(np.concatenate([odd, -odd[-2:0:-1]]))
+    spectrum = _spectrum(samples - line)
     power = np.abs(spectrum)**2 / (2 * count)
     bands = np.array_split(power[1:], _BANDS)
     # A spectrum of an odd curve has one number at each frequency.
     levels = sorted((float(one.mean()), float(len(one))) for one in bands)
     noise, freedom = pooled(levels[1:], *levels[0], OF_QUIETEST)
     if freedom < _LEAST_BANDS * levels[0][1] or not 0 < noise <= _MOST_SHARE**2 * float(power[1:].mean()):
-        return samples, 0.0
+        return as_they_are
     width = 2 * _NEAR + 1
     local = np.convolve(np.pad(power, _NEAR, mode="reflect"), np.full(width, 1 / width), mode="valid")
     gain = np.where(local > noise * (1 + _ABOVE_SIGMA * np.sqrt(2 / width)), 1 - noise / np.maximum(local, noise), 0.0)
-    kept = np.fft.irfft(spectrum * gain, 2 * (count - 1))[:count]
-    return line + kept, float(np.sqrt(noise))
+    deviation = float(np.sqrt(noise))
+    drawn = _spectrum(np.random.default_rng(1).normal(0.0, deviation, count))
+    kept, left = (np.fft.irfft(one, 2 * (count - 1))[:count] for one in (spectrum * gain, drawn * np.sqrt(gain)))
+    return Denoised(line + kept, deviation, left)
+
+
+def _spectrum(samples: Array) -> npt.NDArray[np.complex128]:
+    """Spectrum (n,) of samples that go on oddly at both ends."""
+    return np.fft.rfft(np.concatenate([samples, -samples[-2:0:-1]]))

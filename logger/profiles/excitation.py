@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.white_noise import without_white_noise
+from logger.dsp.white_noise import Denoised, without_white_noise
 from logger.profiles.track import Stance, Way
 
 if TYPE_CHECKING:
@@ -101,6 +101,23 @@ class Excitation:
             means.append(np.diff(self._impulses(inside) + late_s * pushes, axis=0) / np.diff(way.time_s)[:, None])
         return np.hstack(values), np.hstack(means)
 
+    @cached_property
+    def with_noise_left(self) -> Excitation | None:
+        """The same with noise like what is still in it; None where there is none."""
+        if not any(one.deviation for one in (*self._denoised_m, *self._denoised_n)):
+            return None
+        moved, pushed = ([one.samples + one.left for one in some] for some in (self._denoised_m, self._denoised_n))
+        return replace(self, elevation_m=np.stack(moved, axis=1).reshape(self.elevation_m.shape),
+                       force_n=np.stack(pushed, axis=1) if pushed else None)
+
+    @cached_property
+    def _denoised_m(self) -> list[Denoised]:
+        return [without_white_noise(one) for one in self.elevation_m.reshape(len(self.elevation_m), -1).T]
+
+    @cached_property
+    def _denoised_n(self) -> list[Denoised]:
+        return [] if self.force_n is None else [without_white_noise(one) for one in self.force_n.T]
+
     def begun(self, later_s: float) -> Excitation:
         """The same for a record that begins so much later [s]."""
         return replace(self, start_s=self.start_s - later_s)
@@ -125,12 +142,11 @@ class Excitation:
 
     @cached_property
     def _curves(self) -> BSpline:
-        return self._spline(self.elevation_m.reshape(len(self.elevation_m), -1))
+        return self._spline(np.stack([one.samples for one in self._denoised_m], axis=1))
 
     @cached_property
     def _pushes(self) -> BSpline:
-        assert self.force_n is not None
-        return self._spline(self.force_n)
+        return self._spline(np.stack([one.samples for one in self._denoised_n], axis=1))
 
     @cached_property
     def _impulses(self) -> BSpline:
@@ -140,7 +156,6 @@ class Excitation:
         from scipy.interpolate import make_interp_spline
 
         time_s = self.start_s + np.arange(len(samples)) / self.rate_hz
-        samples = np.stack([without_white_noise(column)[0] for column in samples.T], axis=1)
         return make_interp_spline(time_s, samples, _CUBIC)
 
     @cached_property

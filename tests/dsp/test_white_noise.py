@@ -25,9 +25,10 @@ def _sweep(count: int = 10_000) -> tuple[np.ndarray, np.ndarray]:
 def test_noise_of_a_sensor_is_found_and_taken_out() -> None:
     place_m, _ = _sweep()
     noise = 2e-5 * np.random.default_rng(1).standard_normal(len(place_m))
-    found, deviation = without_white_noise(place_m + noise)
-    assert deviation == pytest.approx(2e-5, rel=0.03)
-    assert np.std(found - place_m) < 0.5 * 2e-5  # 12 of 250 Hz keep 5 % of its power, and the sweep's flanks some
+    found = without_white_noise(place_m + noise)
+    assert found.deviation == pytest.approx(2e-5, rel=0.03)
+    assert np.std(found.left) == pytest.approx(np.std(found.samples - place_m), rel=0.3)
+    assert np.std(found.samples - place_m) < 0.5 * 2e-5  # the motion's 12 of 250 Hz keep 5 % of its power
 
 
 def test_a_velocity_by_a_noisy_place_is_the_motion_s() -> None:
@@ -48,6 +49,6 @@ def test_a_velocity_by_a_noisy_place_is_the_motion_s() -> None:
     pytest.param(np.zeros(10_000), id="at rest"),
 ])
 def test_what_moves_is_left_as_it_is(samples: np.ndarray) -> None:
-    found, deviation = without_white_noise(samples)
-    assert deviation == 0.0
-    assert found is samples
+    found = without_white_noise(samples)
+    assert found.deviation == 0.0
+    assert found.samples is samples

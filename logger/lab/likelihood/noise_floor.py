@@ -18,6 +18,7 @@ import numpy.typing as npt
 from logger.dsp.white_noise import EQUAL_SIGMA, OF_QUIETEST, pooled
 from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.repeats import find_repeats
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, UNEXPLAINED, Bands
@@ -152,21 +153,28 @@ def excess_over_noise(posterior: Posterior, state: State, chance: float) -> floa
 
 def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: Noise | None = None
                      ) -> dict[str, float]:
-    """Share by which the residual is above the noise and the discrepancy of two right simulations, by name of the
-    signal (empty: the sensor's acceleration), of the run where it is largest. A run so short that noise alone may do
-    the same with this probability counts no higher than ``UNEXPLAINED``.
+    """Share by which the residual is above what right models leave, by name of the signal (empty: the sensor's
+    acceleration), of the run where it is largest. They leave the noise, what the model makes of the noise of its
+    measured input, the discrepancy of two right simulations, and what is within the prior of a calibrated sensor: as
+    large a share of what was measured as ``UNUSUAL_SIGMA`` deviations of its gain. (Its gain is fitted; how far it is
+    off a straight line, or its cross talk, are of that size at most.) A run so short that noise alone may do the same
+    with this probability counts no higher than ``UNEXPLAINED``.
 
     noise    of the sensors, where it is known; None: estimated from the residuals
     """
     from scipy.special import gammainccinv
 
     signals = _by_signal(posterior, state)
+    carried = by_signal(posterior.readings, posterior.bands, posterior.carried_noise(state))
     count, found = sum(len(one.bands) for one in signals), dict[str, float]()
-    for signal in signals:
+    for signal, inputs in zip(signals, carried, strict=True):
         own = noise or _noise_of(signal)
-        for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True):
+        for run, one, residual, share, moved in zip(signal.runs, signal.bands, signal.residuals, signal.shares,
+                                                    inputs.residuals, strict=True):
+            sensor = next((one for one in run.signals if one.name == signal.name), run.facts.main)
+            chain = UNUSUAL_SIGMA * posterior.tolerance.gain_of(sensor) / DISCREPANCY
             freedom = float(one.freedom.sum())
-            expected = one.freedom @ (own.deviation_mps2**2 / share + one.floor)
+            expected = one.freedom @ (own.deviation_mps2**2 / share + (1 + chain**2) * one.floor + one.power(moved))
             above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
             by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / count) / (freedom / 2))) - 1
             above = above if above > by_chance else min(above, UNEXPLAINED)

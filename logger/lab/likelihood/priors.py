@@ -134,9 +134,12 @@ class VehiclePrior:
         columns = np.sqrt(weights)[:, None] * ways[:, known].T
         # The fitted place is the mean of the runs' own estimate and of the prior's, by their information.
         likeliest = (1 + weights) / np.sqrt(weights) * (ways[:, known].T @ place)
-        within = np.asarray(lsq_linear(columns, likeliest, (-Tolerance.band, Tolerance.band)).x, float)
+        # A change is a share of the number: 20 % less is no more than 20 % more, though its logarithm is.
+        high = np.full(len(logs), Tolerance.band)
+        low = np.minimum(np.log1p(-np.minimum(high * self.deviations, 0.9)) / self.deviations, -high)
+        within = np.asarray(lsq_linear(columns, likeliest, (low, high)).x, float)
         worse = ((columns @ within - likeliest) ** 2).sum() - ((columns @ place - likeliest) ** 2).sum()
-        ended = (np.abs(within) > (1 - 1e-3) * Tolerance.band) & (np.abs(place) > Tolerance.band)
+        ended = (np.abs(within) > (1 - 1e-3) * np.where(place < 0, -low, high)) & (np.abs(place) > Tolerance.band)
         if not worse > CONFLICT_SIGMA**2:
             return {}
         return {self.names[index]: float(np.expm1(logs[index])) for index in np.argsort(-np.abs(place)) if ended[index]}
@@ -146,13 +149,15 @@ class VehiclePrior:
         off, and their standard errors, the farthest first, by their tolerance; arguments as of ``beyond_tolerance``.
 
         A car in which all masses and forces are larger by one factor moves the same. So these are counted against the
-        one of them that moves as the median does: where most are right, a wrong one is named alone. Where the runs show
-        forces, each is counted for itself.
+        one of them that moves as the median does, weighed by how well each is known: where most are right, a wrong one
+        is named alone. Where the runs show forces, each is counted for itself.
         """
         scaling = np.flatnonzero([grows_with_mass(name) for name in self.names])
         against = np.eye(len(logs))
         if len(scaling) and not shows_forces:
-            middle = scaling[np.argsort(logs[scaling])[len(scaling) // 2]]
+            order = scaling[np.argsort(logs[scaling])]
+            known = np.cumsum(self.precision[order])
+            middle = order[np.searchsorted(known, 0.5 * known[-1])]
             against[scaling, middle] -= 1.0
         logs, errors = against @ logs, np.sqrt(np.maximum(np.diag(against @ covariance @ against.T), 0.0))
         least = np.maximum(CONFLICT_SIGMA * errors, 0.6745 * self.deviations)  # the upper quartile of a normal density

@@ -9,10 +9,11 @@ from math import prod
 
 import numpy as np
 
+from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, relinearise
 from logger.lab.likelihood.posterior import NotSimulated, State
-from logger.lab.selection.evidence import probability_by_chance, probability_of_likelihood_gain
+from logger.lab.selection.evidence import min_gain, probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
@@ -98,7 +99,17 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | Non
         state = State((*base.state.effects, trial.one), trial.logs,
                       linear.state.record, linear.size, [])
     try:
-        state = optimise_numbers(linear, state, free_parameters_of(state.effects))
+        found = optimise_numbers(linear, state, free_parameters_of(state.effects))
     except NotSimulated:
         return None
-    return CandidateFit.of(score, relinearise(posterior, state, linear.numbers, score))
+    one = CandidateFit.of(score, relinearise(posterior, found, linear.numbers, score))
+    return _fit_by_squares(score, base, state) if one.gain < -min_gain(1) else one
+
+
+def _fit_by_squares(score: float, base: Baseline, start: State) -> CandidateFit:
+    """A fit that the likelihood led astray, to where it is far worse than the model without the effect, fitted by
+    squares first."""
+    by_squares = BySquares(base.posterior)
+    begun = by_squares.at(start.effects, start.logs, start)
+    state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1], 12)[1], start)
+    return CandidateFit.of(score, fit(LinearModel(base.posterior, state), rounds=3))

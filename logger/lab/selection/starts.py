@@ -19,18 +19,17 @@ from zlib import crc32
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, align, fit, optimise_numbers
+from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
-from logger.lab.likelihood.repeats import repeat_each_other
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
-from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
-from logger.vehicle.named_parameters import WEAKEST, free_parameters_of
+from logger.vehicle.named_parameters import WEAKEST
 
 Array = npt.NDArray[np.float64]
 
@@ -52,68 +51,6 @@ class Started(Screened):
         return max(self.trials[0].gain, self.gain_by_squares)
 
 
-class _BySquares:
-    """Least squares over runs of which none repeats another, all bands weighed alike."""
-
-    def __init__(self, posterior: Posterior) -> None:
-        runs, kept = posterior.runs.runs, list[int]()
-        for index, run in enumerate(runs):
-            if not any(repeat_each_other(runs[one], run) for one in kept):
-                kept.append(index)
-        self.kept, self.whole = kept, posterior
-        self.posterior = posterior if len(kept) == len(runs) else Posterior(
-            SimulatedRuns([runs[one] for one in kept], posterior.runs.fine_hz), posterior.vehicle, posterior.tolerance,
-            posterior.start_vehicle, posterior.prior, [posterior.readings[one] for one in kept])
-        self.whiteners = [bands.flat_whitener(np.concatenate([run.measured_mps2 * run.read, *run.more]))
-                          for bands, run in zip(self.posterior.bands, self.posterior.runs.runs, strict=True)]
-        self.freedom = self.posterior.freedom
-
-    def squares(self, state: State) -> float:
-        """Sum of the squares of a state's residuals, weighed, and cost of its priors."""
-        return self.posterior.prior.cost(state.logs) + sum(float((whitener(one)**2).sum()) for whitener, one in zip(
-            self.whiteners, self.posterior.residuals(state), strict=True))
-
-    def at(self, effects: Sequence[Chosen], logs: Array, near: State) -> tuple[float, State] | None:
-        """The state with these numbers and the records' errors of another state, of these runs or of all, and its
-        squares; None where it cannot be."""
-        record = near.record if len(near.record) == len(self.kept) else [near.record[one] for one in self.kept]
-        try:
-            with np.errstate(all="ignore"):
-                state = self.posterior.state_at(effects, logs, record, near.size)
-                squares = self.squares(state)
-        except NotSimulated:
-            return None
-        return (squares, state) if np.isfinite(squares) else None
-
-    def improved(self, start: State, rounds: int) -> tuple[float, State]:
-        """A state improved in so many rounds of steps, and its squares."""
-        least, best = self.squares(start), start
-        for _ in range(rounds):
-            try:
-                with np.errstate(all="ignore"):
-                    linear = LinearModel(self.posterior, best, self.posterior.number_slopes(
-                        best, self.posterior.prior.steps), self.whiteners)
-                    found = optimise_numbers(linear, best, free_parameters_of(best.effects))
-                    found = self.posterior.state_at(found.effects, found.logs, found.record, found.size)
-                    squares = self.squares(found)
-            except NotSimulated:
-                break
-            if not squares < least:
-                break
-            enough = squares > least * (1 - CONVERGED / self.freedom)
-            least, best = squares, found
-            if enough:
-                break
-        return least, best
-
-    def of_all(self, state: State, near: State) -> State:
-        """The state on all runs."""
-        record = list(near.record)
-        for index, one in zip(self.kept, state.record, strict=True):
-            record[index] = one
-        return self.whole.state_at(state.effects, state.logs, record, near.size)
-
-
 @dataclass(eq=False)
 class UnknownNumbers(MeasuredRoad):
     """The likelihood of drives over a measured road, of a car whose numbers are not known.
@@ -126,7 +63,7 @@ class UnknownNumbers(MeasuredRoad):
     draws: int = 120
     starts: int = 2
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
-    _squares: dict[int, tuple[Posterior, _BySquares]] = field(default_factory=dict)
+    _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
 
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
@@ -192,19 +129,19 @@ class UnknownNumbers(MeasuredRoad):
         leads_away = posterior.error(found.state) > (1 + UNEXPLAINED) * posterior.error(start)
         return begun if leads_away else found
 
-    def _by_squares(self, posterior: Posterior) -> _BySquares:
+    def _by_squares(self, posterior: Posterior) -> BySquares:
         if id(posterior) not in self._squares:
-            self._squares[id(posterior)] = posterior, _BySquares(posterior)  # kept, so that its id stays its own
+            self._squares[id(posterior)] = posterior, BySquares(posterior)  # kept, so that its id stays its own
         return self._squares[id(posterior)][1]
 
-    def _anchor(self, by_squares: _BySquares, near: State, count: int) -> State:
+    def _anchor(self, by_squares: BySquares, near: State, count: int) -> State:
         """The best car by squares with the effects of a state: from there, and from cars that are drawn."""
         here = by_squares.at(near.effects, near.logs, near)
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
         begun += [(by_squares.squares(one), one) for one in self._begun(by_squares, None, near, count)]
         return min(begun, key=lambda pair: pair[0])[1]
 
-    def _begun(self, by_squares: _BySquares, effect: Effect | None, near: State, count: int, rounds: int = 12
+    def _begun(self, by_squares: BySquares, effect: Effect | None, near: State, count: int, rounds: int = 12
                ) -> tuple[State, ...]:
         """The best so many of cars that were drawn around the file's, and as many of those around a state, improved by
         squares, the best first. A state without the effect is in a valley of its own, whose cars are the better ones
