@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, Timeout, WrongDevice
 from drivers.hardware import I2cBus, Machine
-from drivers.readings import UNREAD_CHIP, AccelerationBlock
+from drivers.readings import UNREAD_CHIP, US_PER_S, AccelerationBlock
 from drivers.sample_clock import DatedSamples, UndatedSamples
-from drivers.sources import US_PER_S, ChipSource, Scattered
+from drivers.sources import ChipSource, Scattered
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,6 @@ from statistics import median
 from drivers.framing import Arrivals, Frame, NmeaFramer
 from drivers.nmea_sentences import (
     EPOCH_ORDINAL,
-    SECOND_US,
     Checksum,
     Gga,
     Gll,
@@ -62,7 +61,7 @@ from drivers.nmea_sentences import (
     check,
     parse_checked,
 )
-from drivers.readings import Fix
+from drivers.readings import US_PER_S, Fix
 from drivers.wire_contents import RECEIVER, RecentBytes
 
 BITS_PER_BYTE = 10
@@ -71,7 +70,6 @@ TOLERANCE = 0.03
 LOOK_S = 0.08
 """``SerialSource`` sleeps 0.06 s at most; FTDI adapters gather for 0.016 s."""
 WINDOW_US = 10_000_000
-_US_PER_S = 1_000_000
 _NEEDS_KEPT = 9
 
 
@@ -106,7 +104,7 @@ class LineLoad:
 
     def needs(self, size: int, for_us: int) -> None:
         """So many bytes were what the device had to say of ``for_us`` [us] of its own time."""
-        self._needs.append(size * _US_PER_S / for_us)
+        self._needs.append(size * US_PER_S / for_us)
         if len(self._needs) == _NEEDS_KEPT:
             self.needs_bytes_per_s = max(self.needs_bytes_per_s, median(self._needs))
 
@@ -119,18 +117,18 @@ class LineLoad:
     def share(self) -> float:
         """Bytes of the last seconds over what the line carries; 1 while that is not known."""
         (begin_us, before), (end_us, total) = self._looks[0], self._looks[-1]
-        return (total - before) / self.bytes_per_s * _US_PER_S / (end_us - begin_us) if end_us > begin_us else 1.0
+        return (total - before) / self.bytes_per_s * US_PER_S / (end_us - begin_us) if end_us > begin_us else 1.0
 
     @property
     def may_wait(self) -> bool:
         """What comes may have waited: the line has not been seen to pause in the last seconds."""
-        observed_s = (self._looks[-1][0] - self._looks[0][0]) / _US_PER_S
+        observed_s = (self._looks[-1][0] - self._looks[0][0]) / US_PER_S
         pause_s = observed_s * (1.0 - self.share)
         return abs(pause_s) <= TOLERANCE * observed_s + LOOK_S
 
 
-MINUTE_US = 60 * SECOND_US
-DAY_US = 86_400 * SECOND_US
+MINUTE_US = 60 * US_PER_S
+DAY_US = 86_400 * US_PER_S
 ROLLOVER_DAYS = 1024 * 7
 ROLLOVERS_MAX = 8
 GPS_EPOCH_DAY = datetime.date(1980, 1, 6).toordinal() - EPOCH_ORDINAL
@@ -316,7 +314,7 @@ class NmeaDecoder:
             if self._fixes_without[what] >= TELLING_FIXES:
                 return f"it sends {self._recent.sentence_kinds()}, but no {what}, so {harm}: have it send {sentences}"
         if len(self._long_intervals_us) == TELLING_INTERVALS:
-            return (f"it sends only each {min(self._long_intervals_us) / SECOND_US:.0f} s, too seldom to know the "
+            return (f"it sends only each {min(self._long_intervals_us) / US_PER_S:.0f} s, too seldom to know the "
                     "motion between, so rows have no place: have it send RMC each second")
         if self._too_early_us is None:
             return ""

@@ -17,6 +17,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from drivers.framing import SENTENCE_BYTES_MAX, exclusive_or
+from drivers.readings import US_PER_S
 
 KNOT_MPS = 1852.0 / 3600.0
 KMH_MPS = 1.0 / 3.6
@@ -28,7 +29,6 @@ DOP_UNKNOWN = 99.0
 MODES_WITH_FIX = (b"", b"A", b"D", b"F", b"P", b"R")
 QUALITIES_WITH_FIX = range(1, 6)
 
-SECOND_US = 1_000_000
 EPOCH_ORDINAL = datetime.date(1970, 1, 1).toordinal()
 
 
@@ -301,7 +301,7 @@ def _time_of_day_us(field: bytes) -> int | None:
     hour, minute, second = int(match[1]), int(match[2]), int(match[3])
     _expect(hour <= 23 and minute <= 59 and second <= 60)
     fraction_us = int(((match[4] or b"") + b"000000")[:6])
-    return (hour * 3600 + minute * 60 + second) * SECOND_US + fraction_us
+    return (hour * 3600 + minute * 60 + second) * US_PER_S + fraction_us
 
 
 def _short_date(field: bytes) -> tuple[int | None, bool]:

@@ -31,6 +31,7 @@ GPS = "nmea"
 
 
 STANDARD_GRAVITY_MPS2 = 9.80665
+US_PER_S = 1_000_000
 
 UNREAD_CHIP = "readings arrive, but none that can be used: check the wires of its bus, and its supply"
 """What to do where a chip's bytes become no samples: there is no other language that they could be in."""

@@ -20,9 +20,7 @@ from enum import Enum, auto
 from typing import Protocol, Self
 
 from drivers.errors import DumpError
-from drivers.readings import Event
-
-US_PER_S = 1_000_000
+from drivers.readings import US_PER_S, Event
 
 
 class Fault(Enum):

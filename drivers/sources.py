@@ -15,7 +15,7 @@ from typing import Protocol
 
 from drivers.errors import DeviceError, NotPresent
 from drivers.hardware import BytePort, I2cBus
-from drivers.readings import Event
+from drivers.readings import US_PER_S, Event
 
 CHECK_EVERY_US = 60_000
 """One of a chip's registers each time: all four of a BMA220 have been seen a quarter of a second after a reading."""
@@ -23,7 +23,6 @@ CHECK_EVERY_US = 60_000
 READ_BYTES = 4096
 GATHER_S = 0.05
 SCATTER_S = 0.01  # an interval of the slowest sensor that is taken: 95 samples a second
-US_PER_S = 1_000_000
 
 
 class Source(Protocol):

@@ -44,6 +44,7 @@ from drivers.hardware import I2cBus, Machine
 from drivers.readings import (
     STANDARD_GRAVITY_MPS2,
     UNREAD_CHIP,
+    US_PER_S,
     AccelerationBlock,
     Kind,
     OneOf,
@@ -53,7 +54,7 @@ from drivers.readings import (
     Special,
     Whole,
 )
-from drivers.sources import US_PER_S, ChipSource, Deadlines, Source
+from drivers.sources import ChipSource, Deadlines, Source
 
 CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)

@@ -37,9 +37,20 @@ from drivers.accelerometers._iio_device import (
 from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality
 from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.hardware import Machine
-from drivers.readings import UNREAD_CHIP, AccelerationBlock, Decimal, Event, Kind, OrNone, RecordedWords, Text, Whole
+from drivers.readings import (
+    UNREAD_CHIP,
+    US_PER_S,
+    AccelerationBlock,
+    Decimal,
+    Event,
+    Kind,
+    OrNone,
+    RecordedWords,
+    Text,
+    Whole,
+)
 from drivers.sample_clock import DatedSamples, UndatedSamples
-from drivers.sources import US_PER_S, Deadlines, SerialSource, Source
+from drivers.sources import Deadlines, SerialSource, Source
 
 CHECK_US = US_PER_S
 DESCRIBE_US = 10 * US_PER_S

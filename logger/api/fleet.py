@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, full_day
+from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, day_us
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from logger.fleet.summary import FleetFigures
 
 _ROADS = "roads.geojson"
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,13 +151,6 @@ def _summarised(question: SummariseQuestion | ReportQuestion, by: str
         if figures is None:
             raise empty
         yield figures, running, pieces
-
-
-def day_us(day: str | None) -> int | None:
-    """The start of a day (UTC) [us since 1970]; None for None."""
-    if day is None:
-        return None
-    return (datetime.fromisoformat(full_day(day)).replace(tzinfo=UTC) - _EPOCH) // timedelta(microseconds=1)
 
 
 def _pieces(dataset: Dataset) -> RoadPieces | None:

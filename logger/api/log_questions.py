@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 from re import fullmatch
 from typing import Annotated
@@ -30,15 +30,19 @@ def length_of(length: str | float) -> float:
     return length_m
 
 
-def full_day(day: str) -> str:
-    """The day itself, or the first one of a year (2026) or month (2026-04)."""
-    return day + {4: "-01-01", 7: "-01"}.get(len(day), "")
+def day_us(day: str | None) -> int | None:
+    """The start of a day (2026-04-30), month (2026-04) or year (2026) in UTC [us since 1970]; None for None. ValueError
+    for anything else."""
+    if day is None:
+        return None
+    first = date.fromisoformat(day + {4: "-01-01", 7: "-01"}.get(len(day), ""))
+    return (first - date(1970, 1, 1)) // timedelta(microseconds=1)
 
 
 def check_day(day: str) -> None:
     """ValueError for what is no day, month or year."""
     try:
-        date.fromisoformat(full_day(day))
+        day_us(day)
     except ValueError:
         raise ValueError("expected a date such as 2026-04-30, a month (2026-04) or a year (2026)") from None
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.log_questions import PassesQuestion, full_day, length_of
+from logger.api.log_questions import PassesQuestion, day_us, length_of
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
@@ -29,7 +28,7 @@ from logger.records import WindowRecord
 from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
 from logger.report.page import number_button, page
 from logger.report.placed import column, iri_errors, of_passes, placed, trace_of
-from logger.report.quantities import known
+from logger.report.quantities import columns, known
 from logger.report.summary import comfort_words, counts
 from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import (
@@ -90,36 +89,32 @@ class RepeatedDrives(CommandResult):
 
     def layer(self) -> Layer:
         """Cells as lines, for the formats of ``convert``."""
-        return cells_layer(self._found)
+        return Layer("passes", _fields(_CELL), tuple(_cells(self._found)))
 
     def visits(self) -> Layer:
         """Places to visit as points, the most urgent first, for the formats of ``convert``; waypoints in GPX."""
-        return visits_layer(self._found)
+        return Layer("visits", _fields(_VISIT), tuple(_layer_visits(self._found)), points=True)
 
     def as_page(self, of: str) -> Html:
         """Map, curves and tables as one page."""
         return passes_page(self._found)
 
 
-def _day_s(day: str) -> float:
-    """The beginning of a day such as 2026-04-30, a month or a year in UTC [s since 1970]."""
-    return datetime.fromisoformat(full_day(day)).replace(tzinfo=UTC).timestamp()
-
-
 def combined(question: PassesQuestion) -> RepeatedDrives:
     """The answer to ``PassesQuestion``, which says what is raised."""
     since, until, places = question.since, question.until, question.places
-    first_s, end_s = -np.inf if since is None else _day_s(since), np.inf if until is None else _day_s(until)
+    first_us, end_us, split_us = map(day_us, (since, until, question.split))
     above_m_per_km = question.above_m_per_km or FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
-    split_s = None if question.split is None else _day_s(question.split)
     files = read_found(find_logs_in(places))
     records = [one for file in files for one in file.records]
     if since is not None or until is not None:
-        records = [one for one in records if one.utc_us is not None and first_s <= one.utc_us / US_PER_S < end_s]
+        records = [one for one in records if one.utc_us is not None and (first_us is None or first_us <= one.utc_us)
+                   and (end_us is None or one.utc_us < end_us)]
     if not records:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row"
                        + (" of these days" if since or until else ""))
-    found = combined_drives(records, length_of(question.length), above_m_per_km, split_s)
+    found = combined_drives(records, length_of(question.length), above_m_per_km,
+                            None if split_us is None else split_us / US_PER_S)
     left = of_passes(files, records, found.placed)
     return RepeatedDrives(
         "\n".join([*lines(found), *left_out_paragraph(left)]), as_json(found) | left_out_json(left),
@@ -289,18 +284,36 @@ def _passes_visits(found: CombinedDrives) -> Iterator[str]:
         yield "Work list: empty; no place is above a limit with enough confidence."
         return
     yield f"Work list: {counted(len(found.visits), 'place')}"
-    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w m/s2':>8}  "
-           f"{'perception':25} {'confidence':>10} drives")
-    for number, one in enumerate(found.visits[:MOST_VISITS], start=1):
-        values = visit_values(found, one)
-        iri = f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}"
-        a_w = values["a_w_mps2"]
-        yield (f"{number:3} {values['lat_deg']:10.5f},{values['lon_deg']:10.5f} {compass(values['heading_deg']):7} "
-               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>8}  "
-               f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:10.0%} "
-               f"{one.drives:6}")
+    yield from columns([_VISIT_HEADS, *(
+        (str(number), one.kind, _coordinates(found, one.worst), *_visit_cells(found, one))
+        for number, one in enumerate(found.visits[:MOST_VISITS], start=1))])
     if len(found.visits) > MOST_VISITS:
         yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
+
+
+_VISIT_HEADS = ("#", "What", "Worst piece at", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+                "Perception", "Confidence", "Drives")
+_CHANGE_HEADS = ("#", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
+
+
+def _coordinates(found: CombinedDrives, cell: int) -> str:
+    return f"{found.lat_deg[cell]:.6f}, {found.lon_deg[cell]:.6f}"
+
+
+def _visit_cells(found: CombinedDrives, one: PlaceToVisit) -> tuple[str, ...]:
+    """A place to visit as words, from its direction on."""
+    values = visit_values(found, one)
+    a_w = values["a_w_mps2"]
+    return (compass(values["heading_deg"]), f"{one.length_m:.0f}",
+            f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
+            "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives))
+
+
+def _change_cells(found: CombinedDrives, change: Changes, one: int, cell: int) -> tuple[str, ...]:
+    """A change as words, from its direction on."""
+    return (compass(float(found.heading_deg[cell])),
+            f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
+            str(change.before[one]), str(change.after[one]))
 
 
 def change_lines(found: CombinedDrives) -> list[str]:
@@ -317,14 +330,10 @@ def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
     yield (f"Between the two periods {worse} of {counted(len(change.key), 'piece')} of {found.length_m:g} m got worse, "
            f"{better} better (at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
     if worse or better:
-        yield f"{'#':>3} {'':6} {'coordinates':>21} towards  change of the IRI"
-    cell = np.searchsorted(found.iri.key, change.key)
-    for one in largest_changes(change):
-        at = int(cell[one])
-        yield (f"{place_number(found, at):>3} {changed(change, one):6} {found.lat_deg[at]:10.5f},"
-               f"{found.lon_deg[at]:10.5f} {compass(found.heading_deg[at]):7}  {change.change_m_per_km[one]:+6.2f} ± "
-               f"{change.change_std_m_per_km[one]:.2f} m/km, p {change.p_value[one]:.1e}, "
-               f"{counted(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
+        cells = np.searchsorted(found.iri.key, change.key).tolist()
+        yield from columns([_CHANGE_HEADS, *(
+            (place_number(found, cells[one]), changed(change, one), _coordinates(found, cells[one]),
+             *_change_cells(found, change, one, cells[one])) for one in largest_changes(change))])
 
 
 def changed(change: Changes, one: int) -> str:
@@ -414,12 +423,8 @@ def _fields(names: tuple[str, ...]) -> tuple[Attribute, ...]:
     return tuple(Attribute(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
 
 
-def cells_layer(found: CombinedDrives) -> Layer:
-    """The cells way by way: each a line half-way to its neighbours."""
-    return Layer("passes", _fields(_CELL), tuple(_cells(found)))
-
-
 def _cells(found: CombinedDrives) -> Iterator[Feature]:
+    """The cells way by way: each a line half-way to its neighbours."""
     ways, _ = way_and_cell(found.iri.key)
     for chain in chains(found):
         places = [(float(found.lon_deg[cell]), float(found.lat_deg[cell])) for cell in chain]
@@ -432,12 +437,8 @@ def _cells(found: CombinedDrives) -> Iterator[Feature]:
                           iri_class(values["iri_m_per_km"]))
 
 
-def visits_layer(found: CombinedDrives) -> Layer:
-    """The places to visit, the most urgent first."""
-    return Layer("visits", _fields(_VISIT), tuple(_layer_visits(found)), points=True)
-
-
 def _layer_visits(found: CombinedDrives) -> Iterator[Feature]:
+    """The places to visit, the most urgent first."""
     for number, one in enumerate(found.visits, start=1):
         values = visit_values(found, one)
         place = (values["lon_deg"], values["lat_deg"])
@@ -472,43 +473,24 @@ def _days(found: CombinedDrives) -> str:
 def _page_changes(found: CombinedDrives) -> Html:
     if found.change is None:
         return EMPTY
-    change, cells = found.change, np.searchsorted(found.iri.key, found.change.key)
-    rows = []
-    for one in largest_changes(change):
-        cell = int(cells[one])
-        lat_deg, lon_deg = float(found.lat_deg[cell]), float(found.lon_deg[cell])
-        rows.append((
-            place_number(found, cell), changed(change, one), _link(lat_deg, lon_deg),
-            compass(float(found.heading_deg[cell])),
-            f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
-            str(change.before[one]), str(change.after[one])))
-    heads = ("#", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
-    return paragraphs(change_lines(found)[:1]) + (grid(heads, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
+    change, cells = found.change, np.searchsorted(found.iri.key, found.change.key).tolist()
+    rows = [(place_number(found, cells[one]), changed(change, one), _link(found, cells[one]),
+             *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)]
+    return paragraphs(change_lines(found)[:1]) + (grid(_CHANGE_HEADS, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
 
 
 def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:
     if not found.visits:
         return paragraphs(["No place is above a limit with enough confidence."])
-    rows = []
-    for number, one in enumerate(found.visits, start=1):
-        values = visit_values(found, one)
-        lat_deg, lon_deg = values["lat_deg"], values["lon_deg"]
-        a_w = values["a_w_mps2"]
-        rows.append((
-            number_button(marked[number - 1], number) if number <= len(marked) else str(number), one.kind,
-            _link(lat_deg, lon_deg),
-            compass(values["heading_deg"]), f"{one.length_m:.0f}",
-            f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
-            "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
-    heads = ("#", "What", "Coordinates of the worst piece", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
-             "Perception", "Confidence", "Drives")
-    return html('<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 7))) + hint(
+    rows = [(number_button(marked[number - 1], number) if number <= len(marked) else str(number), one.kind,
+             _link(found, one.worst), *_visit_cells(found, one)) for number, one in enumerate(found.visits, start=1)]
+    return html('<div id="places">{}</div>', grid(_VISIT_HEADS, rows, words=(0, 1, 2, 3, 7))) + hint(
         f"Rough: above {found.above_m_per_km:.2f} m/km. A place has its number in all tables, on the map and in the "
         "curves.")
 
 
-def _link(lat_deg: float, lon_deg: float) -> Html:
-    return map_links(lat_deg, lon_deg, f"{lat_deg:.6f}, {lon_deg:.6f}")
+def _link(found: CombinedDrives, cell: int) -> Html:
+    return map_links(float(found.lat_deg[cell]), float(found.lon_deg[cell]), _coordinates(found, cell))
 
 
 def _rows(found: CombinedDrives) -> Iterator[WindowRecord]:

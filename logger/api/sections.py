@@ -78,15 +78,22 @@ class Sections(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the sections along each drive."""
-        return charts(self._drives)
+        found: list[Chart] = []
+        for one in self._drives:
+            known = np.isfinite(one.figures.iri_m_per_km)
+            if known.any():
+                middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
+                found.append(Curves(_title(one), "distance [m]", "IRI [m/km]", (
+                    Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
+        return found
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the rows in the format of the file's ending."""
         write_layer(self.layer(), path)
 
     def layer(self) -> Layer:
-        """Rows with places, for the formats of ``convert``."""
-        return sections_layer(self._drives)
+        """Rows with places, for the formats of ``convert``; ``t_utc`` is when the first window of each began."""
+        return Layer("sections", FIELDS, tuple(feature for one in self._drives for feature in _features(one)))
 
 
 def sections_of(question: SectionsQuestion) -> Sections:
@@ -204,10 +211,9 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
     edges_m = first_m + length_m * first + even_edges(
         float(windows.end_m[-1] - first_m - length_m * first), length_m)
     found = in_sections(windows, edges_m)
-    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
     counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
     yield DriveSections(log, number, counted_records, measure_m[kept], found, in_sections(windows, edges_m[[0, -1]]),
-                        condition, np.minimum(edges_m[1:], windows.end_m[-1]),
+                        _conditions(found), np.minimum(edges_m[1:], windows.end_m[-1]),
                         "along" if direction == ALONG else "against")
 
 
@@ -229,13 +235,17 @@ def localized(drive: DriveSections, limit_m_per_km: float) -> list[Area]:
     return areas(drive.middle_m, windows.iri_m_per_km, limit_m_per_km, windows.iri_errors.std, beyond_m)
 
 
+def _conditions(found: RoadSections) -> tuple[str, ...]:
+    return tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
+
+
 def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:
     windows = windows_of(records)
     edges_m = even_edges(float(windows.end_m[-1]), length_m)
     found = in_sections(windows, edges_m)
-    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
     return DriveSections(log, number, records, (windows.start_m + windows.end_m) / 2, found,
-                         in_sections(windows, edges_m[[0, -1]]), condition, np.minimum(edges_m[1:], windows.end_m[-1]))
+                         in_sections(windows, edges_m[[0, -1]]), _conditions(found),
+                         np.minimum(edges_m[1:], windows.end_m[-1]))
 
 
 def lines(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
@@ -340,18 +350,6 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
                "comfort": None if a_w is None else comfort_word(a_w)}
 
 
-def charts(drives: Sequence[DriveSections]) -> list[Chart]:
-    """The IRI of the sections along each drive."""
-    found: list[Chart] = []
-    for one in drives:
-        known = np.isfinite(one.figures.iri_m_per_km)
-        if known.any():
-            middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
-            found.append(Curves(_title(one), "distance [m]", "IRI [m/km]", (
-                Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
-    return found
-
-
 _KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known_m": Kind.NUMBER,
           "iri_m_per_km": Kind.NUMBER, "iri_std_m_per_km": Kind.NUMBER, "a_w_mps2": Kind.NUMBER,
           "speed_mps": Kind.NUMBER, "worst_m_per_km": Kind.NUMBER, "worst_at_m": Kind.NUMBER,
@@ -359,11 +357,6 @@ _KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known
 FIELDS = (Attribute("log", Kind.WORDS), Attribute("drive", Kind.COUNT), Attribute("t_utc", Kind.TIME),
           Attribute("direction", Kind.WORDS),
           *(Attribute(name, kind) for name, kind in _KINDS.items()))
-
-
-def sections_layer(drives: Sequence[DriveSections]) -> Layer:
-    """The sections of all drives; ``t_utc`` is when the first window of each began."""
-    return Layer("sections", FIELDS, tuple(feature for one in drives for feature in _features(one)))
 
 
 def _features(drive: DriveSections) -> Iterator[Feature]:

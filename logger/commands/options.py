@@ -248,7 +248,6 @@ def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None
 
 PAGE = ".html"
 PICTURES = (PAGE, *ENDINGS)
-HELP = "write a page with pictures; .png, .svg or .pdf: the pictures alone"
 
 
 def is_picture(path: Path) -> bool:

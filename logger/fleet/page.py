@@ -22,8 +22,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 from typing import Any
@@ -63,6 +61,7 @@ from logger.report.document import (
     section,
     tiles,
 )
+from logger.report.page import asset
 from logger.report.placed import damaged
 from logger.report.quantities import known
 from logger.report.summary import distance_words
@@ -370,18 +369,8 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     return document("A fleet's roads", [
         heading("A fleet's roads", under), _tiles(figures, sections), _map(), _rough(sections), _worse(sections),
         _cars(figures), data_block("data", data),
-    ], style=_shared("page.css") + _STYLE, loads=True,
-        script='"use strict";\n' + "".join(map(_shared, _SHARED)) + _own())
-
-
-@cache
-def _shared(name: str) -> str:
-    return (resources.files("logger.report") / "assets" / name).read_text("utf-8")
-
-
-@cache
-def _own() -> str:
-    return (resources.files("logger.fleet") / "assets" / "fleet.js").read_text("utf-8")
+    ], style=asset("page.css") + _STYLE, loads=True,
+        script='"use strict";\n' + "".join(map(asset, _SHARED)) + asset("fleet.js", "logger.fleet"))
 
 
 def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:

@@ -131,13 +131,13 @@ def page(files: Sequence[LoggedFile], base: Sequence[MapWay] = (), base_name: st
             "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
-    ], style=_asset("page.css"), script='"use strict";\n' + "".join(map(_asset, SCRIPTS)), images_from=host)
+    ], style=asset("page.css"), script='"use strict";\n' + "".join(map(asset, SCRIPTS)), images_from=host)
 
 
 @cache
-def _asset(name: str) -> str:
-    """A file of the page's script or style."""
-    return (resources.files("logger.report") / "assets" / name).read_text("utf-8")
+def asset(name: str, package: str = "logger.report") -> str:
+    """A file of a page's script or style, out of the assets of a package."""
+    return (resources.files(package) / "assets" / name).read_text("utf-8")
 
 
 def _sources(base_name: str, host: str) -> str:
@@ -434,8 +434,8 @@ _PLAIN: Sequence[tuple[str, float, int, Callable[[WindowRecord], float | None]]]
     ("mtvv_mps2", 1e2, 0, lambda record: record.mtvv_mps2),
     ("vdv_mps175", 1e2, 0, lambda record: record.vdv_mps175),
     ("crest_factor", 1e1, 0, lambda record: record.crest_factor),
-    ("iri_rank", 1, 0, lambda record: _rank(record.iri_class, tuple(IRI_CLASSES))),
-    ("comfort_rank", 1, 0, lambda record: _rank(record.comfort, COMFORT_NAMES)),
+    ("iri_rank", 1, 0, lambda record: _number_of(record.iri_class, tuple(IRI_CLASSES))),
+    ("comfort_rank", 1, 0, lambda record: _number_of(record.comfort, COMFORT_NAMES)),
     ("counts", 1, 0, counts),
 )
 
@@ -509,7 +509,7 @@ def _unwrapped(lon_deg: Array, origin_deg: float) -> Array:
     return (lon_deg - origin_deg + 180.0) % 360.0 - 180.0 + origin_deg
 
 
-def _rank(name: str, names: tuple[str, ...]) -> int | None:
+def _number_of(name: str, names: tuple[str, ...]) -> int | None:
     return names.index(name) if name in names else None
 
 

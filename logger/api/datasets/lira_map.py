@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.road_sets import REPEAT_COLUMNS, expected_files, from_folder, repeat_row
+from logger.api.road_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, from_folder, repeat_row
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
@@ -27,7 +27,6 @@ from logger.studies.study import Column, Item, Picture, Result, Study, Table, Wo
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
 _COLUMNS = ("timestamp", "value", "lat", "lng")
 _QUANTITIES = (DISTANCE, SIGNAL, LATITUDE, LONGITUDE)
-_WINDOWS_M = (10.0, 100.0)
 _CELL_M, _MOST_CELLS = 10.0, 1
 _STRETCH_CELLS, _STRETCH_MOST_M = 20, 4.0
 _MOST_BYTES = 64 << 20
@@ -63,7 +62,7 @@ def run(folder: Path, effort: Workload) -> Result:
     tables: list[Table] = []
     ours: list[list[float]] = []
     off_m_per_km: list[float] = []
-    for window_m in _WINDOWS_M:
+    for window_m in WINDOWS_M:
         rows = [row for one, other in pairs for row in _beside(one, other, window_m)]
         tables.append(Table(f"Windows of {window_m:g} m", REPEAT_COLUMNS, tuple(rows)))
         ours.append([row[3] for row in rows if isinstance(row[3], float)])

@@ -16,7 +16,7 @@ from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.store.formats.csv_table import CsvTable, Names, find_table, read_rows, shown
 from logger.store.formats.record_file import MAX_BYTES
-from logger.units import STANDARD_GRAVITY_MPS2
+from logger.units import KMH_MPS, KNOT_MPS, MPH_MPS, STANDARD_GRAVITY_MPS2
 
 ROLES = ("t", "x", "y", "z", "up", "gx", "gy", "gz", "lat", "lon", "speed")
 """What a column can be: time; acceleration along the recorder's own axes, or upwards, of a recorder with one axis;
@@ -25,7 +25,7 @@ AXES, GRAVITY, PLACE = ("x", "y", "z"), ("gx", "gy", "gz"), ("lat", "lon")
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
 ACCELERATION_UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": 1e-3 * STANDARD_GRAVITY_MPS2}
-SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600}
+SPEED_UNITS = {"m/s": 1.0, "km/h": KMH_MPS, "mph": MPH_MPS, "kn": KNOT_MPS}
 ANGLE_UNITS = {"deg": 1.0}
 SPELLINGS = {"m/s^2": "m/s2", "mps2": "m/s2", "m/s/s": "m/s2", "mps": "m/s", "kmh": "km/h", "kph": "km/h",
              "km/hr": "km/h", "knots": "kn", "µs": "us", "°": "deg", "degrees": "deg", "sec": "s", "seconds": "s"}

@@ -46,19 +46,26 @@ from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.iri import UNITS_M, unit_complaint
-from logger.store.formats.csv_table import find_table, parse_columns, place, read_rows, refuse_long_lines, shown, taken
+from logger.store.formats.csv_table import (
+    LINE_BYTES,
+    find_table,
+    parse_columns,
+    place,
+    read_rows,
+    refuse_long_lines,
+    shown,
+    taken,
+)
 from logger.store.formats.record_file import MAX_BYTES, TIME, laid_evenly
 from logger.units import FOOT_M
 
 Array = npt.NDArray[np.float64]
 
 MAX_CHANNELS = 1000
-MAX_SAMPLES = 50_000_000
 MAX_HEADER_LINES = 10_000
 MAX_HEADER_BYTES = 1024 * 1024
 MAX_NUMBERS = 50_000_000
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
-MAX_LINE = 64 * 1024
 
 _BLOCK_BYTES = 1024 * 1024
 _FIELD_CHARS = 20
@@ -173,7 +180,7 @@ class _Header:
         while True:
             end = data.find(b"\n", self.size)
             stop = end if end >= 0 else len(data)
-            text = data[self.size: min(stop, self.size + MAX_LINE)].decode("latin-1").rstrip()
+            text = data[self.size: min(stop, self.size + LINE_BYTES)].decode("latin-1").rstrip()
             self.size = min(stop + 1, len(data))
             self.lines += 1
             if text.upper() == "END":
@@ -200,7 +207,7 @@ class _Header:
             raise BadInput(f"{expected}, found {shown(self._second)}") from None
         if not 1 <= channels <= MAX_CHANNELS:
             raise BadInput(f"{expected}, found {channels} channels")
-        if not (samples == -1 or 1 <= samples <= MAX_SAMPLES):
+        if not (samples == -1 or 1 <= samples <= MOST_SAMPLES):
             raise BadInput(f"{expected}, found {samples} samples")
         if not SHORTEST_STEP <= step <= LONGEST_STEP:
             raise BadInput(f"{expected} above 0, found a step of {step:g}")
