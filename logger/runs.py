@@ -288,6 +288,11 @@ class Run:
         return self.track.two_tracks
 
     @property
+    def pushed(self) -> bool:
+        """Whether measured forces drive it."""
+        return bool(self.track.acts_on)
+
+    @property
     def timed(self) -> bool:
         """Whether it is driven by time: a rig, with no road, no speed and no distance."""
         return self.track.timed

@@ -204,7 +204,7 @@ def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str],
     not, ValueError as ``compose``."""
     for one in effects:
         try:
-            effect_file.check_on(vehicle, one, track.two_tracks, track.timed)
+            effect_file.check_on(vehicle, one, track.two_tracks, track.timed, bool(track.acts_on))
         except BadInput as error:
             raise BadInput(f"{said[one.effect.name]}: {error}") from None
     try:

@@ -42,7 +42,7 @@ from logger.identification.unknown_inputs import (
     read_input,
     run_and_name,
 )
-from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths
+from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths, as_it_is
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
@@ -133,11 +133,12 @@ class RoadInTime:
         return under
 
     def _profile(self, structure: Structure, speed_scale: float) -> Complex:
-        place = (speed_scale, structure.contact_patch_m, *structure.behind_m, *structure.left_m)
+        place = (speed_scale, structure.contact_patch_m, *structure.behind_m, *structure.left_m, structure.actuators)
         if place not in self._known:
             if len(self._known) > 2:
                 self._known.clear()
-            _, means = self._track.under_wheels(Way(self._way_m / speed_scale, self._time_s), structure)
+            track = as_it_is(self._track, (), structure.actuators)
+            _, means = track.under_wheels(Way(self._way_m / speed_scale, self._time_s), structure)
             self._known[place] = np.stack([self._transform(one) for one in means.T], axis=1)
         return self._known[place]
 

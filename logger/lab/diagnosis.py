@@ -283,14 +283,14 @@ def refit(posterior: Posterior, nominal: State) -> Baseline:
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
     runs = posterior.runs.runs
-    two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
+    driven = (all(run.two_tracks for run in runs), all(run.timed for run in runs), all(run.pushed for run in runs))
     by_road = all(run.facts.places_by == BY_ROAD for run in runs)
     at_rest = posterior.vehicle.model == "single_mass" and all(run.at_rest for run in runs)
     there = {one.effect.name for one in present}
     sensors = [run.facts.main for run in runs]
     found = {}
     for name, effect in effects.items():
-        why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
+        why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, *driven)
         if why is None and all(one.kind in effect.not_of for one in sensors):
             why = f"no {' or '.join(sorted({str(one.kind) for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.white_noise import Denoised, without_white_noise
-from logger.profiles.track import Stance, Way
+from logger.profiles.track import Actuators, Stance, Way
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -130,6 +130,15 @@ class Excitation:
     def acts_on(self) -> tuple[tuple[str, ...], ...]:
         """The parts that the forces act on."""
         return tuple(one.parts for one in self.forces)
+
+    def actuated(self, actuators: Actuators) -> Excitation:
+        """The same with the forces that act."""
+        if self.force_n is None:
+            return self
+        acting = self.force_n
+        for one in actuators:
+            acting = np.stack([one(self.rate_hz, force_n) for force_n in acting.T], axis=1)
+        return replace(self, force_n=acting)
 
     def forces_n(self, time_s: Array) -> Array:
         """The forces (M, f) at some times since the first sample of the record [s] [N]."""

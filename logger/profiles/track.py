@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +71,19 @@ Surface = tuple[Resurfaced, ...]
 """What is done to a profile, one after the other; nothing: the road is what its profile says."""
 
 
+class Actuator(Protocol):
+    """What a force is that differs from its record; equal for two that differ alike."""
+
+    def __call__(self, rate_hz: float, force_n: Array) -> Array:
+        """The force that acts (n,), of the one recorded (n,) at this rate [N]."""
+
+    def __hash__(self) -> int: ...
+
+
+Actuators = tuple[Actuator, ...]
+"""What is done to each force of a record, one after the other; nothing: what acts is what was recorded."""
+
+
 @dataclass(frozen=True, eq=False)
 class Way:
     """The way of a car in fine steps of time, (M,) each: where the front tires stand [m], and when, from the first
@@ -104,10 +117,15 @@ class Pushing(WheelTracks, Protocol):
     def acts_on(self) -> tuple[tuple[str, ...], ...]:
         """The parts that each of its forces acts on."""
 
+    def actuated(self, actuators: Actuators) -> WheelTracks:
+        """The forces that act, where they differ from their records."""
 
-def under_surface(track: WheelTracks, surface: Surface) -> WheelTracks:
-    """What moves the wheels where a road differs from its profile. A rig does what it was commanded."""
-    return track.resurfaced(surface) if surface and isinstance(track, Profiled) else track
+
+def as_it_is(track: WheelTracks, surface: Surface, actuators: Actuators) -> WheelTracks:
+    """What moves the wheels where a road differs from its profile, and a force from its record."""
+    if surface and isinstance(track, Profiled):
+        return track.resurfaced(surface)
+    return track.actuated(actuators) if actuators and isinstance(track, Pushing) else track
 
 
 def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:
@@ -133,6 +151,7 @@ class Track:
     start_m: float = 0.0
 
     timed = False
+    acts_on: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.spacing_m < np.inf or not np.isfinite(self.start_m):

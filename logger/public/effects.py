@@ -9,6 +9,7 @@ import sys
 from types import ModuleType
 
 from logger.vehicle.effect import (
+    ActuatorEffect,
     BodyEffect,
     DriveEffect,
     Effect,
@@ -27,6 +28,7 @@ from logger.vehicle.structure import Structure, hung
 from logger.vehicle.vehicle import Vehicle
 
 __all__ = [
+    "ActuatorEffect",
     "Between",
     "BodyEffect",
     "CornerLaws",

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.vehicle.effect import (
+    ActuatorEffect,
     BodyEffect,
     Chosen,
     DriveEffect,
@@ -126,6 +127,17 @@ class _Resurfaced:
         return self.effect.road(SimpleNamespace(**dict(self.values)), spacing_m, elevation_m)
 
 
+@dataclass(frozen=True)
+class _Actuated:
+    """What an effect does to a force."""
+
+    effect: ActuatorEffect
+    values: tuple[tuple[str, float], ...]
+
+    def __call__(self, rate_hz: float, force_n: Array) -> Array:
+        return self.effect.force(SimpleNamespace(**dict(self.values)), rate_hz, force_n)
+
+
 @dataclass(frozen=True, eq=False)
 class Response:
     """What a car did on a passage of N samples.
@@ -154,8 +166,10 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
         structure = replace(structure, sides=2)
     surface = tuple(_Resurfaced(one.effect, tuple(sorted(one.values.items())))
                     for one in ordered if isinstance(one.effect, RoadEffect))
-    if surface:
-        structure = replace(structure, surface=surface)
+    actuators = tuple(_Actuated(one.effect, tuple(sorted(one.values.items())))
+                      for one in ordered if isinstance(one.effect, ActuatorEffect))
+    if surface or actuators:
+        structure = replace(structure, surface=surface, actuators=actuators)
     for one in ordered:
         if isinstance(one.effect, BodyEffect):
             structure = one.effect.structure(one.p, structure)

@@ -3,9 +3,10 @@
 Problem: a car does more than its linear model, in some twenty ways that come alone and together; and users bring ways
 of their own. Simulation, fits, diagnosis and reports must not know any of them by name. Solution: an effect is one file
 that offers ``EFFECT``: a name, its parameters with units and bounds, a source, words on what it leaves in a
-measurement, and one function. There are seven kinds of function, one for each place between road and record:
+measurement, and one function. There are eight kinds of function, one for each place between road and record:
 
     RoadEffect      the road under the wheels            profile written -> profile of the road
+    ActuatorEffect  what pushes a rig                    force recorded -> force that acts
     DriveEffect     where the car was                    distance recorded -> distance driven
     VehicleEffect   the numbers of the car               vehicle -> vehicle
     BodyEffect      what hangs on the body               structure -> structure
@@ -223,8 +224,10 @@ class Effect(ABC):
         """Why it cannot be there in this vehicle on this road; None if it can."""
         return None
 
-    def obstacle_on(self, vehicle: Vehicle, two_tracks: bool, timed: bool) -> str | None:
-        """The same where runs may be driven by time (``timed``)."""
+    def obstacle_on(self, vehicle: Vehicle, two_tracks: bool, timed: bool, pushed: bool) -> str | None:
+        """The same where runs may be driven by time (``timed``), or by forces (``pushed``)."""
+        if isinstance(self, ActuatorEffect) and not pushed:
+            return "it needs a rig that a measured force drives"
         if self.needs_wheel and vehicle.model in OWN_NAMES:
             return f"a {vehicle.model.replace('_', ' ')} has no wheel, no tire and no body that turns"
         if (self.needs_body or self.against_ground) and vehicle.model == "component":
@@ -286,6 +289,14 @@ class RoadEffect(Effect):
     @abstractmethod
     def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
         """Elevations of the road itself (n,) along one track, of those in its profile (n,) at this spacing [m]."""
+
+
+class ActuatorEffect(Effect):
+    """A force that drives a rig, where another one acts than the one that was recorded."""
+
+    @abstractmethod
+    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
+        """The force that acts (n,), of the one that was recorded (n,) at this rate [N]."""
 
 
 class VehicleEffect(Effect):

@@ -27,6 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.vehicle.effect import (
+    ActuatorEffect,
     BodyEffect,
     DriveEffect,
     Effect,
@@ -92,6 +93,12 @@ class _WatchedRoad(_Watched, RoadEffect):
     def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
         with self._blame(), np.errstate(all="ignore"):
             return _numbers("road", self._own.road(p, spacing_m, elevation_m.copy()), elevation_m)
+
+
+class _WatchedActuator(_Watched, ActuatorEffect):
+    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
+        with self._blame(), np.errstate(all="ignore"):
+            return _numbers("force", self._own.force(p, rate_hz, force_n.copy()), force_n)
 
 
 class _WatchedDrive(_Watched, DriveEffect):
@@ -167,8 +174,9 @@ class _WatchedRecord(_Watched, RecordEffect):
 
 
 _WATCHED: dict[type[Effect], type[_Watched]] = {
-    RoadEffect: _WatchedRoad, DriveEffect: _WatchedDrive, VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody,
-    ForceEffect: _WatchedForce, SensorEffect: _WatchedSensor, RecordEffect: _WatchedRecord,
+    RoadEffect: _WatchedRoad, ActuatorEffect: _WatchedActuator, DriveEffect: _WatchedDrive,
+    VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody, ForceEffect: _WatchedForce,
+    SensorEffect: _WatchedSensor, RecordEffect: _WatchedRecord,
 }
 
 
@@ -274,7 +282,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
-KINDS = (RoadEffect, DriveEffect, VehicleEffect, BodyEffect, ForceEffect, SensorEffect, RecordEffect)
+KINDS = tuple(_WATCHED)
 WORDS = ("name", "title", "source", "signature", "shown_by")
 # What a vehicle's file says of an effect beside its parameters.
 KEYS = ("name", "file", "standard_errors")
@@ -342,6 +350,8 @@ def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
     """Ask a watched effect once on a car, as far as a simulation does."""
     if isinstance(effect, RoadEffect):
         effect.road(p, 0.1, 0.01 * np.sin(np.arange(0.0, 100.0, 0.1)))
+    elif isinstance(effect, ActuatorEffect):
+        effect.force(p, 100.0, 10.0 * np.sin(np.arange(0.0, 10.0, 0.01)))
     elif isinstance(effect, DriveEffect):
         effect.driven(p, np.linspace(0.0, 1000.0, 11))
     elif isinstance(effect, VehicleEffect):

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
-from logger.profiles.track import Pushing, Way, WheelTracks, under_surface
+from logger.profiles.track import Pushing, Way, WheelTracks, as_it_is
 from logger.vehicle.structure import Forces, Output, Structure, driven_outputs, pushed, straight_step
 
 Array = npt.NDArray[np.float64]
@@ -259,10 +259,11 @@ class Passage:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins; then further inputs of the structure, forces last."""
         place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface,
-                 structure.on_base, structure.held)
+                 structure.actuators, structure.on_base, structure.held)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
-            elevation, mean = under_surface(self.track, structure.surface).under_wheels(self._way, structure)
+            track = as_it_is(self.track, structure.surface, structure.actuators)
+            elevation, mean = track.under_wheels(self._way, structure)
             heights = np.arange(elevation.shape[1]) < len(structure.wheels) * (not structure.held)
             level = elevation[0, 0] * heights
             known = elevation - level, mean - level

@@ -35,7 +35,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import Surface
+from logger.profiles.track import Actuators, Surface
 from logger.vehicle.vehicle import Axle
 
 Array = npt.NDArray[np.float64]
@@ -168,6 +168,7 @@ class Structure:
     sides                       how many times the masses that a person gives are in it: twice, where a half car was
                                 made whole
     surface                     how the road that it meets differs from the profile that was written of it
+    actuators                   how the forces that act on it differ from those that were recorded
     on_base                     it is a mass on a base: the one corner's wheel is the base
     held                        it is a part that its bench moves: its place is the first of its inputs, those of a mass
                                 on a base, and its force is measured
@@ -188,6 +189,7 @@ class Structure:
     tires: Array
     sides: int = 1
     surface: Surface = ()
+    actuators: Actuators = ()
     on_base: bool = False
     held: bool = False
 

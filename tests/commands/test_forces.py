@@ -32,7 +32,8 @@ def noise(highest_hz: float, size: float, seed: int) -> CubicSpline:
 @dataclass(frozen=True)
 class Bench:
     """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further forces by its travel, and
-    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag."""
+    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag; and what an
+    orifice adds to the damper, by the square of its rate."""
 
     mass: float = 0.3
     spring: float = 30.0
@@ -42,6 +43,7 @@ class Bench:
     tire: float = 0.0
     guide_n: float = 0.0
     guide_drag: float = 0.0
+    orifice: float = 0.0
 
     @property
     def yaml(self) -> str:
@@ -62,6 +64,7 @@ class Bench:
                 wheel_m, wheel_mps = base(t), base(t, 1)
             travel_m, rate_mps = body_m - wheel_m, body_mps - wheel_mps
             force = self.spring * travel_m + self.damper * rate_mps + self.cubic * travel_m**3
+            force = force + self.orifice * rate_mps * np.abs(rate_mps)
             wheel = (force - self.tire * (wheel_m - base(t)) + on_wheel(t)) / (self.wheel or 1.0)
             guide = self.guide_n * np.tanh(body_mps / 0.001) + self.guide_drag * body_mps
             return np.stack([(on_body(t) - force - guide) / self.mass, wheel * (self.wheel > 0)])
@@ -332,6 +335,34 @@ def test_the_zero_of_the_force_on_a_hardening_spring_is_found(
     found = json.loads(capsys.readouterr().out)
     assert found["parameters"]["push_n"] == pytest.approx(off_n, rel=0.1)
     assert found["error_after"] < 0.3 * found["error_before"]
+
+
+def test_an_orifice_and_a_coil_that_saturates_are_found(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The first of them is in the vehicle's file; the other is added, and all of the motion is explained."""
+    true, command = Bench(orifice=2.0), noise(20.0, 0.6, 9)
+    measured = true.moved(NOTHING, lambda t: 0.8 * np.tanh(command(t) / 0.8), NOTHING)["accel_z_mps2"]
+    measured = measured + np.random.default_rng(8).normal(0.0, 2e-3 * measured.std(), len(measured))
+    run = written(tmp_path / "run", {"accel_z_mps2": measured}, {"force_n": command(TIME_S)}, BODY)
+    for one, other, number, is_there in (
+            ("quadratic_damping, quadratic_damping_n_s2_per_m2: 2", "force_limit", "limit_n", 0.8),
+            ("force_limit, limit_n: 0.8", "quadratic_damping", "quadratic_damping_n_s2_per_m2", 2.0)):
+        (tmp_path / "rig.yaml").write_text(f"{true.yaml}effects:\n- {{name: {one}}}\n")
+        assert main(["add-effect", other, "--vehicle", str(tmp_path / "rig.yaml"), "--out",
+                     str(tmp_path / f"{other}.yaml"), str(run), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["parameters"][number] == pytest.approx(is_there, rel=0.02)
+        assert found["error_after"] < 0.01
+
+
+def test_a_rig_that_no_force_drives_has_no_coil_that_saturates(tmp_path: Path) -> None:
+    table = noise(20.0, 0.01, 3)
+    run = written(tmp_path / "run", {"accel_z_mps2": Bench().moved(table, lambda t: 0.0 * t, NOTHING)["accel_z_mps2"]},
+                  {"elevation_m": table(TIME_S)}, "source: me\n")
+    (tmp_path / "rig.yaml").write_text(Bench().yaml)
+    with pytest.raises(BadInput, match="force_limit: it needs a rig that a measured force drives"):
+        main(["add-effect", "force_limit", "--vehicle", str(tmp_path / "rig.yaml"), "--out",
+              str(tmp_path / "out.yaml"), str(run)])
 
 
 def test_what_a_part_pulls_back_with_at_rest_is_found_beside_its_friction(

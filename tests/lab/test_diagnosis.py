@@ -175,7 +175,8 @@ def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named(
 
 
 def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: Diagnosis) -> None:
-    why = {name: EFFECTS[name].obstacle(CAR, False) for name in ("roll", "constant_force")}
+    why = {name: EFFECTS[name].obstacle_on(CAR, False, False, False) for name in (
+        "roll", "constant_force", "force_limit")}
     assert all(why.values())
     found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
     assert found == {"sensor_gain": ALREADY_PRESENT, **why}

@@ -42,9 +42,9 @@ def test_what_a_number_may_be_is_said_in_words() -> None:
 
 def test_what_needs_a_road_is_not_for_a_rig() -> None:
     car = read_vehicle(vehicle_file("rav4-2009"))
-    assert "driven by time" in str(EFFECTS["speed_scale"].obstacle_on(car, False, timed=True))
-    assert EFFECTS["speed_scale"].obstacle_on(car, False, timed=False) is None
-    assert EFFECTS["dry_friction"].obstacle_on(car, False, timed=True) is None
+    assert "driven by time" in str(EFFECTS["speed_scale"].obstacle_on(car, False, timed=True, pushed=False))
+    assert EFFECTS["speed_scale"].obstacle_on(car, False, timed=False, pushed=False) is None
+    assert EFFECTS["dry_friction"].obstacle_on(car, False, timed=True, pushed=False) is None
 
 
 def test_an_effect_is_at_a_bound_by_its_shape_and_not_by_its_strength() -> None:

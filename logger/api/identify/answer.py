@@ -222,7 +222,7 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
 
     for one in given.effects:
         check_on(given.vehicle, one, all(record.two_tracks for record in records),
-                 all(record.timed for record in records))
+                 all(record.timed for record in records), all(record.pushed for record in records))
     if words := slow_words([one.effect for one in given.effects]):
         question.warn(words)
     there = [one.effect.name for one in given.effects]

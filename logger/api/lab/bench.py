@@ -74,7 +74,7 @@ class Bench:
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
-        check_on(self.model.vehicle, one, self.two_tracks, self.timed)
+        check_on(self.model.vehicle, one, self.two_tracks, self.timed, self.pushed)
         if one.file is not None and not slow([one.effect]):
             predicted(one.file, self.model, self.runs, [one])
 
@@ -96,6 +96,11 @@ class Bench:
     def timed(self) -> bool:
         """Whether all runs are driven by time."""
         return all(run.timed for run in self.runs.runs)
+
+    @property
+    def pushed(self) -> bool:
+        """Whether forces drive all runs."""
+        return all(run.pushed for run in self.runs.runs)
 
     def compared(self) -> Comparison:
         """The model against the runs. BadInput when the vehicle lacks what it needs."""
@@ -343,7 +348,7 @@ def _try_own(found: Bench, files: Sequence[str]) -> None:
     """Try the effects of these files on the car, at the values that a search begins at."""
     for name, effect in found.effects.items():
         if found.files.get(name) in files and effect.obstacle_on(
-                found.model.vehicle, found.two_tracks, found.timed) is None:
+                found.model.vehicle, found.two_tracks, found.timed, found.pushed) is None:
             for values in effect.trials():
                 found.try_out(chosen(effect, values, file=found.files[name]))
 

@@ -72,7 +72,7 @@ def check_moves(word: str, model: Model, runs: SimulatedRuns) -> list[Array]:
     be on one of the runs, the model's motion grows without bound, or the road moves no car."""
     for run in runs.runs:
         for one in model.effects:
-            why = one.effect.obstacle_on(model.vehicle, run.two_tracks, run.timed)
+            why = one.effect.obstacle_on(model.vehicle, run.two_tracks, run.timed, run.pushed)
             if why is not None:
                 raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
     predictions = predicted(word, model, runs, model.effects)

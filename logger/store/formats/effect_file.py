@@ -61,10 +61,10 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
     return shipped_effects()[text], None
 
 
-def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool, timed: bool = False) -> None:
-    """Raise BadInput if the effect cannot be there in this car on this road, or rig (``timed``), or makes a car of it
-    that would tip over an axle; a user's own is tried on the car."""
-    obstacle = one.effect.obstacle_on(vehicle, two_tracks, timed)
+def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool, timed: bool = False, pushed: bool = True) -> None:
+    """Raise BadInput if the effect cannot be there in this car on this road, or rig (``timed``, ``pushed``
+    by forces), or makes a car of it that would tip over an axle; a user's own is tried on the car."""
+    obstacle = one.effect.obstacle_on(vehicle, two_tracks, timed, pushed)
     if obstacle is not None:
         raise BadInput(f"{one.effect.name}: {obstacle}")
     if one.file is not None:

@@ -1,0 +1,32 @@
+"""What pushes a rig has no more force than it has: a coil, a motor or a valve saturates.
+
+The command, or the current, was recorded as a force F; what acts is L tanh(F / L), which is F while it is small and no
+more than L.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from logger.vehicle.effect import ActuatorEffect, Array, Parameter, Scale, Sought
+
+
+class ForceLimit(ActuatorEffect):
+    name = "force_limit"
+    title = "a shaker, coil or motor that saturates"
+    parameters = (
+        Parameter("limit_n", 500.0, 1.0, 1e7, float("inf"), Scale.RECIPROCAL, (100.0, 500.0, 2500.0),
+                  "the most force that acts, of each that was recorded"),
+    )
+    source = "K. J. Astrom, L. Rundqwist, Proc. American Control Conference (1989) 1693: actuators that saturate"
+    signature = "strong pushes move it less than weak ones say, in proportion, at all frequencies alike"
+    shown_by = "push it weakly and strongly with the same motion"
+    sought = Sought.ON_RIGS
+
+    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
+        return np.asarray(p.limit_n * np.tanh(force_n / p.limit_n))
+
+
+EFFECT = ForceLimit()

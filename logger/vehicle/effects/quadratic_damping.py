@@ -1,0 +1,31 @@
+"""Oil through an orifice, and air, resist by the square of the rate: beside c v a damper has d v |v|."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.laws import CornerLaws
+
+
+class QuadraticDamping(ForceEffect):
+    name = "quadratic_damping"
+    title = "dampers whose force grows with the square of the rate: an orifice, or air"
+    parameters = (
+        Parameter("quadratic_damping_n_s2_per_m2", 2000.0, 0.0, 2e4, 0.0, Scale.LINEAR, (500.0, 4000.0),
+                  "force over the square of the suspension's rate"),
+    )
+    source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 5: flow through an orifice"
+    signature = "the damping grows with the motion: strong motions die away faster than weak ones"
+    shown_by = "move it weakly and strongly at the same frequency"
+    sought = Sought.ON_RIGS
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        size, damper = p.quadratic_damping_n_s2_per_m2, laws.damper
+        return replace(laws, damper=lambda rate_mps: damper(rate_mps) + size * rate_mps * np.abs(rate_mps))
+
+
+EFFECT = QuadraticDamping()
