@@ -14,11 +14,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import hypothesis
 import pytest
 
-from logger.demo.simulated_drive import DemoDrive, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from .support.drives.short_drive import SHORT_PLAN
+from .support.drives.simulated_drive import DemoDrive, record, simulate_drive
 
 # Byte code is kept, of the tests with their asserts and for the commands that they start: to make it again costs each
 # worker 13 s of a processor and each command one.

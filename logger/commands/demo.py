@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from logger.api.lab.question import CompareQuestion
 from logger.commands.lab import say, take, walk
 from logger.commands.options import on_screen, progress, warned, wipe
 from logger.commands.replay import replay
+from logger.demo import BEYOND, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_file, write_text
 from logger.report.quantities import columns, wrapped
@@ -107,19 +108,18 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.lab.bench import bench_with, require_compiler, sought_effects
     from logger.api.lab.loop import unsaid_lines
-    from logger.demo.lab_drives import VEHICLE
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", sought_effects().values())
     folders = unpack(out)
     drives = " ".join(map(str, folders))
     if unpack_only:
-        print(json.dumps({"vehicle": VEHICLE, "runs": list(map(str, folders))}) if as_json else
-              f"Two drives: {drives}\nNext: ridelog compare --vehicle {VEHICLE} {drives}")
+        print(json.dumps({"vehicle": LAB.vehicle, "runs": list(map(str, folders))}) if as_json else
+              f"Two drives: {drives}\nNext: ridelog compare --vehicle {LAB.vehicle} {drives}")
         return
     if not as_json:
         print(wrapped([_INTRODUCTION]))
-    given = bench_with(CompareQuestion(VEHICLE, folders, warn=warned))
+    given = bench_with(CompareQuestion(LAB.vehicle, folders, warn=warned))
     found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
     print(json.dumps(found.as_json(), allow_nan=False) if as_json else "\n".join(_answer(found.story)))
 
@@ -136,29 +136,23 @@ def unpack(out: Path) -> list[Path]:
 def _answer(story: Story) -> list[str]:
     """What the simulated car truly was, and what was found."""
     from logger.api.lab.loop import chapter
-    from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
 
-    sentence, table = truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
+    sentence, table = truth_beside(story, LAB)
     return [*chapter("The answer"), wrapped([sentence]), "", *table]
 
 
-def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Mapping[str, float]
-                 ) -> tuple[str, list[str]]:
-    """What a simulated car truly was, and what was found: a sentence, and the lines of a table.
-
-    effect, values    that it had
-    off               by which factor its numbers were not those of its file
-    """
+def truth_beside(story: Story, car: TrueCar) -> tuple[str, list[str]]:
+    """What a simulated car truly was, and what was found: a sentence, and the lines of a table."""
     from logger.report.quantities import numbers_of
 
     found = {one.effect.name for one in story.last.effects}
     rows = [("Number", "True", "Without", "With")]
-    rows += [(one.name, f"{off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
+    rows += [(one.name, f"{car.off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
-    numbers = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
-    mine = numbers_of(story.rounds[-1].addition.new[-1]) if effect in found else "nothing of the kind"
-    return (f"The drives were simulated. The car had {effect}, {numbers}; found: {mine}. Its numbers differed from its "
-            "file, in per cent:", columns(rows))
+    numbers = ", ".join(f"{name} {value:.3g}" for name, value in car.values.items())
+    mine = numbers_of(story.rounds[-1].addition.new[-1]) if car.effect in found else "nothing of the kind"
+    return (f"The drives were simulated. The car had {car.effect}, {numbers}; found: {mine}. Its numbers differed from "
+            "its file, in per cent:", columns(rows))
 
 
 PAGE, RUNS = "field.html", "runs"
@@ -191,16 +185,15 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     from logger.api.lab.bench import require_compiler
     from logger.api.lab.loop import as_json as story_json
     from logger.api.lab.loop import unsaid_lines
-    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
     from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
         require_compiler("ridelog demo --field", shipped_effects().values())
     unpacked("field.zip", out)
     first, fourth = [_dump(out, name) for name in DRIVES], _dump(out, FOURTH)
-    commands = _Commands(out, first, fourth, VEHICLE)
+    commands = _Commands(out, first, fourth, FIELD.vehicle)
     if unpack_only:
-        print(json.dumps({"vehicle": VEHICLE, "dumps": [*map(str, first), str(fourth)],
+        print(json.dumps({"vehicle": FIELD.vehicle, "dumps": [*map(str, first), str(fourth)],
                           "lines": [str(out / LINE), str(out / BEYOND)]}) if as_json else
               f"Four drives and two measured lines in {out}\nNext: {commands.extract()[0]}")
         return
@@ -208,11 +201,12 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     tell([wrapped(_ABOUT)])
     tell(_headed("Extract", "extract", *commands.extract()))
     extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]
-    before = _judged(out / RUNS / FOURTH, VEHICLE, "The fourth drive, by the file as it is", "before", commands, tell)
+    before = _judged(out / RUNS / FOURTH, FIELD.vehicle, "The fourth drive, by the file as it is", "before", commands,
+                     tell)
     story = _story(commands, out, tell)
-    last = story.rounds[-1].file if story.rounds else VEHICLE
+    last = story.rounds[-1].file if story.rounds else FIELD.vehicle
     after = _judged(out / RUNS / FOURTH, last, "The fourth drive, by the last file", "after", commands, tell)
-    page, sentence, table = out / PAGE, *_truth(story)
+    page, sentence, table = out / PAGE, *truth_beside(story, FIELD)
     _write_page(page, out, story, before, after, sentence)
     tell(_ending(story, before, after, page))
     tell(["", "=== The answer ===", "", wrapped([sentence]), "", *table])
@@ -256,8 +250,6 @@ class _Commands:
         self._listed = " ".join(map(str, self.runs))
 
     def extract(self) -> tuple[str, str]:
-        from logger.demo.field_drives import BEYOND, LINE
-
         runs = self._out / RUNS
         return (f"ridelog extract {' '.join(map(str, self._first))} --out {runs} --profile {self._out / LINE}",
                 f"ridelog extract {self._fourth} --out {runs} --profile {self._out / BEYOND}")
@@ -335,7 +327,6 @@ def _essential(lines: list[str]) -> Iterator[str]:
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
     from logger.api.extraction import RATE_HZ
     from logger.api.lab.loop import field_page
-    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
     from logger.report.maps import MapWay
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
@@ -346,7 +337,7 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
         _, columns = read_columns(out / RUNS / name / DRIVE)
         lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
         driven.append(MapWay(name, lat_deg, lon_deg))
-    write_text(file, field_page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story,
+    write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, measured, driven, story,
                                 before,
                           after, [sentence.partition(" Its numbers")[0]]))
 
@@ -358,16 +349,8 @@ def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> 
             wrapped([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
 
 
-def _truth(story: Story) -> tuple[str, list[str]]:
-    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
-
-    return truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
-
-
 def _truth_json() -> dict[str, Any]:
-    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
-
-    return {"effect": EFFECT, "parameters": dict(EFFECT_VALUES), "numbers_times": dict(OFF)}
+    return {"effect": FIELD.effect, "parameters": dict(FIELD.values), "numbers_times": dict(FIELD.off)}
 
 
 def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:

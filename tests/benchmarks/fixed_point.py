@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from logger.demo.simulated_drive import DrivePlan, RoadStretch, simulate_drive
 from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FULL_SCALE_MPS2, FULL_SCALE_SLOPE, FixedFilter, fixed_cascade
 from logger.dsp.weightings.wk import WEIGHTING
@@ -25,6 +24,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
 
+from ..support.drives.simulated_drive import DrivePlan, RoadStretch, simulate_drive
 from .figures import Figures
 
 Floats = np.ndarray

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from drivers.dump import Event, open_dump
-from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
+from ..support.drives.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from .figures import Figures
 
 STEP_US = 10_000

@@ -21,10 +21,10 @@ from itertools import product
 from pathlib import Path
 
 from drivers.accelerometers.bma220 import USUAL_OVERSAMPLE
-from logger.demo.simulated_drive import LINES, PLAN, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
+from ..support.drives.simulated_drive import LINES, PLAN, DrivePlan, record, simulate_drive
 from .figures import Figures
 from .noise import ASSUMED_MPS2, wider
 

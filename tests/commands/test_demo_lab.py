@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from logger.commands import demo
-from logger.demo import lab_drives
 from logger.store.formats.drive_file import read_run
 
 from ..support.command import called
+from ..support.drives import lab_drives
 
 DOC = Path(__file__).parents[2] / "docs" / "lab.md"
 

@@ -14,7 +14,11 @@ import yaml
 
 from drivers.dump import DumpWriter, open_dump
 from drivers.readings import GPS, Event
-from logger.demo.simulated_drive import (
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+
+from ..support.command import called
+from ..support.drives.simulated_drive import (
     LEAD_M,
     SPACING_M,
     DemoDrive,
@@ -24,10 +28,6 @@ from logger.demo.simulated_drive import (
     record,
     simulate_drive,
 )
-from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
-
-from ..support.command import called
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.demo.simulated_drive import LEAD_M, SPACING_M, DemoDrive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from ..support.command import called
 from ..support.drives.phones import LAYOUTS, Phone, phone_in, phyphox, rotation, table
+from ..support.drives.simulated_drive import LEAD_M, SPACING_M, DemoDrive, DrivePlan, RoadStretch, simulate_drive
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from drivers.readings import GPS, Event
-from logger.demo.simulated_drive import DemoDrive, DrivePlan, Reception, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_drive
 from logger.store.formats.vehicle_file import read_vehicle
 
 from ..support.command import called
+from ..support.drives.simulated_drive import DemoDrive, DrivePlan, Reception, RoadStretch, record, simulate_drive
 
 LASTS_S = 75.0
 PLAN = DrivePlan(

@@ -10,10 +10,9 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
+import logger.demo
 from drivers.dump import open_dump
 from logger.commands.demo import unpacked
-from logger.demo import field_drives
-from logger.demo.simulated_drive import RoadStretch, body_acceleration, build_road, drive_along, sensed_acceleration
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.profile_file import read_places, read_profile
@@ -21,7 +20,16 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-SHIPPED = Path(field_drives.__file__).parent / "field.zip"
+from ..support.drives import field_drives
+from ..support.drives.simulated_drive import (
+    RoadStretch,
+    body_acceleration,
+    build_road,
+    drive_along,
+    sensed_acceleration,
+)
+
+SHIPPED = Path(logger.demo.__file__).parent / "field.zip"
 
 
 def test_the_archive_is_small_and_has_both_sensors(tmp_path: Path) -> None:
@@ -31,7 +39,7 @@ def test_the_archive_is_small_and_has_both_sensors(tmp_path: Path) -> None:
         if path.name.endswith(".dump.gz"):
             with open_dump(path) as dump:
                 kinds.append(dump.header.accelerometer["driver"])
-                assert dump.header.vehicle == field_drives.VEHICLE
+                assert dump.header.vehicle == logger.demo.FIELD.vehicle
                 assert sum(1 for _ in dump) > 4000 and not dump.torn_tail
     assert kinds == ["pasco", "bma220", "pasco", "bma220"]
     assert {path.name for path in tmp_path.iterdir()} == {

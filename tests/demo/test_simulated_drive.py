@@ -9,9 +9,16 @@ import pytest
 from pynmeagps import NMEAParseError, NMEAReader
 from scipy import signal
 
+import logger.demo
 from drivers.dump import open_dump
-from logger.demo import simulated_drive
-from logger.demo.simulated_drive import (
+from logger.roads import iso8608
+from logger.roads.iri import iri
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.models import half_car
+
+from ..support.drives import simulated_drive
+from ..support.drives.simulated_drive import (
     LEAD_M,
     PLAN,
     SPACING_M,
@@ -22,14 +29,9 @@ from logger.demo.simulated_drive import (
     record,
     simulate_drive,
 )
-from logger.roads import iso8608
-from logger.roads.iri import iri
-from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.models import half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
-SHIPPED = Path(simulated_drive.__file__).parent / "drive.dump.gz"
+SHIPPED = Path(logger.demo.__file__).parent / "drive.dump.gz"
 SHORT = DrivePlan(speed_knots=((0, 10), (10, 10), (20, 15), (30, 15)),
                   stretches=(RoadStretch(100, 50), RoadStretch(1, 200)))
 

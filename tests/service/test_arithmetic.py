@@ -6,11 +6,11 @@ from dataclasses import fields, replace
 
 import pytest
 
-from logger.demo.simulated_drive import DemoDrive
 from logger.records import WindowRecord
 from logger.service.config import Config, PipelineConfig
 
 from ..support.drives.replay import rows_of
+from ..support.drives.simulated_drive import DemoDrive
 
 
 def numbers(record: WindowRecord) -> dict[str, float]:

@@ -10,7 +10,6 @@ import pytest
 
 from logger.comfort.iso2631 import comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RideFigures, Uncertain
-from logger.demo.simulated_drive import DemoDrive
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.windows import Window
 from logger.estimation.noise_belief import NoiseBelief
@@ -21,6 +20,7 @@ from logger.service.config import Config, GpsConfig
 from logger.service.signal_chain import ComfortColumns, word_of
 
 from ..support.drives.replay import rows_of
+from ..support.drives.simulated_drive import DemoDrive
 
 GAIN = np.abs(WEIGHTING.response(np.linspace(0.0, 50.0, 1025)))
 STEP_MPS2 = 0.613

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.dump import Event
-from logger.demo.simulated_drive import DemoDrive, simulate_drive
 from logger.errors import BadInput
 from logger.service.config import Config, GpsConfig, PipelineConfig
 from logger.service.event_core import STEP_US
@@ -22,6 +21,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 
 from ..support.drives.replay import Rows, core_for, rows_of
 from ..support.drives.short_drive import SHORT_PLAN
+from ..support.drives.simulated_drive import DemoDrive, simulate_drive
 from ..support.faults.sensors import checked
 from ..support.slow import slow
 

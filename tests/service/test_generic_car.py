@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from drivers.dump import DumpWriter
-from logger.demo.simulated_drive import DemoDrive
 from logger.service import wiring
 from logger.service.config import Config, load_config
 from logger.shipped import vehicle_file
@@ -22,6 +21,7 @@ from logger.vehicle.published_cars import generic_car
 
 from ..support.command import called
 from ..support.drives.replay import rows_of
+from ..support.drives.simulated_drive import DemoDrive
 
 WHEELBASE_M = 2.94  # of the car that the drive was made with
 

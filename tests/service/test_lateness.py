@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from logger.demo.simulated_drive import DrivePlan, Reception, RoadStretch, simulate_drive
 from logger.service.config import Config, GpsConfig
 from logger.service.pipeline import FIX_DELAY_US, LONGEST_LAG_US, longest_wait_us
 from logger.shipped import vehicle_file
@@ -15,6 +14,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import US_PER_S
 
 from ..support.drives.replay import core_for
+from ..support.drives.simulated_drive import DrivePlan, Reception, RoadStretch, simulate_drive
 
 ROOT = Path(__file__).resolve().parents[2]
 

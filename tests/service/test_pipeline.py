@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from drivers.accelerometers.bma220 import Bma220Decoder
-from logger.demo.simulated_drive import DemoDrive
 from logger.dsp.resample import GridResampler
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.geodesy import EARTH_RADIUS_M
@@ -18,6 +17,7 @@ from logger.service.config import Config, GpsConfig
 from logger.shipped import vehicle_file
 
 from ..support.drives.replay import rows_of
+from ..support.drives.simulated_drive import DemoDrive
 
 CONFIG = Config(gps=GpsConfig(latency_s=0.15), vehicle=vehicle_file("rav4-2009"))
 

@@ -21,9 +21,10 @@ from types import TracebackType
 from typing import Self
 
 from drivers.dump import DumpHeader, DumpWriter, Event, open_dump
-from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+
+from ...support.drives.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 
 FAST_MPS, SLOW_MPS = 20.0, 14.0
 SPEED_CHANGE_S = 30.0

@@ -16,9 +16,10 @@ from itertools import pairwise
 import numpy as np
 
 from drivers.dump import DumpHeader, Event
-from logger.demo.simulated_drive import GPS_BAUD, PLAN, STEP_S, DriveMotion, Reception, simulate_drive, transmit
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+
+from .simulated_drive import GPS_BAUD, PLAN, STEP_S, DriveMotion, Reception, simulate_drive, transmit
 
 START_US = 41_300_000
 CLOCK_RATE = 1.0 + 20e-6

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.demo.simulated_drive import DemoDrive
 from logger.units import STANDARD_GRAVITY_MPS2 as G
+
+from .simulated_drive import DemoDrive
 
 
 def rotation(rng: np.random.Generator) -> np.ndarray:

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 
 from drivers.dump import Event
-from logger.demo.simulated_drive import DemoDrive, DrivePlan, RoadStretch, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from .replay import Rows, rows_of
+from .simulated_drive import DemoDrive, DrivePlan, RoadStretch, simulate_drive
 
 BEGIN_S, SECONDS = 10, 110
 SPEED_MPS = 15.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from logger.demo.simulated_drive import DrivePlan, Reception, RoadStretch, SpeedBump
+from .simulated_drive import DrivePlan, Reception, RoadStretch, SpeedBump
 
 SHORT_PLAN = DrivePlan(
     speed_knots=((0, 0), (3, 0), (9, 10), (30, 12), (36, 0), (41, 0), (47, 14), (70, 14)),

@@ -26,7 +26,6 @@ from unittest.mock import patch
 
 from drivers.dump import Event, intact_bytes, open_dump
 from logger.commands.status import advice, screen
-from logger.demo.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -34,6 +33,7 @@ from logger.store.integrity import verify
 from logger.store.log.log_writer import LogName
 from logger.store.log.row_format import read_log
 
+from ..drives.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
 from .trials import Found, Hazard, found
 
 PATIENCE_S = 60.0

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from drivers.dump import open_dump
-from logger.demo.simulated_drive import record, simulate_drive
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -25,6 +24,7 @@ from logger.store.log.row_format import HEADER, format_row
 from ..command import called
 from ..drives.logged_rows import repeated_drives
 from ..drives.short_drive import SHORT_PLAN
+from ..drives.simulated_drive import record, simulate_drive
 from . import fields
 from .field_targets import dump_lines, table
 from .mutation import Target

@@ -1,10 +1,8 @@
-"""Makes the drives of ``ridelog demo --field``: ``python -m logger.demo.field_drives FILE.zip``.
+"""Makes the drives of ``ridelog demo --field``: ``python -m tests.support.drives.field_drives FILE.zip``.
 
 Three passes over a measured street and a fourth drive over the street beyond, as the bytes that a recorder in a car
 would have kept: two drives with a BMA220, two with an accelerometer on a serial line, each beside a GPS receiver whose
-fixes are noisy and late. All of it is simulated. The car differs from what its file says in two ways: its masses,
-springs and dampers are off by up to 3 %, as those of any car are; and it has one physical effect that the file does
-not know. Readers of the demo should find out which before they read on here.
+fixes are noisy and late. All of it is simulated; what the car truly is says ``logger.demo``.
 """
 
 from __future__ import annotations
@@ -19,8 +17,16 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 import numpy as np
 
-from logger.demo.lab_drives import LONG_AGO
-from logger.demo.simulated_drive import (
+from logger.demo import BEYOND, FIELD, FOURTH, LINE
+from logger.files import write_file
+from logger.shipped import vehicle_file
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.effect import chosen
+from logger.vehicle.named_parameters import changed, read
+
+from .lab_drives import LONG_AGO
+from .simulated_drive import (
     DEFAULT,
     LEAD_M,
     LINES,
@@ -34,28 +40,7 @@ from logger.demo.simulated_drive import (
     record,
     simulate_drive,
 )
-from logger.files import write_file
-from logger.shipped import vehicle_file
-from logger.store.formats.effect_file import shipped_effects
-from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.effect import chosen
-from logger.vehicle.named_parameters import changed, read
 
-VEHICLE = "rav4-2009"
-EFFECT, EFFECT_VALUES = "dry_friction", {"friction_force_n": 150.0}
-OFF: Mapping[str, float] = {
-    "sprung_mass_kg": 1.015, "pitch_inertia_kg_m2": 0.98, "front.unsprung_mass_kg": 1.02,
-    "front.suspension_stiffness_n_per_m": 0.98, "front.suspension_damping_n_s_per_m": 1.02,
-    "front.tire_stiffness_n_per_m": 0.98, "rear.unsprung_mass_kg": 0.98,
-    "rear.suspension_stiffness_n_per_m": 1.02, "rear.suspension_damping_n_s_per_m": 0.97,
-    "rear.tire_stiffness_n_per_m": 1.015,
-}
-"""By which factor the car's numbers are not what its file says."""
-
-DRIVES = ("first", "second", "third")
-FOURTH = "fourth"
-LINE, BEYOND = "line.csv", "beyond.csv"
-"""What was measured: the street of the first three drives, and the one beyond of the fourth."""
 LINES_M: Mapping[str, tuple[float, float]] = {LINE: (60.0, 560.0), BEYOND: (600.0, 1200.0)}
 """From where to where, as the way goes."""
 _PLACE_EVERY = 200  # rows of a line
@@ -97,9 +82,9 @@ def street() -> Road:
 
 def drive(name: str) -> DemoDrive:
     """One of the drives, with its truth."""
-    given = read_vehicle(vehicle_file(VEHICLE))
-    true = changed(given, {one: factor * read(given, one) for one, factor in OFF.items()})
-    return simulate_drive(PLANS[name], true, [chosen(shipped_effects()[EFFECT], EFFECT_VALUES)], street())
+    given = read_vehicle(vehicle_file(FIELD.vehicle))
+    true = changed(given, {one: factor * read(given, one) for one, factor in FIELD.off.items()})
+    return simulate_drive(PLANS[name], true, [chosen(shipped_effects()[FIELD.effect], FIELD.values)], street())
 
 
 def line(name: str, driven: DemoDrive) -> str:

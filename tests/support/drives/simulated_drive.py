@@ -1,8 +1,8 @@
 """A drive that never took place, as the bytes a recorder would have written.
 
-``python -m logger.demo.simulated_drive FILE`` makes the one that ships with ridelog (``PLAN``): not quite six minutes
-and 4.5 km in a 2009 RAV4 near College Park, Maryland: town streets, a red light, a fast smooth road with a long loss of
-GPS, a rough lane with a speed bump, and home.
+``python -m tests.support.drives.simulated_drive FILE`` makes the one that ships with ridelog (``PLAN``): not quite six
+minutes and 4.5 km in a 2009 RAV4 near College Park, Maryland: town streets, a red light, a fast smooth road with a long
+loss of GPS, a rough lane with a speed bump, and home.
 
 The logger needs drives whose truth is known: to show itself without hardware, and to be measured. A plan (speeds,
 roughness, bumps, lost fixes) becomes motion; the road moves a half car; its body acceleration and its position pass

@@ -1,15 +1,12 @@
-"""Makes the drives of the lab's tutorial: ``python -m logger.demo.lab_drives FILE.zip``.
+"""Makes the drives of the lab's tutorial: ``python -m tests.support.drives.lab_drives FILE.zip``.
 
 Two drives of forty seconds in a 2009 RAV4, over two poor town streets with speed bumps, slowly and less slowly. All of
-it is simulated. The car differs from what its file says in two ways: its masses, springs and dampers are off by up to
-3 %, as those of any car are; and it has one physical effect that the file does not know. Readers of the tutorial should
-find out which before they read on here.
+it is simulated; what the car truly is says ``logger.demo``.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +15,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
+from logger.demo import LAB
 from logger.files import make_folder, write_file
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
@@ -31,16 +29,6 @@ from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.simulate import Passage
 
-VEHICLE = "rav4-2009"
-EFFECT, EFFECT_VALUES = "progressive_spring", {"cubic_stiffness_n_per_m3": 2.5e6}
-OFF: Mapping[str, float] = {
-    "sprung_mass_kg": 1.01, "pitch_inertia_kg_m2": 0.98, "front.unsprung_mass_kg": 1.01,
-    "front.suspension_stiffness_n_per_m": 0.98, "front.suspension_damping_n_s_per_m": 1.02,
-    "front.tire_stiffness_n_per_m": 0.985, "rear.unsprung_mass_kg": 0.98,
-    "rear.suspension_stiffness_n_per_m": 1.01, "rear.suspension_damping_n_s_per_m": 0.98,
-    "rear.tire_stiffness_n_per_m": 1.015,
-}
-"""By which factor the car's numbers are not what its file says."""
 RATE_HZ, LASTS_S, SPACING_M = 100, 40, 0.1
 _GD_N0_CM3 = 30.0
 _NOISE_MPS2 = 0.05
@@ -73,9 +61,9 @@ def write_run(folder: Path, plan: DemoDrive) -> None:
     wander = np.cumsum(rng.normal(0, _WANDER_M / np.sqrt(RATE_HZ), len(time_s)))
     smooth = np.convolve(np.pad(wander, RATE_HZ, "edge"), np.full(2 * RATE_HZ + 1, 1 / (2 * RATE_HZ + 1)), "valid")
     track = road(plan, float(distance[-1]) + 20.0)
-    vehicle = read_vehicle(vehicle_file(VEHICLE))
-    true = changed(vehicle, {name: factor * read(vehicle, name) for name, factor in OFF.items()})
-    car = compose(true, [chosen(shipped_effects()[EFFECT], EFFECT_VALUES)])
+    vehicle = read_vehicle(vehicle_file(LAB.vehicle))
+    true = changed(vehicle, {name: factor * read(vehicle, name) for name, factor in LAB.off.items()})
+    car = compose(true, [chosen(shipped_effects()[LAB.effect], LAB.values)])
     accel = recorded(car, Passage(track, RATE_HZ, distance + smooth)) + rng.normal(0, _NOISE_MPS2, len(time_s))
     make_folder(folder)
     write_drive(folder / DRIVE, {"t_s": time_s, "accel_z_mps2": np.round(accel, 3), "speed_mps": speed,
