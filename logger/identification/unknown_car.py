@@ -145,8 +145,8 @@ class Roads:
 
 @dataclass(frozen=True, eq=False)
 class LearnedCar:
-    """Coordinates (p,) with their covariance (p, p); the roads; and the logarithm of the posterior density there with
-    the roads integrated out (Laplace)."""
+    """Coordinates (p,) with their covariance (p, p); the roads; and the logarithm of the drives' evidence, with car and
+    roads integrated out (Laplace), up to a constant of the drives."""
 
     knowledge: CarKnowledge
     x: Array
@@ -233,15 +233,18 @@ class UnknownCar:
         wheels, and with front or rear ones that hop faster."""
         turned = np.zeros(len(self.knowledge.mean))
         turned[[NUMBERS.index(f"{end}.hop_hz") for end in ("front", "rear")]] = 0.5 * _HOPS_APART, -0.5 * _HOPS_APART
-        return max((self.fit_from(self.knowledge.mean + sign * turned) for sign in (0, 1, -1)),
-                   key=lambda one: one.log_evidence)
+        return self.fit_of([self.knowledge.mean + sign * turned for sign in (0, 1, -1)])
 
-    def fit_from(self, start: Array, held: Sequence[int] = ()) -> LearnedCar:
-        """The same from one start. ``held``: coordinates that stay there."""
+    def fit_of(self, starts: Sequence[Array]) -> LearnedCar:
+        """The same, the best of searches from these starts."""
+        return max(map(self.fit_from, starts), key=lambda one: one.log_evidence)
+
+    def fit_from(self, start: Array) -> LearnedCar:
+        """The same from one start."""
         x = start.copy()
         roads, value = self.with_blocks(x, self.start(x))
         damping, converged = 1e-3, False
-        step = _Step(self, x, roads, held)
+        step = _Step(self, x, roads)
         for _ in range(_MOST_ROUNDS):
             for _ in range(_MOST_HALVINGS):
                 tried, moved = step.taken(damping)
@@ -253,12 +256,12 @@ class UnknownCar:
                 converged = True
                 break
             gain, value, x, roads, damping = new - value, new, tried, tried_roads, damping / 6
-            step = _Step(self, x, roads, held)
+            step = _Step(self, x, roads)
             if gain < _SMALL_GAIN:
                 converged = True
                 break
-        return LearnedCar(self.knowledge, x, step.covariance, roads, value + step.log_volume, converged)
-
+        known = 0.5 * float(np.linalg.slogdet(self.knowledge.precision)[1])
+        return LearnedCar(self.knowledge, x, step.covariance, roads, value + known + step.log_volume, converged)
 
     def is_impulsive(self, x: Array) -> npt.NDArray[np.bool_]:
         """Blocks (b,) in whose spectrum a car with these coordinates shows a pothole, a joint or a kerb.
@@ -318,16 +321,12 @@ def _solved(moments: Array, right: Array) -> Array:
 class _Step:
     """Score and information of car and stretches where the blocks are at their most probable."""
 
-    def __init__(self, problem: UnknownCar, x: Array, roads: Roads, held: Sequence[int] = ()) -> None:
+    def __init__(self, problem: UnknownCar, x: Array, roads: Roads) -> None:
         self._x, self._roads, self._problem = x, roads, problem
-        self._free = np.array([one for one in range(len(x)) if one not in set(held)], dtype=int)
         gains = problem.gains(x)
         slopes = np.zeros((*gains.shape, len(x)))
-        for one in self._free:
-            if one < len(x) - 1:
-                moved = x.copy()
-                moved[one] += _STEP
-                slopes[..., one] = np.log(problem.gains(moved) / gains) / _STEP
+        for one, step in enumerate(_STEP * np.eye(len(x))[:-1]):
+            slopes[..., one] = np.log(problem.gains(x + step) / gains) / _STEP
         count, stretches = len(problem.spectra), problem.stretches
         self._outer = np.zeros((stretches, len(x) + 1, len(x) + 1))
         self._score = np.zeros((stretches, len(x) + 1))
@@ -348,7 +347,7 @@ class _Step:
         outer = np.empty((*share.shape, len(x) + 1))       # derivatives of the logarithm of what is expected
         outer[..., 0] = share * slope
         outer[..., 1:-1] = share[..., None] * slopes[speed][..., :-1]
-        outer[..., -1] = (1 - share) * (len(x) - 1 in self._free)
+        outer[..., -1] = 1 - share
         weighted = outer * (weight * share)[..., None]
         moments = _moments(weight * share**2, slope, _PRECISION)
         coupling = np.stack([weighted.sum(axis=1), np.einsum("bkj,bk->bj", weighted, slope)], axis=1)
@@ -365,7 +364,7 @@ class _Step:
         own = by_road.sum(axis=1), (by_road * slope).sum(axis=1)
         gradient[:, 0] += own[1]
         gradient[:, 1:-1] += np.einsum("bk,bkj->bj", by_road, slopes[speed][..., :-1])
-        gradient[:, -1] += by_noise.sum(axis=1) * (len(x) - 1 in self._free)
+        gradient[:, -1] += by_noise.sum(axis=1)
         gradient -= eliminated[:, 0] * own[0][:, None] + eliminated[:, 1] * own[1][:, None]
         # the blocks' own scores are zero but for what is known before of them
         known = np.stack([(roads.level[part] - _LEVEL), roads.own[part]], axis=1) * _PRECISION
@@ -397,40 +396,30 @@ class _Step:
 
     @property
     def covariance(self) -> Array:
-        """Of the car's coordinates (p, p); 0 of those that are held.
+        """Of the car's coordinates (p, p).
 
         Potholes and levels that change within a block make scores vary more than the model lets them: their own spread
         counts where it is larger (P. Huber, Fifth Berkeley Symposium 1, 1967), by groups of neighbouring blocks.
         """
-        found = np.zeros((len(self._x),) * 2)
-        if len(self._free):
-            at = np.ix_(self._free, self._free)
-            inverse = np.linalg.inv(self.system[0][at])
-            own, _ = self._of_stretches
-            share = self._outer[:, 0, 1:] / own[:, None]
-            stretch = self._problem.spectra.stretch
-            scores = self.block_scores[:, 1:] - self.block_scores[:, :1] * share[stretch]
-            groups = np.add.reduceat(scores, np.arange(0, len(scores), _NEIGHBOURS), axis=0)[:, self._free]
-            groups = groups - groups.mean(axis=0)
-            spread = inverse @ (groups.T @ groups + self._problem.knowledge.precision[at]) @ inverse
-            wider = np.sqrt(np.maximum(np.diag(spread) / np.diag(inverse), 1.0))
-            found[at] = inverse * np.outer(wider, wider)
-        return found
+        inverse = np.linalg.inv(self.system[0])
+        own, _ = self._of_stretches
+        share = self._outer[:, 0, 1:] / own[:, None]
+        scores = self.block_scores[:, 1:] - self.block_scores[:, :1] * share[self._problem.spectra.stretch]
+        groups = np.add.reduceat(scores, np.arange(0, len(scores), _NEIGHBOURS), axis=0)
+        groups = groups - groups.mean(axis=0)
+        spread = inverse @ (groups.T @ groups + self._problem.knowledge.precision) @ inverse
+        wider = np.sqrt(np.maximum(np.diag(spread) / np.diag(inverse), 1.0))
+        return np.asarray(inverse * np.outer(wider, wider))
 
     @property
     def log_volume(self) -> float:
         """Half the logarithm of the determinant of the covariance of stretches and car."""
-        inner = self.system[0][np.ix_(self._free, self._free)]
-        return float(-0.5 * (np.log(self._of_stretches[0]).sum() + np.linalg.slogdet(inner)[1]))
+        return float(-0.5 * (np.log(self._of_stretches[0]).sum() + np.linalg.slogdet(self.system[0])[1]))
 
     def taken(self, damping: float) -> tuple[Array, Roads]:
         """Car and roads after a step."""
         information, score = self.system
-        move = np.zeros(len(self._x))
-        if len(self._free):
-            at = np.ix_(self._free, self._free)
-            inner = information[at]
-            move[self._free] = np.linalg.solve(inner + damping * np.diag(np.diag(inner)), score[self._free])
+        move = np.linalg.solve(information + damping * np.diag(np.diag(information)), score)
         move *= min(1.0, _LONGEST_STEP / max(float(np.abs(move).max()), 1e-12))
         own, own_score = self._of_stretches
         stretch = (own_score - self._outer[:, 0, 1:] @ move) / own
@@ -455,16 +444,6 @@ def log_error(problem: UnknownCar, x: Array) -> float:
              for each in range(3)]
     means = [one[one > 0] for one in means]
     return float(np.sqrt(np.mean(np.log(np.concatenate(means)) ** 2)))
-
-
-def apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> tuple[float, Array]:
-    """How far apart two cars are in some of their numbers: squared distance in standard errors over the number of
-    numbers, and each difference in standard errors (n,). Both contain what is known of cars in general, which makes
-    them more alike than they are."""
-    at = [COORDINATES.index(name) for name in names]
-    off = one.x[at] - other.x[at]
-    covariance = (one.covariance + other.covariance)[np.ix_(at, at)]
-    return float(off @ np.linalg.solve(covariance, off)) / len(at), off / np.sqrt(np.diag(covariance))
 
 
 def iri_errors(knowledge: CarKnowledge, x: Array, covariance: Array, speeds_mps: Sequence[float], noise: float,

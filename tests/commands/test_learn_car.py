@@ -83,9 +83,10 @@ def test_braking_that_is_read_as_up_and_down_is_refused(runs: list[Path], tmp_pa
 @pytest.mark.slow
 def test_drives_of_two_cars_are_refused(runs: list[Path], tmp_path: Path) -> None:
     other = UnmeasuredCar(2.66, 0.4, (1.5, 0.4, 12.8, 0.1), (1.6, 0.35, 12.6, 0.12))
-    strange = written(tmp_path, mixed(other, 5, 2 * SECONDS, speeds_mps=(45 * MPH,)))
-    found = called("learn-car", *runs[:3], *strange, "--wheelbase", 2.66)
-    assert found.returncode == 1 and "not of the same car" in found.stderr and len(found.stderr.splitlines()) == 1
+    drive, = written(tmp_path, mixed(other, 5, 2 * SECONDS, speeds_mps=(45 * MPH,)))
+    found = called("learn-car", *runs[:2], drive.rename(tmp_path / "strange"), runs[2], "--wheelbase", 2.66)
+    assert found.returncode == 1 and len(found.stderr.splitlines()) == 1
+    assert "strange: this drive is not of the same car as the others" in found.stderr
 
 
 def test_one_speed_says_what_to_add(tmp_path: Path) -> None:
