@@ -95,7 +95,7 @@ def write_rig_run(folder: Path, rate_hz: float, drives: Mapping[str, Array], mea
 class Improved:
     """A rig as it was described, refitted, and with what ``diagnose`` named.
 
-    added      each effect that was named, added one after the other; empty: none was named
+    added      effects that were named, one after the other, those that help; empty: none
     refitted   the rig without them, its numbers fitted to the same runs
     """
 
@@ -119,14 +119,15 @@ class Improved:
 
 
 def improved(vehicle: Path, runs: Sequence[Path]) -> Improved:
-    """What the lab makes of a rig: ``diagnose`` once, then ``add-effect`` for each that it names."""
+    """What the lab makes of a rig: ``diagnose`` once, then ``add-effect`` for each that it names, kept if it helps."""
     diagnosis = diagnose(vehicle, runs)
     model, refitted, added = read_vehicle(vehicle), None, list[AddedEffect]()
     for name in diagnosis.verdict:
         found = add_effect(name, model, runs)
         refitted = refitted or model.with_numbers({one.name: one.without for one in found.numbers})
-        model = found.model
-        added.append(found)
+        if found.helps:
+            model = found.model
+            added.append(found)
     return Improved(diagnosis, tuple(added), refitted or model, model)
 
 

@@ -291,8 +291,8 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     found = {}
     for name, effect in effects.items():
         why = ALREADY_PRESENT if name in there else effect.obstacle_on(posterior.vehicle, *driven)
-        if why is None and all(one.kind in effect.not_of for one in sensors):
-            why = f"no {' or '.join(sorted({str(one.kind) for one in sensors}))} has it"
+        if why is None and all({one.kind, one.measures} & set(effect.not_of) for one in sensors):
+            why = f"no {' or '.join(sorted({one.kind or f'sensor of {one.measures}' for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
             why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
         if why is None and effect.against_ground and at_rest:

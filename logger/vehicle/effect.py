@@ -58,6 +58,7 @@ class Sought(Enum):
 
     ALWAYS = "always"
     ON_RIGS = "on rigs"
+    ON_PARTS = "on parts"
     NEVER = "never"
 
 
@@ -186,7 +187,7 @@ class Effect(ABC):
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
     against_ground  whether it acts between what moves and the ground; where the base of a mass rests, it is what acts
                  between that and the base
-    not_of       kinds of sensors that cannot have it
+    not_of       kinds of sensors, and what they measure, that cannot have it
     found_of     what sensors measure whose records have it in any model, to a per cent
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows

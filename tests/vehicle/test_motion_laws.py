@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from logger.api.lab.bench import among, known_effects
+from logger.api.lab.bench import among, known_effects, sought_effects
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import own_effect, shipped_effects
@@ -417,6 +417,7 @@ def test_which_a_search_tries_unasked() -> None:
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_limit", "frame_damping", "frame_friction", "quadratic_damping"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
+    assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):
         known_effects(model, ["dry_friction"])
     assert among(known_effects(model, [])[0], ["hysteresis", "dry_friction"]).keys() == {"dry_friction", "hysteresis"}

@@ -265,7 +265,8 @@ def known_effects(model: Model, files: Sequence[str], on_rig: bool = False, scal
     on_rig    as ``sought_effects``
     scales    as ``sized``
     """
-    effects, own = {name: sized(one, model.vehicle, scales) for name, one in sought_effects(on_rig).items()}, {}
+    effects, own = {name: sized(one, model.vehicle, scales) for name, one in sought_effects(
+        on_rig, model.vehicle.model == "component").items()}, {}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
@@ -281,12 +282,13 @@ def known_effects(model: Model, files: Sequence[str], on_rig: bool = False, scal
     return effects, own
 
 
-def sought_effects(on_rig: bool = False) -> dict[str, Effect]:
+def sought_effects(on_rig: bool = False, of_part: bool = False) -> dict[str, Effect]:
     """The effects that come with ridelog and that a search tries unasked, by name.
 
     on_rig    whether the runs are of a test rig, and not of a road
+    of_part   and of a part alone on it
     """
-    where = (Sought.ALWAYS, Sought.ON_RIGS) if on_rig else (Sought.ALWAYS,)
+    where = (Sought.ALWAYS, *[Sought.ON_RIGS] * on_rig, *[Sought.ON_PARTS] * of_part)
     return {name: one for name, one in effect_file.shipped_effects().items() if one.sought in where}
 
 

@@ -26,7 +26,7 @@ class SensorMountResonance(SensorEffect):
     source = "C. M. Harris, A. G. Piersol, Shock and Vibration Handbook (2002), chapter 2: transmissibility"
     signature = "a peak at a frequency that is no mode of the car, at every speed and on every road"
     shown_by = "drive a rough road at two speeds, and knock on the console while the car stands"
-    not_of = ("encoder", "potentiometer")
+    not_of = ("encoder", "potentiometer", "force")
     stage = 1
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:

@@ -1,0 +1,84 @@
+"""A part alone on its bench: what slides in it does so behind a spring, by a power of the force, maybe with play.
+
+Both carry the force F: the spring is stretched by s = F / k beyond the play, and what slides goes at the rate
+(F / F0)^n, which is Norton's creep. n = 1 is a damper behind rubber (Maxwell), a large n friction that gives before it
+slides, or a fluid that yields; between them are valves that open. F0, which the force comes to where the part is moved
+at one usual rate, may differ between lengthening and shortening. It acts beside the part's own spring and damper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_SHARE = 0.3  # of the forces of the part's own spring and damper
+_TRAVELS = (0.02, 0.2)  # shares of the usual travel, over which such parts yield
+_POWERS = (1.5, 6.0)
+
+_FUNCTIONS = """
+def force(p, seen):
+    s = seen.memory[0]
+    return p.sliding_force_n * (s - min(max(s, -p.play_m), p.play_m)) / p.yield_travel_m
+
+
+def rates(p, seen):
+    s = seen.memory[0]
+    size = (s - min(max(s, -p.play_m), p.play_m)) / p.yield_travel_m  # the force over that of sliding
+    if size < 0.0:
+        return (seen.rate_mps + p.sliding_rate_m_per_s * (-size * p.lengthening_ratio) ** p.power_ratio,)
+    return (seen.rate_mps - p.sliding_rate_m_per_s * size ** p.power_ratio,)
+"""
+
+
+class SlidingBehindSpring(Family):
+    name = "sliding_behind_spring"
+    title = "what slides behind a spring in a part on its bench"
+    related_effects = ("hysteresis", "top_mount_compliance", "dry_friction")
+    shown_by = "move the part by little and by much, slowly and fast"
+
+    def drafts(self, context: LawContext) -> list[Draft]:
+        vehicle = context.vehicle
+        if vehicle.model != "component":
+            return []
+        front, travel_m, rate_mps = vehicle.front, context.reach("travel_m", 0.9), context.reach("rate_mps", 0.9)
+        size_n = rounded(_SHARE * (front.suspension_stiffness_n_per_m * travel_m
+                                   + front.suspension_damping_n_s_per_m * rate_mps))
+        lengths_m = tuple(rounded(one * travel_m) for one in _TRAVELS)
+        force, over, power, rate, ratio, play = (
+            Parameter("sliding_force_n", size_n, 0.0, 1e4 * size_n, 0.0, Scale.LINEAR, (size_n,),
+                      f"as it slides at {rate_mps:g} m/s, shortening"),
+            Parameter("yield_travel_m", lengths_m[0], 1e-4 * lengths_m[0], 10 * travel_m, None, Scale.LOG, lengths_m,
+                      "over which its spring comes to that force"),
+            Parameter("power_ratio", _POWERS[0], 0.3, 40.0, None, Scale.LOG, _POWERS,
+                      "exponent of the force in the rate of sliding"),
+            Parameter("sliding_rate_m_per_s", rate_mps, rate_mps, rate_mps, None, Scale.LOG, (rate_mps,),
+                      "at which what slides has its force", default=rate_mps),
+            Parameter("lengthening_ratio", 1.0, 0.1, 10.0, None, Scale.LOG, (1.0,),
+                      "of the force of shortening to that of lengthening"),
+            Parameter("play_m", 0.1 * travel_m, 0.0, travel_m, None, Scale.LINEAR, (0.1 * travel_m,),
+                      "either way, within which it has no force"))
+        one_way = replace(ratio, low=1.0, high=1.0, default=1.0)
+        tight = replace(play, start=0.0, high=0.0, trials=(0.0,), default=0.0)
+        return [self._draft(variant, (force, over, power, rate, *more)) for variant, more in (
+            ("alike", (one_way, tight)), ("by direction", (ratio, tight)), ("with play", (one_way, play)))]
+
+    def _draft(self, variant: str, parameters: tuple[Parameter, ...]) -> Draft:
+        return Draft(
+            family=self.name, kind="ForceEffect", title="a part slides behind a spring", shown_by=self.shown_by,
+            parameters=parameters, variant=variant, at="loop",
+            source="F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied "
+                   "Mechanics 9 (1966) 243",
+            signature="small motions meet a spring, larger ones a force that hardly grows",
+            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN)
+
+    def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
+        more = {"by direction": f", {say('lengthening_ratio')} times that of lengthening",
+                "with play": f", with play of {say('play_m', 1000.0, 'mm')} either way"}.get(draft.variant, "")
+        return (f"what slides behind a spring, {say('sliding_force_n')} over {say('yield_travel_m', 1000.0, 'mm')} at "
+                f"the power {say('power_ratio')}{more}")
+
+
+FAMILY = SlidingBehindSpring()

@@ -1,0 +1,68 @@
+"""What slides behind a spring: beside an integrator that shares nothing with ridelog, and on a damper's bench."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.api.lab.bench import bench_with
+from logger.api.lab.question import CompareQuestion
+from logger.commands.main import main
+from logger.lab.laws.draft import LawContext
+from logger.lab.laws.families.sliding_behind_spring import FAMILY
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import chosen
+
+from ...support.drives.part_bench import Array, fitted_error, force_of, moved, write_bench, write_part
+
+FORCE_N, OVER_M, POWER, RATIO, PLAY_M, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 1.6, 0.0005, 2000.0, 300.0
+
+
+def true_force(place_m: Array, ratio: float, play_m: float, rate_mps: float) -> Array:
+    """Its equations as its docstring has them: shortening is a negative force."""
+    def size(stretch: Array | float) -> Array | float:
+        return (stretch - np.clip(stretch, -play_m, play_m)) / OVER_M
+
+    def rates(_t: float, _x: float, v: float, state: Array) -> list[float]:
+        s = float(size(state[0]))
+        return [v - np.sign(s) * rate_mps * abs(s * (ratio if s < 0 else 1.0)) ** POWER]
+
+    return force_of(rates, lambda x, v, s: STIFFNESS * x + DAMPING * v + FORCE_N * size(s[0]), 1, place_m)
+
+
+@pytest.mark.parametrize(("variant", "ratio", "play_m"), [
+    ("alike", 1.0, 0.0), ("by direction", RATIO, 0.0), ("with play", 1.0, PLAY_M)])
+def test_it_is_the_force_of_its_equations(variant: str, ratio: float, play_m: float, tmp_path: Path) -> None:
+    place_m = moved(1, 8.0, 0.02, 6.0)
+    vehicle, run = tmp_path / "part.yaml", write_bench(tmp_path / "run", place_m, np.sin(np.arange(len(place_m)) / 9))
+    vehicle.write_text(f"name: part\nmodel: component\nstiffness_n_per_m: {STIFFNESS}\n"
+                       f"damping_n_s_per_m: {DAMPING}\npreload_n: 0\n")
+    bench = bench_with(CompareQuestion(vehicle, run, anyway=True), thin=False)
+    posterior = bench.posterior()
+    draft = next(one for one in FAMILY.drafts(LawContext(posterior, posterior.start([]))) if one.variant == variant)
+    values = {"sliding_force_n": FORCE_N, "yield_travel_m": OVER_M, "power_ratio": POWER, "play_m": play_m,
+              "lengthening_ratio": ratio}
+    law = chosen(draft.effect, draft.effect.usual | values)
+    found = bench.runs.predict(compose(bench.model.vehicle, [law]))[0]
+    true_n = true_force(place_m, ratio, play_m, law.values["sliding_rate_m_per_s"])
+    linear_n = bench.runs.predict(compose(bench.model.vehicle, []))[0]
+    kept = slice(100, -50)
+    assert np.std((found - true_n)[kept]) < 0.01 * np.std((linear_n - true_n)[kept])
+
+
+@pytest.mark.release
+def test_a_damper_s_law_is_nearer_than_lugre_and_bouc_wen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle, runs, kept = write_part(tmp_path, "valves with play")
+    law, better = tmp_path / "law.py", tmp_path / "better.yaml"
+    assert main(["learn", "--vehicle", str(vehicle), "--out", str(law), *map(str, runs)]) == 0
+    assert main(["add-effect", str(law), "--vehicle", str(vehicle), "--out", str(better), *map(str, runs)]) == 0
+    capsys.readouterr()
+    main(["compare", "--vehicle", str(better), str(write_bench(tmp_path / "kept", *kept)), "--json"])
+    ours = json.loads(capsys.readouterr().out)["error"]
+    columns = [[np.loadtxt(run / name, delimiter=",", skiprows=1)[:, 1] for name in ("excitation.csv", "drive.csv")]
+               for run in runs]
+    theirs = min(fitted_error(name, [(one, two) for one, two in columns], kept) for name in ("lugre", "bouc_wen"))
+    assert ours < 0.5 * theirs
