@@ -43,7 +43,7 @@ from logger.dsp.filters import butterworth
 from logger.dsp.whole_record import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
-from logger.runs import ENCODER, NO_READING, READING, LowPass, Run
+from logger.runs import NO_READING, READING, LowPass, Run
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -85,7 +85,6 @@ _PHASES_UP_TO = 1.2  # times the cut-off: above, a filter of order 4 leaves less
 _DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # a filter of order 8 at 6 Hz delays by 0.14 s; a step is 5 degrees at 30 Hz
 LEAST_WIDTH_HZ = 3.0
 """A narrower band holds the body's bounce at most, and no model of a car can be distinguished from another."""
-_LEAST_ON_RIG_HZ = 1.0  # as wide as the narrowest band is made (``whittle``): a rig's modes may be slow
 
 
 def is_steep(seen: LowPass) -> bool:
@@ -107,8 +106,6 @@ def detect_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list
 
     predictions    (n,) per run, of a model that is about right; distance errors do not matter
     """
-    if all(run.facts.main.kind == ENCODER for run in runs):
-        return [None] * len(runs)  # what counts has no filter
     fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
     common = _detect_low_pass(fits, runs[0].rate_hz, common=True)
     if common is not None and all(_is_consistent(one, common, runs[0].rate_hz) for one in fits):
@@ -140,13 +137,10 @@ def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass
     low_hz, high_hz = run.pass_band_hz
     if low_pass_hz is not None:
         high_hz = min(high_hz, low_pass_hz)
-    least_hz = _LEAST_ON_RIG_HZ if run.timed else LEAST_WIDTH_HZ
-    if seen is not None and run.timed and not is_wide_enough(run, seen):
-        seen = None  # slow motions fall as steeply: the place of an axis that runs freely, with two orders of its own
     if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
         high_hz, seen = ends_hz, replace(seen, ends_band=True)
-    if high_hz - low_hz < least_hz:
-        raise ValueError(f"{run.name}: expected a pass band of {least_hz:g} Hz or wider, found {low_hz:.3g} "
+    if high_hz - low_hz < LEAST_WIDTH_HZ:
+        raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
                          f"to {high_hz:.3g} Hz")
     cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
     there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
