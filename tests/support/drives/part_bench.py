@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +47,7 @@ def fluid_that_yields(place_m: Array) -> Array:
     damper in series with Bouc and Wen's, the numbers of a small one."""
     alpha, c0, c1, k0, k1, gamma, beta, big, n = 9e4, 2000.0, 2e4, 4500.0, 500.0, 3.6e6, 3.6e6, 300.0, 2
 
-    def inner(x: float, v: float, z: float, y: float) -> float:
+    def inner(x: Any, v: Any, z: Any, y: Any) -> Any:
         return (alpha * z + c0 * v + k0 * (x - y)) / (c0 + c1)
 
     def rates(_t: float, x: float, v: float, state: Array) -> list[float]:
