@@ -483,11 +483,11 @@ def _bus_opener(bus: int | Path, machine: Machine) -> Callable[[], I2cBus]:
 
     def play() -> I2cBus:
         from drivers.dump import open_dump
-        from drivers.recorded_wires import RecordedBus
+        from drivers.played_bus import PlayedBus, Recording
 
         with open_dump(bus) as reader:
             events = [event for event in reader if event.source == "bma220"]
-        return RecordedBus.playing(Bma220Chip(), events, machine.now_us)
+        return PlayedBus(Bma220Chip(), Recording(events, machine.now_us, None))
 
     return play
 

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
-from drivers.recorded_wires import RecordedBus
+
+from ..support.recorded_wires import RecordedBus
 
 SUSPEND, SOFT_RESET = 0x30, 0x32
 FILTER_BITS = {500: 1, 250: 2, 125: 3, 64: 4, 32: 5}

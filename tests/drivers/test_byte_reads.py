@@ -16,7 +16,8 @@ from smbus2 import I2cFunc
 from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220, Bma220Chip, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
-from drivers.recorded_wires import RecordedBus
+
+from ..support.recorded_wires import RecordedBus
 
 BYTES = I2cFunc.SMBUS_READ_BYTE_DATA | I2cFunc.SMBUS_WRITE_BYTE_DATA
 Sample = tuple[int, int, int]

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Settings
 from drivers.dump import Event
 from drivers.errors import BadReply, DumpError, NotPresent, Timeout
-from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
+
+from ..support.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 
 
 class Clock:

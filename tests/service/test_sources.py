@@ -8,9 +8,10 @@ import pytest
 
 from drivers.accelerometers.bma220 import FILTER, RANGE, Bma220Chip, Bma220Settings, chip_source
 from drivers.dump import Event
-from drivers.recorded_wires import RecordedBus
 from logger.service.main_loop import EventMerger, Listener, MainLoop
 from logger.service.supervisor import Supervisor
+
+from ..support.recorded_wires import RecordedBus
 
 SETTINGS = Bma220Settings(range_g=4)
 STEP_US = 10_000

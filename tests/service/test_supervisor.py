@@ -9,9 +9,10 @@ import pytest
 from drivers.accelerometers.bma220 import Bma220Chip, Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
-from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 from drivers.sources import SerialSource
 from logger.service.supervisor import FAULTS_IN_A_ROW, FAULTY_US, FIRST_WAIT_US, LONGEST_WAIT_US, Supervisor
+
+from ..support.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 
 
 class Clock:

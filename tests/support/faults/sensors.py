@@ -33,7 +33,6 @@ from drivers.accelerometers.bma220 import (
 )
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
-from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 from drivers.sources import SerialSource, Source
 from logger.commands.status import advice
 from logger.records import WindowRecord
@@ -53,6 +52,7 @@ from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
 
 from ..drives.replay import Rows, parts_for
+from ..recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 from .trials import Found, Hazard, found
 
 STEP_US = 10_000

@@ -1,7 +1,6 @@
 """Recorded wires: an I2C bus and a serial port that play a recording and misbehave on cue.
 
-Problem: the whole service must run at a desk, on what was recorded in a car, through the very drivers it uses in the
-car; and what goes wrong on real wires must be tried on purpose. Solution: ``RecordedBus`` and ``RecordedPort`` offer
+Problem: what goes wrong on real wires must be tried on purpose. Solution: ``RecordedBus`` and ``RecordedPort`` offer
 the methods of the real ones and raise the same ``OSError``. Each works in one of two ways:
 
 - loaded: the player calls ``load`` with the bytes of an event, and the driver reads them;
@@ -13,13 +12,12 @@ A ``Cue`` says what goes wrong and when. After ``close`` the wire may be used ag
 from __future__ import annotations
 
 import errno
-import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Protocol, Self
 
-from drivers.errors import DumpError
+from drivers.played_bus import PlayedBus, RecordedChip, Recording, os_error
 from drivers.readings import US_PER_S, Event
 
 
@@ -94,111 +92,46 @@ class _Cues:
         return due
 
 
-class _Recording:
-    """Events in order of time against a clock that starts now, at the recording's time ``first_us`` (its first
-    event when None). Holds one event at a time."""
-
-    def __init__(self, events: Iterable[Event], clock_us: Callable[[], int], first_us: int | None) -> None:
-        self._events = iter(events)
-        self._next = next(self._events, None)
-        if first_us is None:
-            first_us = self._next.t_us if self._next is not None else 0
-        self._clock_us = clock_us
-        self._offset_us = first_us - clock_us()
-
-    def now_us(self) -> int:
-        """The time on the recording's own scale."""
-        return self._clock_us() + self._offset_us
-
-    def next_us(self) -> int | None:
-        """When the next event comes; None after the last."""
-        return self._next.t_us if self._next is not None else None
-
-    def until_now(self) -> Iterator[bytes]:
-        """Take the events that have come by now."""
-        now_us = self.now_us()
-        while self._next is not None and self._next.t_us <= now_us:
-            data = self._next.data
-            self._next = next(self._events, None)
-            yield data
-
-
-class RecordedChip(Protocol):
-    """A chip on a recorded bus, as a model of its registers.
-
-    data_address, sample_bytes    a read of so many bytes from there on takes a sample
-    sample                        gives the bytes of one
-    watchdog_on                   it lets go of a bus that it holds low
-    """
-
-    data_address: int
-    sample_bytes: int
-    sample: Callable[[], bytes]
+class FailingChip(RecordedChip, Protocol):
+    """A chip whose power and watchdog can be tried; ``watchdog_on``: it lets go of a bus that it holds low."""
 
     @property
     def watchdog_on(self) -> bool: ...
     def lose_power(self) -> None: ...
-    def read(self, address: int, length: int = 1) -> bytes: ...
-    def write(self, address: int, value: int) -> None: ...
 
 
-class RecordedBus:
-    """An I2C bus with one chip on it, whose data registers give recorded samples.
+class RecordedBus(PlayedBus):
+    """A played bus that fails on cue, or is loaded: ``load`` puts a sample into the data registers, over one that
+    nobody has read; a burst takes it out. ``now_us`` is only needed for cues with ``at_us``."""
 
-    Loaded: ``load`` puts a sample into the data registers, over one that nobody has read; a burst takes it out.
-    Playing: a burst gives the latest sample at or before the present. With nothing to give, a burst is not
-    acknowledged: a sample is never invented. ``now_us`` is only needed for cues with ``at_us``.
-    """
+    chip: FailingChip
 
-    def __init__(self, chip: RecordedChip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
-                 address: int = 0x0A) -> None:
-        self.chip = chip
-        self.chip.sample = self._take_loaded
-        self._address = address
+    def __init__(self, chip: FailingChip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
+                 address: int = 0x0A, recording: Recording | None = None) -> None:
+        super().__init__(chip, recording, address)
         self._cues = _Cues(cues, BUS_FAULTS, now_us)
-        self._loaded: bytes | None = None
-        self._recording: _Recording | None = None
         self._failing: list[int] = []
         self._unplugged = False
         self._stuck_low = False
         self._reads = 0
 
     @classmethod
-    def playing(
-        cls,
-        chip: RecordedChip,
-        events: Iterable[Event],
-        now_us: Callable[[], int],
-        cues: Iterable[Cue] = (),
-        first_us: int | None = None,
-    ) -> Self:
+    def playing(cls, chip: FailingChip, events: Iterable[Event], now_us: Callable[[], int], cues: Iterable[Cue] = (),
+                first_us: int | None = None) -> Self:
         """A bus on which ``events`` (of this sensor only) happen from now on, the first at once unless ``first_us``
-        names another start on the recording's scale. A sample of the wrong length is a DumpError when it is its
-        turn."""
-        recording = _Recording(events, now_us, first_us)
-        bus = cls(chip, cues, recording.now_us)
-        bus._recording = recording
-        bus.chip.sample = bus._take_latest
-        return bus
+        names another start on the recording's scale."""
+        recording = Recording(events, now_us, first_us)
+        return cls(chip, cues, recording.now_us, recording=recording)
 
     def load(self, data: bytes) -> None:
         """Put one whole sample into the data registers. DumpError on any other length."""
-        self._loaded = self._whole_sample(data)
+        self._latest = self._whole_sample(data)
 
-    def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        self._transfer(i2c_addr, register)
-        return self.chip.read(register)[0]
-
-    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        self._transfer(i2c_addr, None)
-        self.chip.write(register, value)
-
-    def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        self._transfer(i2c_addr, register)
-        return list(self.chip.read(register, length=length))
-
-    def close(self) -> None:
-        """Nothing to let go of."""
+    def _sample(self) -> bytes:
+        data = super()._sample()
+        if self._recording is None:
+            self._latest = None
+        return data
 
     def _transfer(self, i2c_addr: int, read_register: int | None) -> None:
         """What comes before the bytes: address, acknowledgement, and whatever goes wrong. A burst that fails here
@@ -210,8 +143,8 @@ class RecordedBus:
         failure = self._failure(i2c_addr)
         if failure:
             if read_register == self.chip.data_address:
-                self._loaded = None
-            raise _os_error(failure)
+                self._latest = None
+            raise os_error(failure)
 
     def _failure(self, i2c_addr: int) -> int:
         """The errno of this transfer, 0 when it goes well."""
@@ -234,25 +167,6 @@ class RecordedBus:
             self._stuck_low = False
             self.chip.lose_power()
 
-    def _whole_sample(self, data: bytes) -> bytes:
-        if len(data) != self.chip.sample_bytes:
-            raise DumpError(f"a recorded read of the chip has {len(data)} bytes, expected {self.chip.sample_bytes}")
-        return data
-
-    def _take_loaded(self) -> bytes:
-        data, self._loaded = self._loaded, None
-        if data is None:
-            raise _os_error(errno.EREMOTEIO)
-        return data
-
-    def _take_latest(self) -> bytes:
-        if self._recording is not None:
-            for data in self._recording.until_now():
-                self._loaded = self._whole_sample(data)
-        if self._loaded is None:
-            raise _os_error(errno.EREMOTEIO)
-        return self._loaded
-
 
 class RecordedPort:
     """A serial port on which recorded bytes arrive. What a driver writes is kept in ``written``.
@@ -265,7 +179,7 @@ class RecordedPort:
         self.written = bytearray()
         self._cues = _Cues(cues, PORT_FAULTS, now_us)
         self._waiting = bytearray()
-        self._recording: _Recording | None = None
+        self._recording: Recording | None = None
         self._sleep: Callable[[float], None] | None = None
         self._unplugged = False
         self._gone = False
@@ -284,7 +198,7 @@ class RecordedPort:
     ) -> Self:
         """A port on which ``events`` (of this port only) happen from now on, the first at once unless ``first_us``
         names another start on the recording's scale. ``sleep`` takes seconds."""
-        recording = _Recording(events, now_us, first_us)
+        recording = Recording(events, now_us, first_us)
         port = cls(cues, recording.now_us)
         port._recording = recording
         port._sleep = sleep
@@ -338,7 +252,7 @@ class RecordedPort:
                 self._waiting.clear()
         if self._gone:
             self._arrive()
-            raise _os_error(errno.EIO)
+            raise os_error(errno.EIO)
 
     def _arrive(self) -> None:
         if self._recording is not None:
@@ -354,7 +268,3 @@ class RecordedPort:
     def _pause(self, wait_s: float) -> None:
         if self._sleep is not None and wait_s > 0:
             self._sleep(wait_s)
-
-
-def _os_error(number: int) -> OSError:
-    return OSError(number, os.strerror(number))
