@@ -22,6 +22,9 @@ BY_ROAD, BY_RECEIVER = "road", "receiver"
 """By what the places of a run were found (``RecordFacts.places_by``)."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
+PART_SKIP_S = 0.1
+"""The same of a part that its bench moves: it remembers no more than a damper on its mount does (2 kN s/m on 2e5 N/m:
+10 ms; a judgement) [s]."""
 EVEN_SAMPLES = 1e-3
 """A time within so many samples of one is at that sample: rates are read off times that were rounded."""
 RECEIVER_ERROR_LASTS_S = 60.0
@@ -301,6 +304,11 @@ class Run:
     def at_rest(self) -> bool:
         """Whether what the rig stands on rests, so that forces alone drive it."""
         return isinstance(self.track, Excitation) and not np.ptp(self.track.elevation_m)
+
+
+def unknown_past_s(track: Track | Excitation | None) -> float:
+    """How much of the beginning of a run over this road, or on this rig, is left out: ``SKIP_S``, ``PART_SKIP_S``."""
+    return PART_SKIP_S if isinstance(track, Excitation) and track.moves_part else SKIP_S
 
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:

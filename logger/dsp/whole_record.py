@@ -100,16 +100,16 @@ def _at_own_rate(t_s: Array, samples: Array, own_hz: float) -> Array:
 
 def _correction(place: Array, samples: Array, laid: Array, kernel: _Kernel) -> Array:
     """What to add to ``laid`` (m, axes) on a grid so that a sinc through it, the ``kernel``, meets samples (n, axes) at
-    ``place`` (n,), counted in steps of the grid."""
+    ``place`` (n,), counted in steps of the grid; beyond its ends it is taken to go on as their mirror image."""
     from scipy.linalg import solveh_banded
 
     count = len(laid)
     first = np.floor(place).astype(np.int64) - _REACH + 1
     columns = first[:, None] + np.arange(2 * _REACH)
     weights = kernel.at(place - np.floor(place))
+    off = samples - np.einsum("nk,nka->na", weights, _continued(laid, 2 * _REACH)[columns + 2 * _REACH])
     weights[(columns < 0) | (columns >= count)] = 0.0
     columns = np.clip(columns, 0, count - 1)
-    off = samples - np.einsum("nk,nka->na", weights, laid[columns])
     banded = np.zeros((2 * _REACH, count))
     for lag in range(2 * _REACH):
         products = weights[:, : 2 * _REACH - lag] * weights[:, lag:]
@@ -119,12 +119,17 @@ def _correction(place: Array, samples: Array, laid: Array, kernel: _Kernel) -> A
     return np.asarray(solveh_banded(banded, right, lower=True))
 
 
+def _continued(even: Array, reach: int) -> Array:
+    """Samples (n, axes) with so many more at both ends: their mirror image about the last sample, as far as it goes."""
+    around = np.pad(even, ((min(reach, len(even) - 1),) * 2, (0, 0)), mode="reflect", reflect_type="odd")
+    return np.pad(around, ((reach - (len(around) - len(even)) // 2,) * 2, (0, 0)), mode="edge")
+
+
 def _band_limited(even: Array, at: Array, cutoff: float) -> Array:
     """Samples (n, axes) of an even grid, taken at places (m,) counted in its steps, without what lies above ``cutoff``
     of half its rate. The ends are continued by their mirror image about the last sample."""
     half = ceil(_BAND_REACH / cutoff)
-    around = np.pad(even, ((min(half + 1, len(even) - 1),) * 2, (0, 0)), mode="reflect", reflect_type="odd")
-    around = np.pad(around, ((half + 1 - (len(around) - len(even)) // 2,) * 2, (0, 0)), mode="edge")
+    around = _continued(even, half + 1)
     offsets = np.arange(-half, half + 1)
     found = np.empty((len(at), even.shape[1]))
     rows = ceil(_MOST_WEIGHTS / len(offsets))

@@ -42,7 +42,8 @@ class AppliedForce:
 @dataclass(frozen=True, eq=False)
 class Excitation:
     """Elevations under the wheels and forces, evenly sampled in time; before and after them they stay where they are,
-    but before the first sample of a force there is none.
+    but before the first sample of a force there is none. A part that its bench moves is on its way then: it is taken to
+    have moved as after its first sample, mirrored there, so that its velocity does not jump.
 
     rate_hz        samples a second
     elevation_m    (n,) under all wheels, or (n, 2) under the front and under the rear ones [m]
@@ -85,8 +86,11 @@ class Excitation:
         """As ``WheelTracks``, then the forces: whatever stands behind the front wheels is a rear wheel. What stands on
         a base feels the base's height, velocity and acceleration."""
         end_s, inside = self.end_s, np.clip(way.time_s, self.start_s, self.end_s)
-        curves = self._curves(inside)
-        integral = self._integrals(inside) + curves * (way.time_s - np.clip(way.time_s, self.start_s, end_s))[:, None]
+        curves, near_s = self._curves(inside), self._near_s(way.time_s)
+        beyond = curves * (way.time_s - inside)[:, None]
+        if self.moves_part:
+            curves, beyond = 2 * curves - self._curves(near_s), 2 * beyond
+        integral = self._integrals(near_s) + beyond
         means = np.diff(integral, axis=0) / np.diff(way.time_s)[:, None]
         column = np.where(np.asarray(stance.behind_m) > 0, curves.shape[1] - 1, 0)
         values, means = [curves[:, column]], [means[:, column]]
@@ -146,8 +150,16 @@ class Excitation:
 
     def _derivative(self, order: int, time_s: Array) -> Array:
         """Of the elevation under the front wheels (M, 1), by time; 0 where it stays where it is."""
+        inside, sign = np.clip(time_s, self.start_s, self.end_s), 0.0
+        if self.moves_part:
+            sign = -1.0 if order == 2 else 1.0
+        found = self._curves.derivative(order)(self._near_s(time_s))[:, 0]
+        return np.where(inside == time_s, found, sign * found)[:, None]
+
+    def _near_s(self, time_s: Array) -> Array:
+        """Times within the record: those before and after it at its ends, or as far within as they are beyond."""
         inside = np.clip(time_s, self.start_s, self.end_s)
-        return np.where(inside == time_s, self._curves.derivative(order)(inside)[:, 0], 0.0)[:, None]
+        return np.clip(2 * inside - time_s, self.start_s, self.end_s) if self.moves_part else inside
 
     @cached_property
     def _curves(self) -> BSpline:

@@ -365,6 +365,22 @@ def test_a_rig_that_no_force_drives_has_no_coil_that_saturates(tmp_path: Path) -
               str(tmp_path / "out.yaml"), str(run)])
 
 
+def test_a_short_test_of_a_part_is_taken_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A bench that makes five turns a second needs no five: what moves the part is known, so it has no past."""
+    whole = TIME_S <= 2.0
+    x_m, v_mps = 0.02 * np.sin(10 * np.pi * TIME_S), 0.2 * np.pi * np.cos(10 * np.pi * TIME_S)
+    run = written(tmp_path / "run", {"force_n": 400.0 * x_m + 90.0 * v_mps}, {"displacement_m": x_m}, "source: me\n")
+    for name in ("drive.csv", "excitation.csv"):
+        lines = (run / name).read_text().splitlines()
+        (run / name).write_text("\n".join(lines[:1 + whole.sum()]) + "\n")
+    (tmp_path / "part.yaml").write_text("name: damper\nmodel: component\nstiffness_n_per_m: 400\n"
+                                        "damping_n_s_per_m: 90\npreload_n: 0\n")
+    assert main(["compare", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["error"] < 1e-4
+    assert found["runs"][0]["samples"] == pytest.approx(whole.sum() - 25, abs=1)
+
+
 def test_what_a_part_pulls_back_with_at_rest_is_found_beside_its_friction(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its file says a damper and no preload; the numbers are those of its equation, and all of its force is explained.

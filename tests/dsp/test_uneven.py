@@ -81,3 +81,16 @@ def test_bursts_are_spread_evenly() -> None:
     arrived_s[1500:] += 2.0
     with pytest.raises(ValueError, match="off an even rate"):
         spread(arrived_s, ends)
+
+
+def test_a_record_that_ends_in_motion_is_right_up_to_its_end() -> None:
+    """A ramp under a sine: neither end is at rest."""
+    draw = np.random.default_rng(7)
+    t_s = np.sort(np.arange(0, 6, 0.004) + draw.normal(0, 0.001, 1500) * (draw.random(1500) < 0.2))
+
+    def wave(at_s: np.ndarray) -> np.ndarray:
+        return 3.0 + at_s + np.sin(2 * np.pi * 1.3 * at_s)
+
+    hz = mean_rate_hz(t_s)
+    laid = on_even_grid(t_s, wave(t_s)[:, None], hz, hz)[:, 0]
+    assert np.abs(laid - wave(t_s[0] + np.arange(len(laid)) / hz)).max() < 0.003

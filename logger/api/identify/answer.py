@@ -32,8 +32,8 @@ from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE,
 from logger.identification.unknown_road.road_fit import RoadFit
 from logger.lab.readings_fit import ReadingsFit
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
-from logger.runs import SKIP_S, runs_left_out
 from logger.runs import Run as Record
+from logger.runs import runs_left_out, unknown_past_s
 from logger.store.formats import vehicle_file
 from logger.vehicle.named_parameters import Coordinates, Free
 
@@ -152,13 +152,13 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
 
     records = []
     for drive in drives:
-        lasts_s = len(drive.time_s) / drive.rate_hz
-        if not lasts_s - LEAST_SAMPLES / drive.rate_hz > SKIP_S:
-            raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {SKIP_S:g} s, "
+        lasts_s, past_s = len(drive.time_s) / drive.rate_hz, unknown_past_s(drive.track)
+        if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
+            raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
                            f"which are left out, found a drive of {lasts_s:g} s")
         samples = drive.accel_z_mps2 - (0.0 if drive.facts.main.has_zero else drive.accel_z_mps2.mean())
         records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, SKIP_S,
+                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
                               replace(drive.facts, signals=()), drive.marks()))
     try:
         check_records(records)

@@ -256,6 +256,7 @@ _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a
 # What the lab looks at of a car lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
 _RATE_HZ, _NEARLY = 100.0, 0.25
 LEAST_S = 5.0
+_LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
@@ -319,7 +320,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
     from logger.profiles.excitation import Excitation
-    from logger.runs import Run
+    from logger.runs import Run, unknown_past_s
 
     driven = None
     if isinstance(drive.track, Excitation):
@@ -335,9 +336,22 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
-                drive.track.begun(part.start / drive.rate_hz), facts=drive.facts,
+                drive.track.begun(part.start / drive.rate_hz), unknown_past_s(drive.track), facts=drive.facts,
                 usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
             for part in parts]
+
+
+def _past_s(drive: Drive) -> float:
+    from logger.runs import unknown_past_s
+
+    return unknown_past_s(getattr(drive, "track", None))
+
+
+def least_s(drive: Drive) -> float:
+    """How long a drive, or a test of a part, has to be [s]."""
+    from logger.runs import PART_SKIP_S
+
+    return _LEAST_OF_PART_S if _past_s(drive) == PART_SKIP_S else LEAST_S
 
 
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
@@ -346,7 +360,7 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
     A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
     well. One that lasts longer than that is cut out, and so are those at the ends of a part.
 
-    Raises BadInput where no part has readings for ``LEAST_S``.
+    Raises BadInput where no part has readings for ``least_s``.
     """
     import numpy as np
 
@@ -361,11 +375,11 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
         between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
         kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
     parts = [part for part in map(slice, *stretches_of(kept))
-             if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
+             if np.count_nonzero(read[part]) >= least_s(drive) * drive.rate_hz]
     if not parts:
         moving = f" at {SLOWEST_MPS:g} m/s or faster" if on_rig is None else " while its excitation lasts"
-        raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings{moving}, without a break of more than "
-                       f"{SKIP_S:g} s")
+        raise BadInput(f"{drive.path}: expected {least_s(drive):g} s with readings{moving}, without a break of more "
+                       f"than {SKIP_S:g} s")
     return parts
 
 
@@ -453,25 +467,26 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
 
     from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
-    from logger.runs import READING, SKIP_S
+    from logger.runs import READING
 
+    past_s = _past_s(drive)
     least_hz, seen = _least_hz(drive, vehicle)
     if drive.rate_hz < (1 - _CLOCK) * least_hz:
         raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
                        f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
     lasts_s = len(drive.time_s) / drive.rate_hz
-    if lasts_s < LEAST_S:
-        raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")
+    if lasts_s < least_s(drive):
+        raise BadInput(f"{file}: expected a drive of {least_s(drive):g} s or longer, found {lasts_s:.3g} s")
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
-    counted = drive.accel_z_mps2[int(SKIP_S * drive.rate_hz):]
+    counted = drive.accel_z_mps2[int(past_s * drive.rate_hz):]
     is_acceleration = drive.facts.main.measures == "acceleration"
     if np.ptp(counted) == 0:
         unit = " m/s2" if is_acceleration else ""
         found = f"{counted[0]:g}{unit} all along" if counted[0] else "zeros only"
         what = "accelerations" if is_acceleration else drive.facts.main.name
-        raise BadInput(f"{file}: expected {what} after the first {SKIP_S:g} s, found {found}")
+        raise BadInput(f"{file}: expected {what} after the first {past_s:g} s, found {found}")
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     if is_acceleration and abs(counted.mean()) > _MOST_MEAN_MPS2:

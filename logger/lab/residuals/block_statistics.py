@@ -26,7 +26,7 @@ def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals) -> tuple
 
     means = block_means(residuals, signals, 2)
     if len(means) < 4:
-        return float(means.mean()), np.nan, np.nan
+        return float(np.concatenate(signals).mean()), np.nan, np.nan
     error = float(means.std(ddof=1) / np.sqrt(len(means)))
     return float(means.mean()), error, float(ttest_1samp(means, 0.0).pvalue) if error > 0 else np.nan
 

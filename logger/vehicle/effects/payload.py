@@ -21,6 +21,7 @@ class Payload(VehicleEffect):
     source = "Newton's second law; 4.4 of Blum 2015 finds the sprung mass from a bump"
     signature = "the body bounces more slowly and shakes less above its bounce, on every road alike"
     shown_by = "drive a road with long waves, or weigh the car"
+    needs_body = True
 
     def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
         return with_load(vehicle, p.mass_kg)
