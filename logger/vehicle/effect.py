@@ -189,6 +189,7 @@ class Effect(ABC):
                  between that and the base
     not_of       kinds of sensors, and what they measure, that cannot have it
     found_of     what sensors measure whose records have it in any model, to a per cent
+    underlies    whether it is nearly always there and hides others: these are tried on top of it where none is seen
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
     """
@@ -209,6 +210,7 @@ class Effect(ABC):
     against_ground: bool = False
     not_of: tuple[str, ...] = ()
     found_of: tuple[str, ...] = ()
+    underlies: bool = False
     also_by: tuple[str, ...] = ()
     stage: int = 0
 

@@ -181,6 +181,28 @@ def test_what_acts_on_a_single_mass_from_its_guide_is_named(
     assert found.candidates[0].parameters[number] == pytest.approx(next(iter(hidden.values())), rel=0.04)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction_n", "push_n", "names"), [(0.0, 0.0, set()), (0.0, 5.0, {"constant_force"}),
+                                                             (15.0, 5.0, {"constant_force", "dry_friction"})])
+def test_a_free_axis_is_named_what_acts_on_it_by_its_places_alone(
+        friction_n: float, push_n: float, names: set[str], tmp_path: Path) -> None:
+    """Its record begins anywhere, on its way, and it drifts; nothing of it is above 4 Hz. The file is a fifth off."""
+    true, push = Bench(95.0, 0.0, 200.0, guide_n=friction_n), noise(4.0, 60.0, 9)
+    place_m = true.moved(NOTHING, lambda t: push(t) + push_n, NOTHING)["displacement_m"]
+    place_m = place_m + 0.7 + np.random.default_rng(2).normal(0.0, 5e-6, len(place_m))
+    run = written(tmp_path / "run", {"displacement_m": place_m}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "axis.yaml").write_text(Bench(80.0, 0.0, 240.0).yaml)
+    found = ridelog.diagnose(tmp_path / "axis.yaml", [run])
+    assert set(found.verdict) == names
+    by_name = {one.effect: one.parameters for one in found.candidates}
+    if push_n:
+        assert by_name["constant_force"]["push_n"] == pytest.approx(push_n, rel=0.02)
+    if friction_n:
+        assert by_name["dry_friction"]["friction_force_n"] == pytest.approx(friction_n, rel=0.02)
+    assert ridelog.identify(tmp_path / "axis.yaml", [run], free=["mass_kg", "damping_n_s_per_m"]).error_after < (
+        0.02 if not names else 1.0)
+
+
 def test_a_run_with_forces_is_written_as_it_was_read(tmp_path: Path) -> None:
     said = "forces: {force_n: {on: body}}\nsignals: {place_m: {measures: displacement, kind: encoder}}\n"
     run = written(tmp_path / "run", {"place_m": np.sin(TIME_S)}, {"force_n": np.cos(TIME_S)}, said)

@@ -17,7 +17,7 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_roads
+from logger.api.lab.checks import check_roads, moves_freely, of_rates
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
     from logger.vehicle.uncertain import NumberErrors
+    from logger.vehicle.vehicle import Vehicle
 
 
 USUAL_WAVINESS = 2.0
@@ -121,7 +122,7 @@ def answer(question: IdentifyQuestion) -> Identification:
         raise question.wrong("same_road", ": expected two runs or more")
     flat_will_do = bool(question.obstacles) or question.road != MEASURED
     drives = [run_on_road(one) if not flat_will_do else one if isinstance(one, Run) else read_run(one) for one in given]
-    records = _records(drives, question)
+    records = _records(drives, question, model.vehicle)
     if question.road != MEASURED:
         return _on_unmeasured_roads(model, records, question)
     return _on_measured_roads(model, records, _narrowed(question, drives))
@@ -144,7 +145,7 @@ def _narrowed(question: IdentifyQuestion, drives: Sequence[Run]) -> IdentifyQues
     return replace(question, low_pass_hz=min((one for one in ends_hz if one is not None), default=None))
 
 
-def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
+def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
     from logger.identification.session import LEAST_SAMPLES, UnusableRun, check_records, off_rate
@@ -168,7 +169,7 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion) -> list[Record]:
     if (run := off_rate(rates_hz)) is not None:
         raise BadInput(f"{records[run].name}: expected {rates_hz[0]:g} samples a second as in {records[0].name}, found "
                        f"{rates_hz[run]:g}")
-    return records
+    return [of_rates(record) for record in records] if moves_freely(vehicle) else records
 
 
 # --- roads that are known, but for a few numbers ---

@@ -20,7 +20,7 @@ from logger.units import FOOT_M, STANDARD_GRAVITY_MPS2
 if TYPE_CHECKING:
     from logger.lab.another_car import AnotherCar
     from logger.lab.road_match import RoadMatch
-    from logger.runs import Array, Bools, Run
+    from logger.runs import Array, Bools, Run, Signal
     from logger.simulation.virtual_drive import SimulatedRuns
     from logger.store.formats.drive_file import Drive, DriveOnRoad
     from logger.store.formats.vehicle_file import Model
@@ -290,8 +290,47 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
         if vehicle is not None:
             check_forces(vehicle, drive.track, str(drive.path / RUN))
     runs = [run for one in drives for run in driven_stretches(one)]
+    if vehicle is not None and moves_freely(vehicle):
+        runs = [of_rates(run) for run in runs]
     kept = thinned_runs(runs, vehicle) if thin else runs
     return SimulatedRuns(kept) if vehicle is None else SimulatedRuns(kept, steps_hz(vehicle))
+
+
+def moves_freely(vehicle: Vehicle) -> bool:
+    """Whether it is an axis: a mass that no spring holds, which keeps in its place every push that it ever had."""
+    return vehicle.model == "single_mass" and vehicle.front.suspension_stiffness_n_per_m == 0
+
+
+def of_rates(run: Run) -> Run:
+    """The run of an axis with the rates of its places in their stead: a small force, or a start that is not known,
+    moves a place without bound, and the rate by no more than the damper allows. Rates are those of cubic splines, right
+    to a part in 10,000 up to a thirtieth of the sample rate, and have a zero."""
+    import numpy as np
+    from scipy.interpolate import CubicSpline
+
+    from logger.runs import NO_READING
+
+    def is_place(signal: Signal) -> bool:
+        return signal.measures in ("displacement", "travel")
+
+    def rate(samples: Array) -> Array:
+        return np.asarray(CubicSpline(time_s, samples)(time_s, 1))
+
+    time_s, facts = np.arange(run.count) / run.rate_hz, run.facts
+    if not any(map(is_place, (facts.main, *facts.signals))):
+        return run
+    usable, main = run.usable, facts.main
+    if is_place(main):
+        if usable is not None:  # what was not read spoils the rates beside it
+            usable = np.where(np.convolve(usable == NO_READING, np.ones(5), "same") > 0, NO_READING, usable)
+        main = replace(main, measures="velocity")
+        facts = replace(facts, step_mps2=None, range_mps2=None, noise_mps2=None)
+    more = [rate(samples) if is_place(one) else samples for one, samples in zip(facts.signals, run.more, strict=True)]
+    return replace(
+        run, measured_mps2=rate(run.measured_mps2) if is_place(facts.main) else run.measured_mps2, usable=usable,
+        more=np.array([samples - samples.mean() for samples in more]) if more else run.more,
+        facts=replace(facts, main=main, signals=tuple(
+            replace(one, measures="velocity") if is_place(one) else one for one in facts.signals)))
 
 
 def check_distances(drive: Drive, file: Path) -> None:

@@ -130,16 +130,20 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
 
 
 def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass_hz: float | None = None) -> Run:
-    """The run filtered to its pass band, given the low-pass that it went through, and a model's prediction (n,).
+    """The run filtered to its pass band, given the low-pass that it went through, and a model's prediction (n,). What a
+    rig does may all be slow, without any filter: a band that is asked for is taken there, however narrow, and what
+    seems to be a filter below is none.
 
     ValueError where nothing is left.
     """
     low_hz, high_hz = run.pass_band_hz
     if low_pass_hz is not None:
         high_hz = min(high_hz, low_pass_hz)
+    if run.timed and seen is not None and not is_wide_enough(run, seen):
+        seen = None
     if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
         high_hz, seen = ends_hz, replace(seen, ends_band=True)
-    if high_hz - low_hz < LEAST_WIDTH_HZ:
+    if high_hz - low_hz < LEAST_WIDTH_HZ and not run.timed:
         raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
                          f"to {high_hz:.3g} Hz")
     cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None

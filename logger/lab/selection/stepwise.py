@@ -282,6 +282,11 @@ class Search(Generic[M, P, F]):
             last = tried = self.round(now, untried, self._required_gain(now) if steps else 0.0)
             first = first if steps else tried
             best = self._simplest(now, tried)
+            if best is None and not steps and (under := self._underlaid(now, tried)) is not None:
+                tried = self.round(under, [one for one in untried if one.name not in names_of(under)])
+                if (best := self._simplest(under, tried)) is not None:
+                    now = under
+                    steps.append((names_of(now)[-1], now.hold_out))
             if best is None:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
@@ -296,6 +301,16 @@ class Search(Generic[M, P, F]):
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps), last)
+
+    def _underlaid(self, now: M, tried: Round[P, F]) -> M | None:
+        """The model with an effect that is nearly always there and may hide others; None where there is no such effect,
+        or nothing to explain."""
+        if now.explanation == 0:
+            return None
+        fits = [one for one in tried.fits if one.effect.underlies]
+        fits += [one for each in tried.unfitted if each.effect.underlies
+                 for one in self.likelihood.fitted_roughly(now.score, now, each)]
+        return self.likelihood.with_effect(fits[0]) if fits else None
 
     def without_effect(self, found: Selection[M, P, F], name: str) -> Selection[M, P, F]:
         """A result without one of its effects."""

@@ -23,6 +23,7 @@ class ConstantForce(ForceEffect):
     signature = "what moves freely drifts; on a spring that is not linear the motion one way differs from that back"
     shown_by = "push it forth and back over its whole travel, weakly and strongly"
     sought = Sought.ON_RIGS
+    underlies = True
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         return None if vehicle.model == "single_mass" else "springs take it up at rest"
