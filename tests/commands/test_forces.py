@@ -422,3 +422,22 @@ def test_what_a_part_pulls_back_with_at_rest_is_found_beside_its_friction(
     assert now.preload_n == pytest.approx(-40.0, abs=0.5)
     assert now.front.suspension_damping_n_s_per_m == pytest.approx(90.0, rel=0.02)
     assert ridelog.compare(tmp_path / "with.yaml", [run]).error < 0.1
+
+
+@pytest.mark.slow
+def test_friction_of_a_part_is_named_through_the_noise_of_its_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]
+                                                                    ) -> None:
+    """0.1 % of its way, which is 2 mm/s of its rate at 250 samples a second. The load cell reads 1 % too much."""
+    way, drawn = noise(3.0, 0.02, 6), np.random.default_rng(4)
+    force_n = 1.01 * (90.0 * way(TIME_S, 1) + 5.0 * np.tanh(way(TIME_S, 1) / 0.002)) - 8.0
+    run = written(tmp_path / "run", {"force_n": force_n + drawn.normal(0.0, 0.3, len(force_n))},
+                  {"displacement_m": way(TIME_S) + drawn.normal(0.0, 2e-5, len(TIME_S))}, "source: me\n")
+    (tmp_path / "part.yaml").write_text("name: damper\nmodel: component\nstiffness_n_per_m: 0\n"
+                                        "damping_n_s_per_m: 80\npreload_n: 0\n")
+    assert main(["diagnose", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ["dry_friction"]
+    assert not found["unexplained"]
+    friction = found["candidates"][0]
+    off_n = friction["parameters"]["friction_force_n"] - 5.0
+    assert abs(off_n) < 3 * friction["standard_errors"]["friction_force_n"]

@@ -264,9 +264,11 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     unseen = np.diag([range_of(state.effects[free.effect].effect.parameters[free.parameter])**-2.0
                       for free in free_parameters])
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, free_parameters)])
-    # Where numbers are not known, the scale of all masses and forces is held by the prior of one of them alone: a step
-    # that is damped by what the runs say of each moves it by next to nothing, and looks like the last.
-    damping = Damping(first=Damping.least) if linear.prior.is_vague else Damping()
+    # Where numbers are not known, the scale of all masses and forces is held by the prior of one of them alone, and
+    # where a force was measured by that of its sensor's gain: a step that is damped by what the runs say of each moves
+    # it by next to nothing, and looks like the last.
+    by_priors = linear.prior.is_vague or linear.posterior.shows_forces
+    damping = Damping(first=Damping.least) if by_priors else Damping()
     ends = np.array([(-np.inf, np.inf)] * p + [ends_of(state.effects[free.effect].effect.parameters[free.parameter])
                                                for free in free_parameters]).reshape(-1, 2)
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,

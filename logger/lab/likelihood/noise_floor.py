@@ -155,10 +155,11 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
                      ) -> dict[str, float]:
     """Share by which the residual is above what right models leave, by name of the signal (empty: the sensor's
     acceleration), of the run where it is largest. They leave the noise, what the model makes of the noise of its
-    measured input, the discrepancy of two right simulations, and what is within the prior of a calibrated sensor: as
-    large a share of what was measured as ``UNUSUAL_SIGMA`` deviations of its gain. (Its gain is fitted; how far it is
-    off a straight line, or its cross talk, are of that size at most.) A run so short that noise alone may do the same
-    with this probability counts no higher than ``UNEXPLAINED``.
+    measured input, the discrepancy of two right simulations, and what is within the prior of calibrated sensors: as
+    large a share of what was measured as ``UNUSUAL_SIGMA`` deviations of the gain of the sensor, and of that which
+    measured a rig's input. (Gains are fitted; how far a sensor is off a straight line, or its cross talk, are of that
+    size at most.) A run so short that noise alone may do the same with this probability counts no higher than
+    ``UNEXPLAINED``.
 
     noise    of the sensors, where it is known; None: estimated from the residuals
     """
@@ -172,7 +173,8 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
         for run, one, residual, share, moved in zip(signal.runs, signal.bands, signal.residuals, signal.shares,
                                                     inputs.residuals, strict=True):
             sensor = next((one for one in run.signals if one.name == signal.name), run.facts.main)
-            chain = UNUSUAL_SIGMA * posterior.tolerance.gain_of(sensor) / DISCREPANCY
+            of_input = posterior.tolerance.scale if run.timed else 0.0
+            chain = UNUSUAL_SIGMA * np.hypot(posterior.tolerance.gain_of(sensor), of_input) / DISCREPANCY
             freedom = float(one.freedom.sum())
             expected = one.freedom @ (own.deviation_mps2**2 / share + (1 + chain**2) * one.floor + one.power(moved))
             above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1

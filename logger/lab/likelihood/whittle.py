@@ -156,6 +156,8 @@ class Whitener:
         self._inside = slice(*np.searchsorted(f_hz, edges[[0, -1]]))
         middle = 0.5 * (edges[1:] + edges[:-1])
         self._gain = np.exp(-0.5 * np.interp(f_hz[self._inside], middle, np.log(levels)))
+        # Parseval's theorem: each frequency but 0 stands for its negative as well.
+        self._sides = np.sqrt(np.where(f_hz[self._inside] > 0, 2.0, 1.0) / self._padded)
 
     @property
     def kept(self) -> int:
@@ -164,15 +166,14 @@ class Whitener:
 
     def __call__(self, samples: Array) -> Array:
         """Samples (n,) or (columns, n), whole, as numbers (..., kept) whose products are those of the whitened samples
-        that count, in units of the noise: Parseval's theorem, without the frequencies outside of all bands."""
-        both_sides = np.sqrt(2 / self._padded)
-        return (self._spectrum(samples) * (both_sides * self._gain)).view(float)
+        that count, in units of the noise, without the frequencies outside of all bands."""
+        return (self._spectrum(samples) * (self._sides * self._gain)).view(float)
 
     def adjoint(self, white: Array) -> Array:
         """Samples (..., n), whole, whose products with other samples are those of numbers (..., kept) with these
         whitened."""
         found = np.zeros((*white.shape[:-1], self._first + self._count))
-        found[..., self._first :] = self._in_time(white.view(complex) * (np.sqrt(self._padded / 2) * self._gain))
+        found[..., self._first :] = self._in_time(white.view(complex) * (self._gain / self._sides))
         return found
 
     def in_time(self, samples: Array) -> Array:

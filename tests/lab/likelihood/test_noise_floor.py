@@ -153,3 +153,13 @@ def test_what_two_right_simulations_differ_by_is_not_above_the_noise() -> None:
     signal = state.predictions[0]
     posterior, there = leaving(0.9 * DISCREPANCY * signal + white(level=1e-3 * float(signal.std())))
     assert excess_over_noise(posterior, there, 1e-3) < UNEXPLAINED
+
+
+@pytest.mark.parametrize(("share", "unexplained"), [(0.012, False), (0.03, True)])
+def test_what_a_calibrated_sensor_may_be_off_by_is_not_above_the_noise(share: float, unexplained: bool) -> None:
+    """Its gain is known to half a per cent, and three of these are usual."""
+    _, state = predicted(6000)
+    signal = state.predictions[0]
+    size = float(signal.std())
+    posterior, there = leaving(share * size * (signal**2 / size**2 - 1) / np.sqrt(2) + white(level=1e-3 * size))
+    assert (excess_over_noise(posterior, there, 1e-3) > UNEXPLAINED) == unexplained

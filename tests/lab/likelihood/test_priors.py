@@ -88,3 +88,19 @@ def test_where_no_run_shows_the_common_factor_of_masses_and_forces_the_wrong_one
     assert {name: share for name, (share, _) in found.items()} == pytest.approx(wrong, abs=0.003)
     assert all(error < 0.004 for _, error in found.values())
     assert not PRIOR.moved(no_common_factor @ moved, covariance_of(1e-3 * no_common_factor))
+
+
+def test_what_is_weighed_well_is_what_other_masses_and_forces_are_counted_against() -> None:
+    """All springs, dampers and tires are a seventh softer than the file says; the sprung mass was weighed to 2 %."""
+    prior = VehiclePrior.of(CAR, Tolerance(by_name={"sprung_mass_kg": 0.02}))
+    moved = np.where(["_n_" in name for name in prior.names], np.log(6 / 7), 0.0)
+    found = prior.moved(moved, 1e-8 * np.eye(len(moved)))
+    assert {*found} == {name for name in prior.names if "_n_" in name}
+
+
+def test_a_fifth_less_is_no_more_beyond_a_tolerance_of_a_fifth_than_a_fifth_more() -> None:
+    well = covariance_of(1e4 * np.eye(len(PRIOR.names)))
+    damping = np.array([name == "front.suspension_damping_n_s_per_m" for name in PRIOR.names], float)
+    assert not PRIOR.beyond_tolerance(np.log(0.805) * damping, well)
+    assert {*PRIOR.beyond_tolerance(np.log(0.75) * damping, well)} == {"front.suspension_damping_n_s_per_m"}
+    assert {*PRIOR.beyond_tolerance(np.log(1.25) * damping, well)} == {"front.suspension_damping_n_s_per_m"}

@@ -3,6 +3,8 @@ and no level is believed below the share of the signal by which right simulation
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -12,7 +14,7 @@ from logger.lab.likelihood.signals import deviance
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.runs import Run
+from logger.runs import RecordFacts, Run, Signal
 
 Array = npt.NDArray[np.float64]
 NOISE = 0.05
@@ -148,3 +150,15 @@ def test_bands_of_a_rig_go_on_above_those_of_cars() -> None:
     assert (np.diff(edges)[edges[:-1] > 30.0] < 0.15 * edges[1:][edges[:-1] > 30.0]).all()
     car = Run("car", rate_hz, np.ones(count), nothing, nothing, Track(1.0, np.zeros(2)))
     assert Bands(car).edges_hz[-2:] == pytest.approx([37.0, 0.37 * rate_hz])
+
+
+def test_products_of_whitened_samples_are_the_same_both_ways_also_of_a_force_that_is_compared_from_0_hz() -> None:
+    """A whitener and its adjoint: <W x, y> = <x, W' y>; 0 Hz has no negative, and counts once."""
+    force = Signal("force_n", "force", "front_suspension")
+    run = replace(run_of(1500), track=Excitation(100.0, np.zeros(1500), moves_part=True), facts=RecordFacts(main=force))
+    bands = Bands(run)
+    assert bands.edges_hz[0] == 0.0
+    whitener, samples = bands.whitener(coloured(1500)), 3.0 + white(1500)
+    seen = whitener(5.0 + coloured(1500, 4))
+    assert whitener(samples) @ seen == pytest.approx(samples @ whitener.adjoint(seen[None])[0], rel=1e-9)
+    assert (whitener.in_time(samples)**2).sum() == pytest.approx((whitener(samples)**2).sum(), rel=0.05)
