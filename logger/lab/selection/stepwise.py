@@ -148,6 +148,9 @@ class Likelihood(Protocol[M, P, F]):
     def leaves_noise(self, there: M | F) -> bool:
         """Whether what is left is noise though it is louder than expected."""
 
+    def explains_most(self, without: M, there: M | F) -> bool:
+        """Whether more than half of the power of what was left is explained, on data that no fit saw."""
+
 
 class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
@@ -206,6 +209,10 @@ class MeasuredRoad:
         """Whether what is left is noise of a colour."""
         fitted = there if isinstance(there, Baseline) else there.found
         return is_coloured_noise(fitted.posterior, fitted.state)
+
+    def explains_most(self, without: Baseline, there: Baseline | CandidateFit) -> bool:
+        """By the errors on held-out stretches."""
+        return there.hold_out.error**2 < 0.5 * without.hold_out.error**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,11 +390,12 @@ class Search(Generic[M, P, F]):
 
     def _is_evident(self, without: M, one: Chosen, gain: float, there: M | F) -> bool:
         """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
-        explain, or what is left with it (``there``) is noise, nothing is imitated."""
+        explain, or what is left with it (``there``) is noise, nothing is imitated; nor by what explains most of the
+        power, be it in so few lines of a spectrum that a likelihood, which counts lines, has hardly gained."""
         if not self._chance_of(without, one, gain) < FALSE_ALARM:
             return False
         return (gain > IMITATION * without.explanation or without.explanation == 0
-                or self.likelihood.leaves_noise(there))
+                or self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there))
 
     def _chance_of(self, without: M, one: Chosen, gain: float) -> float:
         """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are

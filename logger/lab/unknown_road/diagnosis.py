@@ -257,6 +257,10 @@ class UnmeasuredRoad:
         """Never: a colour of the noise is not told from a road."""
         return False
 
+    def explains_most(self, without: RoadModel, there: RoadModel | RoadCandidate) -> bool:
+        """Never: most of the power is the road's."""
+        return False
+
     def _state(self, base: RoadModel, effects: tuple[Chosen, ...]) -> RoadFitState:
         """The state of a model with other effects."""
         return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))

@@ -43,7 +43,7 @@ class Hysteresis(ForceEffect):
                   "at which each suspension slides"),
         Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
                   "over which the force would grow to that at its initial stiffness"),
-        Parameter("sharpness_ratio", 1.0, 0.5, 10.0, None, Scale.LOG, (1.0,),
+        Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (1.0,),
                   "exponent: the higher, the sharper the yield", default=1.0),
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "

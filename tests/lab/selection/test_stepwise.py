@@ -15,7 +15,7 @@ from logger.lab.likelihood.map_fit import MapFit, align, fit
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.screening import Baseline, misalignment, screen
-from logger.lab.selection.stepwise import Round, Search, Selection
+from logger.lab.selection.stepwise import MeasuredRoad, Round, Search, Selection
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Misalignment, chosen
 
@@ -138,6 +138,8 @@ def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Ba
     more_is_left = replace(offset_base, explanation=2 * enough / IMITATION)
     assert sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))  # what is left is noise
     monkeypatch.setattr("logger.lab.selection.stepwise.is_coloured_noise", lambda posterior, state: False)
+    assert sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))  # most of the power is explained
+    monkeypatch.setattr(MeasuredRoad, "explains_most", lambda road, without, there: False)
     assert not sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))
     assert sought.is_accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
 
@@ -175,7 +177,7 @@ def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) 
 
 # A wheel that its guide damps is, but for the road's own speed, one that its tire damps, which is simpler.
 ALONE = tuple(name for name, one in EFFECTS.items()
-              if one.obstacle(CAR, two_tracks=False) is None and name != "frame_damping")
+              if one.obstacle_on(CAR, two_tracks=False, timed=False, pushed=False) is None and name != "frame_damping")
 STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": {"mass_kg": 250.0},
             "tire_damping": {"tire_damping_n_s_per_m": 500.0},
             "tire_enveloping": {"contact_patch_m": 0.5 * CAR.contact_patch_m}, "bump_stop": {"clearance_m": 0.02}}
