@@ -176,7 +176,7 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     forces = [one for one in ordered if isinstance(one.effect, ForceEffect)]
     laws = []
     for axle in _axles(vehicle):
-        corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear)
+        corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear, axle.suspension_stiffness_n_per_m)
         if vehicle.preload_n:
             corner = corner.with_spring(partial(_preload, vehicle.preload_n))
         for one in forces:

@@ -87,6 +87,7 @@ class CornerLaws:
     """One suspension and its tire.
 
     damping_n_s_per_m       of the linear damper
+    stiffness_n_per_m       of the linear spring
     damper                  the damper's force by its own rate: rate [m/s] -> force [N]; grows with the rate
     mount_n_per_m           stiffness of a mount in series with the damper; infinite: none
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
@@ -104,6 +105,7 @@ class CornerLaws:
     """
 
     damping_n_s_per_m: float
+    stiffness_n_per_m: float
     damper: Law
     mount_n_per_m: float = np.inf
     springs: tuple[Law, ...] = ()
@@ -143,6 +145,6 @@ class CornerLaws:
         return replace(self, tires=(*self.tires, law))
 
 
-def linear(damping_n_s_per_m: float, rear: bool = False) -> CornerLaws:
+def linear(damping_n_s_per_m: float, rear: bool = False, stiffness_n_per_m: float = 0.0) -> CornerLaws:
     """The laws of the linear car, which its matrices hold already."""
-    return CornerLaws(damping_n_s_per_m, lambda rate: damping_n_s_per_m * rate, rear=rear)
+    return CornerLaws(damping_n_s_per_m, stiffness_n_per_m, lambda rate: damping_n_s_per_m * rate, rear=rear)

@@ -227,9 +227,10 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
         infinite = name == "mount_n_per_m" and value == np.inf
         if not (infinite or (np.ndim(value) == 0 and np.isfinite(value) and value >= 0)):
             raise ValueError(f"expected laws to answer with {name} of 0 or more, found {value}")
-    if laws.damping_n_s_per_m != before.damping_n_s_per_m:
-        raise ValueError("expected laws to leave damping_n_s_per_m as it was: another damper is "
-                         "replace(laws, damper=...)")
+    for name, other in (("damping_n_s_per_m", "another damper is replace(laws, damper=...)"),
+                        ("stiffness_n_per_m", "another spring is laws.with_spring(...)")):
+        if getattr(laws, name) != getattr(before, name):
+            raise ValueError(f"expected laws to leave {name} as it was: {other}")
     if laws.rear is not before.rear:
         raise ValueError("expected laws to leave rear as it was: it says at which axle they are")
     for name in ("springs", "others", "tires"):
@@ -360,7 +361,8 @@ def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
         effect.structure(p, structure_of(vehicle))
     elif isinstance(effect, ForceEffect):
         for rear in (False, True)[: 1 + (vehicle.rear is not None)]:
-            laws = effect.laws(p, linear(vehicle.front.suspension_damping_n_s_per_m, rear))
+            axle = vehicle.front
+            laws = effect.laws(p, linear(axle.suspension_damping_n_s_per_m, rear, axle.suspension_stiffness_n_per_m))
             laws.damper(_RATE_MPS)
             for law in (*laws.springs, *laws.tires):
                 law(_TRAVEL_M)

@@ -3,7 +3,7 @@ which shares nothing with ridelog."""
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +32,8 @@ def noise(highest_hz: float, size: float, seed: int) -> CubicSpline:
 @dataclass(frozen=True)
 class Bench:
     """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further forces by its travel, and
-    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag; and what an
-    orifice adds to the damper, by the square of its rate."""
+    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag; what an orifice
+    adds to the damper, by the square of its rate; and play of the spring, this way in each direction."""
 
     mass: float = 0.3
     spring: float = 30.0
@@ -44,6 +44,7 @@ class Bench:
     guide_n: float = 0.0
     guide_drag: float = 0.0
     orifice: float = 0.0
+    play_m: float = 0.0
 
     @property
     def yaml(self) -> str:
@@ -63,7 +64,8 @@ class Bench:
             if not self.wheel:
                 wheel_m, wheel_mps = base(t), base(t, 1)
             travel_m, rate_mps = body_m - wheel_m, body_mps - wheel_mps
-            force = self.spring * travel_m + self.damper * rate_mps + self.cubic * travel_m**3
+            felt_m = np.sign(travel_m) * np.maximum(np.abs(travel_m) - self.play_m, 0.0)
+            force = self.spring * felt_m + self.damper * rate_mps + self.cubic * travel_m**3
             force = force + self.orifice * rate_mps * np.abs(rate_mps)
             wheel = (force - self.tire * (wheel_m - base(t)) + on_wheel(t)) / (self.wheel or 1.0)
             guide = self.guide_n * np.tanh(body_mps / 0.001) + self.guide_drag * body_mps
@@ -140,6 +142,26 @@ def test_a_hardening_spring_under_a_force_is_what_the_integrator_says(tmp_path: 
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error < 0.01
     (tmp_path / "bench.yaml").write_text(bench.yaml)
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
+
+
+@pytest.mark.parametrize("bench", [Bench(0.3, 2000.0, 4.0, play_m=5.7e-4), Bench(
+    2.45, 980.0, 12.0, wheel=1.0, tire=6300.0, play_m=5.7e-4)])
+def test_a_spring_with_play_in_its_seat_is_what_the_integrator_says(
+        bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """And the play is found where the file says another stiffness and no play."""
+    base = noise(8.0, 0.0015, 4)
+    seen = bench.moved(base, NOTHING, NOTHING)
+    run = written(tmp_path / "run", {"accel_z_mps2": seen["accel_z_mps2"]}, {"elevation_m": base(TIME_S)},
+                  "source: me\n")
+    (tmp_path / "true.yaml").write_text(f"{bench.yaml}effects:\n- {{name: play, half_gap_m: {bench.play_m}}}\n")
+    assert ridelog.compare(tmp_path / "true.yaml", [run]).error < 0.02  # corners jerk above what a recorder keeps
+    (tmp_path / "bench.yaml").write_text(replace(bench, spring=0.8 * bench.spring).yaml)
+    assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
+    assert main(["add-effect", "play", "--vehicle", str(tmp_path / "bench.yaml"), "--out", str(tmp_path / "with.yaml"),
+                 str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["half_gap_m"] == pytest.approx(bench.play_m, rel=0.01)
+    assert found["error_after"] < 0.03
 
 
 FRICTION = "{name: frame_friction, friction_force_n: 0.8, transition_velocity_m_per_s: 0.001}"

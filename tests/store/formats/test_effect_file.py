@@ -66,6 +66,7 @@ CASES = [
     ("ForceEffect", f"return replace(laws, dry_friction_n={BAD})", "dry_friction_n of 0 or more, found nan"),
     ("ForceEffect", "return replace(laws, mount_n_per_m=2000.0 - 1000 * p.size)", "mount_n_per_m of 0 or more"),
     ("ForceEffect", "return replace(laws, damping_n_s_per_m=1.0 + p.size)", "leave damping_n_s_per_m as it was"),
+    ("ForceEffect", "return replace(laws, stiffness_n_per_m=1.0 + p.size)", "leave stiffness_n_per_m as it was"),
     ("ForceEffect", "return replace(laws, springs=(3.0,))", "a tuple of functions as springs"),
     ("SensorEffect", "return np.full_like(s, 1 / (p.size - 3) if p.size != 3 else np.inf)", "expected factor to answ"),
     ("SensorEffect", "return np.ones(3) if p.size == 3 else np.ones(s.shape)", "expected factor to answer with"),
