@@ -103,7 +103,11 @@ class VehiclePrior:
     def is_vague(self) -> bool:
         """Whether a number may well be so far off that it counts as not measured: a fit that begins at the file's may
         end elsewhere."""
-        return bool((UNUSUAL_SIGMA * self.deviations > WEAKEST).any())
+        return bool(self._not_measured.any())
+
+    @property
+    def _not_measured(self) -> npt.NDArray[np.bool_]:
+        return np.asarray(UNUSUAL_SIGMA * self.deviations > WEAKEST, bool)
 
     def cost(self, logs: Array) -> float:
         """Minus twice the log-density, without its constant."""
@@ -121,7 +125,7 @@ class VehiclePrior:
         Of all cars within the tolerance the likeliest is found, by the likelihood alone to second order. Where it
         explains the runs worse than the fitted one by ``CONFLICT_SIGMA`` squared, the file is wrong in those numbers
         that are at the end of their tolerance in it. So two lengths of which the runs know the sum alone, a wheelbase,
-        show an error of that.
+        show an error of that. A number that nobody measured has no end of a tolerance.
         """
         from scipy.optimize import lsq_linear
 
@@ -135,7 +139,7 @@ class VehiclePrior:
         # The fitted place is the mean of the runs' own estimate and of the prior's, by their information.
         likeliest = (1 + weights) / np.sqrt(weights) * (ways[:, known].T @ place)
         # A change is a share of the number: 20 % less is no more than 20 % more, though its logarithm is.
-        high = np.full(len(logs), Tolerance.band)
+        high = np.where(self._not_measured, np.inf, Tolerance.band)
         low = np.minimum(np.log1p(-np.minimum(high * self.deviations, 0.9)) / self.deviations, -high)
         within = np.asarray(lsq_linear(columns, likeliest, (low, high)).x, float)
         worse = ((columns @ within - likeliest) ** 2).sum() - ((columns @ place - likeliest) ** 2).sum()
@@ -170,11 +174,11 @@ class VehiclePrior:
         logs, errors    fitted logarithms and their standard errors (p,), which include the prior
 
         Where the prior is right, a fitted number scatters around it by the root of what the runs took from its
-        variance.
+        variance. A number that nobody measured contradicts nothing.
         """
         scatter = np.sqrt(np.maximum(self.deviations**2 - errors**2, 0.0))
         return bool(((np.abs(logs) > Tolerance.band * self.deviations)
-                     & (np.abs(logs) > UNUSUAL_SIGMA * scatter)).any())
+                     & (np.abs(logs) > UNUSUAL_SIGMA * scatter) & ~self._not_measured).any())
 
     @property
     def precision(self) -> Array:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Effect, Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.vehicle import OWN_NAMES, Vehicle
 
 Complex = npt.NDArray[np.complex128]
 
 # So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE_S, _WRONG_S = 2e-4, 0.002
 _THIRD = 1 / 3
+_ONE_RECORDER_S = 0.01
+"""What moves a part or a mass on a bench and what it does are channels of one recorder, which are a sample apart at the
+most; such recorders take 100 samples a second or more. A longer delay is physics: a spring in series, a damping."""
 
 
 class TimeOffset(SensorEffect):
@@ -30,10 +35,13 @@ class TimeOffset(SensorEffect):
     realigns, reshapes = True, False
     stage = 4
 
+    def on(self, vehicle: Vehicle) -> Effect:
+        return _OF_ONE_RECORDER if vehicle.model in OWN_NAMES else self
+
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         if seen is None:
             return [{"delay_s": -_WRONG_S}, {"delay_s": _WRONG_S}]
-        wrong_s = [seen.delay_s] if abs(seen.delay_s) > _WRONG_S else []
+        wrong_s = [seen.delay_s] if _WRONG_S < abs(seen.delay_s) <= self.parameters[0].high else []
         return [{"delay_s": delay_s} for delay_s in (_LITTLE_S, *wrong_s)]
 
     def is_trifle(self, values: Mapping[str, float], seen: Misalignment) -> bool:
@@ -48,4 +56,11 @@ class TimeOffset(SensorEffect):
         return np.exp(-s * p.delay_s)
 
 
+class _OfOneRecorder(TimeOffset):
+    title = "what was measured is late against what drives it"
+    parameters = (replace(TimeOffset.parameters[0], start=0.002, low=-_ONE_RECORDER_S, high=_ONE_RECORDER_S,
+                          trials=(-0.002, 0.002)),)
+
+
+_OF_ONE_RECORDER = _OfOneRecorder()
 EFFECT = TimeOffset()

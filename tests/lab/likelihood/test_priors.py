@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.vehicle.named_parameters import read
+from logger.vehicle.uncertain import Known
 
 from ...support.lab.runs_with_residual import CAR
 
@@ -104,3 +105,14 @@ def test_a_fifth_less_is_no_more_beyond_a_tolerance_of_a_fifth_than_a_fifth_more
     assert not PRIOR.beyond_tolerance(np.log(0.805) * damping, well)
     assert {*PRIOR.beyond_tolerance(np.log(0.75) * damping, well)} == {"front.suspension_damping_n_s_per_m"}
     assert {*PRIOR.beyond_tolerance(np.log(1.25) * damping, well)} == {"front.suspension_damping_n_s_per_m"}
+
+
+def test_a_number_that_nobody_measured_contradicts_nothing() -> None:
+    """A gas spring that is not there, of a damper whose file says ``unknown``."""
+    name = "front.suspension_stiffness_n_per_m"
+    unknown = VehiclePrior.of(CAR, Tolerance(by_name={name: Known.unknown(name, 1.0).deviation}))
+    gone = np.where(np.array(unknown.names) == name, -20.0, 0.0)
+    errors = 0.01 * unknown.deviations
+    assert not unknown.is_in_conflict(gone, errors) and PRIOR.is_in_conflict(gone, errors)
+    well = np.diag(errors**2)
+    assert name not in unknown.beyond_tolerance(gone, well) and name in PRIOR.beyond_tolerance(gone, well)
