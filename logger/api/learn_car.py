@@ -228,6 +228,8 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
 
 def learned(question: LearnCarQuestion) -> LearnedVehicle:
     """The answer to ``LearnCarQuestion``, which says what is raised."""
+    import numpy as np
+
     from logger.estimation.drive_spectra import joined
     from logger.identification.unknown_car import CarKnowledge, UnknownCar
 
@@ -237,10 +239,31 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     question.progress("finding the car")
     problem, car = UnknownCar(joined([one.spectra for one in used]), knowledge).learn()
     question.progress("checking it")
-    _check_drives(used, knowledge, car.x, question.progress)
+    rough, smooth = problem.by_level(car)
+    unlike = rough.log_evidence + smooth.log_evidence - car.log_evidence
+    _check_drives(used, knowledge, car.x, unlike, question.progress)
     _check_car(problem, car)
     _check_wheelbase(problem, car)
-    return _answer(question, used, problem, car)
+    if unlike < _TWO_CARS:
+        return _answer(question, used, problem, car, [])
+    off = (rough.x - smooth.x) / 2
+    return _answer(question, used, problem, replace(car, covariance=car.covariance + np.outer(off, off)),
+                   [_not_linear(rough, smooth)])
+
+
+def _not_linear(rough: LearnedCar, smooth: LearnedCar) -> str:
+    """What is said of a car that answers rough roads otherwise than smooth ones."""
+    name = _most_apart(rough, smooth, _COMPARED[:-1])
+    like = "friction" if rough.x[_place(name)] < smooth.x[_place(name)] else "a progressive spring or damper"
+    return (f"This car is not linear: {_words_of(name)} is {_value(rough, name)} on rough road, {_value(smooth, name)} "
+            f"on smooth road, as with {like}. The errors hold half the difference; ridelog diagnose over a measured "
+            "street finds the effect.")
+
+
+def _most_apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> str:
+    """Of some numbers the one by which two cars differ most, in standard errors."""
+    return max(names, key=lambda name: abs(one.x[_place(name)] - other.x[_place(name)]) / (
+        one.std[_place(name)]**2 + other.std[_place(name)]**2)**0.5)
 
 
 def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
@@ -266,10 +289,9 @@ def _moved(x: Array, at: int, step: float) -> Array:
     return moved
 
 
-def _check_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, tell: Any) -> None:
-    """CheckFailed where one drive, or one group of many, is of another car than the rest."""
-    import numpy as np
-
+def _check_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, unlike: float, tell: Any) -> None:
+    """CheckFailed where one drive, or one group of many, is of another car than the rest. ``unlike``: logarithm of how
+    many times likelier another car on rough roads than on smooth ones is than one: it explains drives that differ."""
     from logger.estimation.drive_spectra import joined
     from logger.identification.unknown_car import UnknownCar
 
@@ -295,9 +317,8 @@ def _check_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, 
         own, rest = fitted(group), fitted(others)
         found.append((own.log_evidence + rest.log_evidence, group, others, own, rest))
     evidence, group, others, own, rest = max(found, key=lambda one: one[0])
-    if evidence - fitted(used).log_evidence > _TWO_CARS:
-        name = max(_COMPARED, key=lambda one: abs(own.x[_place(one)] - rest.x[_place(one)]) / np.hypot(
-            own.std[_place(one)], rest.std[_place(one)]))
+    if evidence - fitted(used).log_evidence > max(_TWO_CARS, unlike):
+        name = _most_apart(own, rest, _COMPARED)
         those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
         as_what = "the others" if len(others) > 1 else others[0].name
         raise CheckFailed(
@@ -354,8 +375,8 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
                           "without a trailer?")
 
 
-def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar
-            ) -> LearnedVehicle:
+def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar,
+            missing: Sequence[str]) -> LearnedVehicle:
     import numpy as np
 
     from logger.api.vehicles import Model
@@ -400,10 +421,11 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
         "speed_high_mps": float(problem.spectra.speed_mps.max()),
         "iri": [{"speed_mps": speed, "std_share": now[speed], "std_share_before": ever[speed]} for speed in speeds],
         "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
-        "converged": car.is_converged, "not_identifiable": unknown, "changes": moved, "other_than_settings": misfits}
+        "converged": car.is_converged, "not_identifiable": unknown,
+        "effects_missing": list(missing), "changes": moved, "other_than_settings": misfits}
     lines = [*_head(used, problem, seconds), "", *_table(values, deviations), "", *_iri_lines(now, ever), "",
              *_kept_lines(errors), _mass_line(question, mass), *_warnings(values, deviations, car),
-             *unknown, *moved, *misfits]
+             *missing, *unknown, *moved, *misfits]
     comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in
                        [f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *lines])
     return LearnedVehicle("\n".join(lines), as_json, model, values, deviations, now, ever,

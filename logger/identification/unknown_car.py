@@ -260,7 +260,7 @@ class UnknownCar:
             if gain < _SMALL_GAIN:
                 converged = True
                 break
-        known = 0.5 * float(np.linalg.slogdet(self.knowledge.precision)[1])
+        known = 0.5 * float(np.linalg.slogdet(self.knowledge.precision)[1]) - self.stretches * np.log(WAVINESS_APART)
         return LearnedCar(self.knowledge, x, step.covariance, roads, value + known + step.log_volume, converged)
 
     def is_impulsive(self, x: Array) -> npt.NDArray[np.bool_]:
@@ -283,6 +283,14 @@ class UnknownCar:
         rest = hole - share * (taken[:, :1] + taken[:, 1:] * self.slope)
         score = (self.weight * (self.power / whole - 1) * rest).sum(axis=1)
         return np.asarray(score > _HOLE_SIGMA * np.sqrt((self.weight * rest * hole).sum(axis=1)))
+
+    def by_level(self, car: LearnedCar) -> tuple[LearnedCar, LearnedCar]:
+        """The car of the rougher and of the smoother half of the blocks of each stretch: of a linear car they agree."""
+        stretch, level = self.spectra.stretch, car.roads.level
+        usual = np.array([np.median(level[stretch == one]) for one in range(self.stretches)])
+        rough, smooth = (UnknownCar(self.spectra.part(half), self.knowledge).fit_from(car.x)
+                         for half in (level > usual[stretch], level <= usual[stretch]))
+        return rough, smooth
 
     def learn(self) -> tuple[UnknownCar, LearnedCar]:
         """The car, and the problem without the blocks that are impulsive with it: which those are follows from the car,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from logger.vehicle.uncertain import cars_off
 
 from ..support.command import called
 from ..support.drives.logged_rows import ROW
-from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, mixed, written
+from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, driven, mixed, written
 
 CAR = UnmeasuredCar()
 SECONDS = 120.0
@@ -104,6 +105,29 @@ def test_what_is_no_drive_is_refused_in_one_line(tmp_path: Path, runs: list[Path
                         ((runs[3], "--wheelbase", 2.66), "expected two minutes of steady driving")):
         found = called("learn-car", *words)
         assert found.returncode == 2 and said in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_friction_is_named_and_stays_in_the_errors(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
+    """Friction acts as damping that is weaker where the road is rough: each drive is half on a rough road, half on a
+    smooth one."""
+    rng = np.random.default_rng(8)
+    damped = [replace(CAR, **{end: (bounce, factor * damping, hop, ratio) for end, (bounce, damping, hop, ratio)
+                              in (("front", CAR.front), ("rear", CAR.rear))}) for factor in (1.1, 1.7)]
+    drives = []
+    for mps in (20 * MPH, 35 * MPH, 60 * MPH):
+        parts = [driven(car, rng, SECONDS, mps, 2.1, iri) for car, iri in zip(damped, (5.0, 2.0), strict=True)]
+        drives.append((np.concatenate([accel for accel, _ in parts]), np.concatenate([speed for _, speed in parts])))
+    found = called("learn-car", *written(tmp_path, drives), "--wheelbase", 2.66, "--json")
+    assert found.returncode == 0, found.stderr
+    answer = json.loads(found.stdout)
+    said, = answer["effects_missing"]
+    assert "damping ratio" in said and "as with friction" in said
+    for end in ("front", "rear"):
+        value, error = (answer[key][f"{end}.damping_ratio"] for key in ("parameters", "standard_errors"))
+        low, high = (getattr(car, end)[1] for car in damped)
+        assert value - 2 * error < low and high < value + 2 * error
+    assert learned[0]["effects_missing"] == []
 
 
 @pytest.mark.slow
