@@ -145,11 +145,12 @@ class Simulated:
         return float(np.sqrt(np.mean((self.measured - model)[skip:] ** 2)))
 
 
-def simulated(found: Improved, run: Path, measured: Array | None = None) -> Simulated:
+def simulated(found: Improved, run: Path, measured: Array | None = None, thin: bool = False) -> Simulated:
     """Simulations of a run by the refitted rig and by that with its effects, at the recorded times; ``measured`` (n,)
-    in place of the run's own, whose mean is left out where its zero is not known."""
+    in place of the run's own, whose mean is left out where its zero is not known; ``thin``: at as few samples a second
+    as the lab compares, which leave out the noise above."""
     def output(model: Model) -> tuple[float, Array, Array]:
-        bench = bench_with(CompareQuestion(model, run), thin=False)
+        bench = bench_with(CompareQuestion(model, run), thin=thin)
         one = bench.runs.runs[0]
         return one.rate_hz, one.measured_mps2, one.main(bench.runs.predict(compose(model.vehicle, model.effects))[0])
 
