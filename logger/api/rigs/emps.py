@@ -108,8 +108,8 @@ STUDY = Study(
     rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "Coulomb friction is found by name, and the force is twice as near with it."),
      Item("EMPS numbers", Word.AGREES, "Mass within 2.5 % and Coulomb friction within 15 %. Viscous friction comes out "
-          "a tenth to a third too high: the published one weighs all frequencies alike, ours each by what is left there, "
-          "which is least where the axis hardly moves.")),
+          "a tenth to a third too high: the published one weighs all frequencies alike, ours each by what is left "
+          "there, which is least where the axis hardly moves.")),
     source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",
     data=f"the EMPS record ({_DOWNLOAD})")
 STUDIES = (STUDY,)
