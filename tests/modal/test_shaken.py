@@ -49,7 +49,7 @@ def test_the_command_finds_both_modes_of_a_car(tmp_path: Path, capsys: pytest.Ca
     assert main(["modes", file, "--input", "u"]) == 0
     text = capsys.readouterr().out
     assert "beside its measured input" in text
-    assert text.count("+-") == 5  # two modes of two figures, and the sentence about them
+    assert text.count("±") == 5  # two modes of two figures, and the sentence about them
     for method in ("era", "decrement"):
         with pytest.raises(BadInput, match=f"expected a free decay for --method {method}.*--method ssi"):
             main(["modes", file, "--columns", "a", "--method", method])

@@ -27,7 +27,7 @@ NAMES: dict[str, frozenset[str]] = {
     BY_TIRE: frozenset({"tire_force"}),
     FRICTION: frozenset({"axle_friction", "friction_with_memory"}),
     RUBBER: frozenset({"spring_with_memory"}),
-    PLAY: frozenset({"damper_backlash"}),
+    PLAY: frozenset({"damper_backlash", "sliding_behind_spring"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
     CORRECTION: frozenset({"record_factor", "clipping", "loose_sensor"}),

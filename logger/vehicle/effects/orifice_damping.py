@@ -11,8 +11,8 @@ from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import CornerLaws
 
 
-class QuadraticDamping(ForceEffect):
-    name = "quadratic_damping"
+class OrificeDamping(ForceEffect):
+    name = "orifice_damping"
     title = "dampers whose force grows with the square of the rate: an orifice, or air"
     parameters = (
         Parameter("quadratic_damping_n_s2_per_m2", 2000.0, 0.0, 2e4, 0.0, Scale.LINEAR, (500.0, 4000.0),
@@ -28,4 +28,4 @@ class QuadraticDamping(ForceEffect):
         return replace(laws, damper=lambda rate_mps: damper(rate_mps) + size * rate_mps * np.abs(rate_mps))
 
 
-EFFECT = QuadraticDamping()
+EFFECT = OrificeDamping()
