@@ -61,7 +61,7 @@ class Stance(Protocol):
 class Resurfaced(Protocol):
     """What a road is that differs from its profile; equal for two that differ alike."""
 
-    def __call__(self, spacing_m: float, elevation_m: Array) -> Array:
+    def __call__(self, spacing_m: float, elevation_m: Array, /) -> Array:
         """Elevations of the road (n,), of those of a track in its profile (n,) at this spacing [m]."""
 
     def __hash__(self) -> int: ...
@@ -74,7 +74,7 @@ Surface = tuple[Resurfaced, ...]
 class Actuator(Protocol):
     """What a force is that differs from its record; equal for two that differ alike."""
 
-    def __call__(self, rate_hz: float, force_n: Array) -> Array:
+    def __call__(self, rate_hz: float, force_n: Array, /) -> Array:
         """The force that acts (n,), of the one recorded (n,) at this rate [N]."""
 
     def __hash__(self) -> int: ...

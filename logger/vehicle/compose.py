@@ -117,25 +117,16 @@ class Car:
 
 
 @dataclass(frozen=True)
-class _Resurfaced:
-    """What an effect does to a profile."""
+class _OfInput:
+    """What an effect does to a profile of this spacing, or to a force of this rate; equal for two of the same values.
+    """
 
-    effect: RoadEffect
+    effect: RoadEffect | ActuatorEffect
     values: tuple[tuple[str, float], ...]
 
-    def __call__(self, spacing_m: float, elevation_m: Array) -> Array:
-        return self.effect.road(SimpleNamespace(**dict(self.values)), spacing_m, elevation_m)
-
-
-@dataclass(frozen=True)
-class _Actuated:
-    """What an effect does to a force."""
-
-    effect: ActuatorEffect
-    values: tuple[tuple[str, float], ...]
-
-    def __call__(self, rate_hz: float, force_n: Array) -> Array:
-        return self.effect.force(SimpleNamespace(**dict(self.values)), rate_hz, force_n)
+    def __call__(self, sampling: float, samples: Array) -> Array:
+        does = self.effect.road if isinstance(self.effect, RoadEffect) else self.effect.force
+        return does(SimpleNamespace(**dict(self.values)), sampling, samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +155,9 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     structure = structure_of(vehicle)
     if (given, vehicle.model) == ("half_car", "full_car"):
         structure = replace(structure, sides=2)
-    surface = tuple(_Resurfaced(one.effect, tuple(sorted(one.values.items())))
-                    for one in ordered if isinstance(one.effect, RoadEffect))
-    actuators = tuple(_Actuated(one.effect, tuple(sorted(one.values.items())))
-                      for one in ordered if isinstance(one.effect, ActuatorEffect))
+    surface, actuators = (tuple(_OfInput(one.effect, tuple(sorted(one.values.items())))
+                                for one in ordered if isinstance(one.effect, kind))
+                          for kind in (RoadEffect, ActuatorEffect))
     if surface or actuators:
         structure = replace(structure, surface=surface, actuators=actuators)
     for one in ordered:
