@@ -206,8 +206,7 @@ def test_what_acts_on_a_single_mass_from_its_guide_is_named(
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction_n", "push_n", "names"), [
     (0.0, 0.0, set()), (0.0, 5.0, {"constant_force"}),
-    pytest.param(15.0, 5.0, {"constant_force", "dry_friction"}, marks=pytest.mark.xfail(
-        strict=True, reason="in 12 s neither of them is named: found on longer records"))])
+    (15.0, 5.0, {"constant_force", "dry_friction"})])
 def test_a_free_axis_is_named_what_acts_on_it_by_its_places_alone(
         friction_n: float, push_n: float, names: set[str], tmp_path: Path) -> None:
     """Its record begins anywhere, on its way, and it drifts; nothing of it is above 4 Hz. The file is a fifth off."""

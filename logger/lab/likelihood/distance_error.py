@@ -129,6 +129,7 @@ class RecordError:
         any force as large as those measured is as likely."""
         signals = (self.run.facts.main, *self.run.signals)
         gain, *gains = (self.tolerance.gain_of(one) for one in signals)
+        gain = min(gain, self.tolerance.gain)  # what is measured first sets the scale of all numbers
         zero = [float(np.sqrt(np.mean(self.run.kept_readings_mps2**2))) or 1.0] if self.has_zero else []
         return np.array([gain, self.tolerance.droop, *gains, *zero])
 
