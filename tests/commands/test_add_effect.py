@@ -41,7 +41,7 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     compared = json.loads(capsys.readouterr().out)
     assert compared["error"] == pytest.approx(reported["error_as_written"], rel=1e-6)
     assert compared["refitted"]["error"] == pytest.approx(reported["error_after"], rel=0.02)
-    assert {one["name"] for one in reported["numbers"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
+    assert {one["name"] for one in reported["vehicle_parameters"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
 
     model = read_model(first)
     assert [one.effect.name for one in model.effects] == ["dry_friction"]
@@ -49,8 +49,8 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert model.effects[0].standard_errors == reported["standard_errors"]
     assert [step.step for step in model.history] == ["as it was given", "parameters refitted", "added dry_friction"]
     assert model.history[-1].error == reported["error_after"]
-    mass = next(one for one in reported["numbers"] if one["name"] == "sprung_mass_kg")
-    assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["written"]
+    mass = next(one for one in reported["vehicle_parameters"] if one["name"] == "sprung_mass_kg")
+    assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["with"]
 
     # Rebound and bump are alike in this car: one more number gains nothing.
     assert add("damper_asymmetry:rebound_to_bump_ratio=1.1", first, second, *runs) == 0

@@ -66,8 +66,8 @@ def test_numbers_are_far_off_by_their_prior(runs: list[str], capsys: pytest.Capt
         assert compare(*runs, "--json", "--tolerance", tolerance) == 0
         reported.append(json.loads(capsys.readouterr().out)["refitted"])
     firm, loose = reported
-    assert firm["moved_far"] and not loose["moved_far"]
-    assert max(map(abs, loose["moves"].values())) > max(map(abs, firm["moves"].values()))
+    assert firm["shifted_far"] and not loose["shifted_far"]
+    assert max(map(abs, loose["shifts"].values())) > max(map(abs, firm["shifts"].values()))
 
 
 def test_what_cannot_be_compared(runs: list[str], tmp_path: Path) -> None:

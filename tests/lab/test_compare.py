@@ -84,7 +84,7 @@ def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Compar
 
 def test_json_has_what_the_format_names(lacking: Comparison) -> None:
     reported = json.loads(json.dumps(comparison_json(lacking), allow_nan=False))
-    assert {"error", "runs", "where", "evidence", "refitted", "marks"} <= reported.keys()
+    assert {"error", "runs", "where", "evidence", "refitted", "residual_tests"} <= reported.keys()
     assert {"run", "error", "samples"} <= reported["runs"][0].keys()
     where = reported["where"]
     assert {"from_hz", "to_hz", "error_power_share"} <= where["frequency"][0].keys()
@@ -95,7 +95,7 @@ def test_json_has_what_the_format_names(lacking: Comparison) -> None:
     assert shares == sorted(shares, reverse=True)
     assert all(isinstance(sentence, str) and sentence.endswith(".") for sentence in reported["evidence"])
     assert reported["refitted"]["error"] == lacking.steps[-1].error == reported["errors"][1]["error"]
-    assert reported["refitted"]["moves"].keys() >= {"sprung_mass_kg"}
+    assert reported["refitted"]["shifts"].keys() >= {"sprung_mass_kg"}
 
 
 def test_one_short_run() -> None:

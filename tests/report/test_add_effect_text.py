@@ -113,6 +113,6 @@ def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was
     assert errors == [0.43, 0.154, 0.15]
     assert reported["helps"] is True and reported["p_value"] == 1e-12
     assert reported["biased"] == ["rear.tire_stiffness_n_per_m", "sprung_mass_kg"]
-    assert reported["numbers"][1] == {
+    assert reported["vehicle_parameters"][1] == {
         "name": "sprung_mass_kg", "nominal": 875.0, "without": 846.0, "without_standard_error": 9.8, "with": 876.0,
-        "with_standard_error": 7.5, "shift_standard_errors": 4.0, "written": 876.0}
+        "with_standard_error": 7.5, "shift_standard_errors": 4.0}

@@ -131,8 +131,8 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
     _, moved, same, _ = diagnosis_summary(found)
     assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure one of them" in moved
     assert same.startswith("payload (") and "mass_kg 108 kg) would move all of them in this way" in same
-    assert diagnosis_json(found)["numbers_moved"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
-    assert diagnosis_json(found)["moved_as_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
+    assert diagnosis_json(found)["parameter_shifts"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
+    assert diagnosis_json(found)["shift_explained_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
 
 
 def test_distances_that_are_off_are_reported() -> None:
@@ -207,7 +207,7 @@ def test_the_object_has_what_the_contract_promises() -> None:
     assert (best["error"], best["p_value"], best["confused_with"]) == (0.2, 1e-12, [])
     assert best["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
     assert others[0]["standard_errors"] == {}
-    assert (best["log_likelihood_gain"], best["unseen_log_likelihood_gain"]) == (250.0, 248.0)
+    assert (best["log_likelihood_gain"], best["held_out_log_likelihood_gain"]) == (250.0, 248.0)
 
 
 def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> None:
@@ -215,9 +215,9 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
         "roll": "one track is known", "sensor_offset": ALREADY_PRESENT}, undetectable=(
             Undetectable(EFFECTS["wheel_lift"], 0.1),))
     reported = json.loads(json.dumps(diagnosis_json(found), allow_nan=False))
-    assert reported["unexplained"] is True and reported["left_over_noise"] == 1.5
-    assert reported["numbers_off_too_far"] == {"sprung_mass_kg": -0.13}
-    assert reported["not_tried"] == {"roll": "one track is known"} and reported["hidden"] == {"wheel_lift": 0.1}
+    assert reported["unexplained"] is True and reported["residual_over_noise"] == 1.5
+    assert reported["beyond_tolerance"] == {"sprung_mass_kg": -0.13}
+    assert reported["not_tried"] == {"roll": "one track is known"} and reported["undetectable"] == {"wheel_lift": 0.1}
     assert reported["judged_on"] == JUDGED_ON
     assert reported["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
     assert reported["sentences"] == [*diagnosis_summary(found), *looks_like(found)]

@@ -85,12 +85,12 @@ class Comparison(CommandResult):
         return self.found.missing
 
     @property
-    def moves(self) -> Mapping[str, float]:
+    def shifts(self) -> Mapping[str, float]:
         """By which share each number moved for the refit."""
         return self.found.moves
 
     @property
-    def moved_far(self) -> tuple[str, ...]:
+    def shifted_far(self) -> tuple[str, ...]:
         """Numbers that moved farther than their tolerance."""
         return self.found.far
 
@@ -276,10 +276,10 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
         "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
         **errors_json(found.steps, found.floor),
         "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
-                     "moves": dict(found.moves), "moved_far": list(found.far)},
+                     "shifts": dict(found.moves), "shifted_far": list(found.far)},
         "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
-        "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
+        "residual_tests": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
     }
 
 
@@ -653,15 +653,14 @@ def addition_json(found: AddedEffects) -> dict[str, Any]:
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
-        "error_unseen_before": found.error_refitted, "error_unseen_after": found.error_after,
         **errors_json(found.steps, found.noise_floor_error),
         **band_json(found.band), **removed_json(found.removed), "tolerance": found.tolerance,
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
-        "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
-                     "without_standard_error": one.without_standard_error, "with": one.found,
-                     "with_standard_error": one.standard_error, "shift_standard_errors": one.shift,
-                     "written": one.found}
-                    for one in found.moved],
+        "vehicle_parameters": [
+            {"name": one.name, "nominal": one.nominal, "without": one.without,
+             "without_standard_error": one.without_standard_error, "with": one.found,
+             "with_standard_error": one.standard_error, "shift_standard_errors": one.shift}
+            for one in found.moved],
         "signals": {name: {"error_refitted": one.before, "error_after": one.after,
                            "noise_floor_error": one.noise_floor} for name, one in found.signals.items()},
         "biased": [one.name for one in found.moved if one.biased],

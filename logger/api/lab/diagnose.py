@@ -493,30 +493,30 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     return {
         "baseline_error": found.baseline_error, "noise_floor_error": found.noise_floor_error,
-        "unseen_noise_floor_error": found.noise_floor_error, "judged_on": JUDGED_ON,
+        "judged_on": JUDGED_ON,
         "candidates": [
             {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
              "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),
-             "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
+             "log_likelihood_gain": one.gain / 2, "held_out_log_likelihood_gain": one.held_out_gain / 2}
             for one in found.candidates],
         "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
         "starts": {name: {"ended_there": there, "of": count} for name, (there, count) in found.ends.items()},
         "contradicted": list(found.contradicted),
-        "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.beyond),
-        "numbers_moved": {name: {"share": share, "standard_error": error}
+        "residual_over_noise": 1 + found.excess, "beyond_tolerance": dict(found.beyond),
+        "parameter_shifts": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},
-        "moved_as_by": None if found.as_moved is None else {
+        "shift_explained_by": None if found.as_moved is None else {
             "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
-        "signals_off": dict(found.signals_off), "contradicted_by": list(found.contradicted_by),
+        "signals_in_conflict": dict(found.signals_off), "contradicted_by": list(found.contradicted_by),
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         **errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
-        "hidden": {one.effect.name: one.deviations for one in found.undetectable},
+        "undetectable": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
         **band_json(found.band), **removed_json(found.removed),
         "sentences": [*diagnosis_summary(found), *looks_like(found)],
@@ -740,11 +740,11 @@ def same_road_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
              "standard_errors": errors.get(one.name, {}), "log_likelihood_gain": one.gain / 2}
             for one in found.candidates],
         "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
-        "left_over_noise": 1 + found.excess,
+        "residual_over_noise": 1 + found.excess,
         "steps": [{"step": words, "error": error} for words, error in _same_road_steps(found)],
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
         "undecided": [one.name for one in found.undecided],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
-        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "hidden": dict(found.hidden),
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "undetectable": dict(found.hidden),
         "sentences": [*same_road_summary(found), *cannot_tell(found)],
     }
