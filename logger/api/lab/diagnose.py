@@ -745,6 +745,7 @@ def same_road_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
         "undecided": [one.name for one in found.undecided],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
-        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road), "undetectable": dict(found.hidden),
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road),
+        "undetectable": dict(found.hidden),
         "sentences": [*same_road_summary(found), *cannot_tell(found)],
     }
