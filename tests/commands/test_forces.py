@@ -5,28 +5,29 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 import ridelog
 from logger.commands.main import main
 from logger.errors import BadInput
 
+from ..support.drives.course import Course, integrated
+
 Array = npt.NDArray[np.float64]
 RATE_HZ = 250.0
 TIME_S = np.arange(0, 12, 1 / RATE_HZ)
 
 
-def noise(highest_hz: float, size: float, seed: int) -> CubicSpline:
+def noise(highest_hz: float, size: float, seed: int) -> Course:
     """Low-passed noise of an r.m.s. ``size``, which begins and ends at rest."""
     drawn = np.random.default_rng(seed).standard_normal(len(TIME_S))
     slow = sosfiltfilt(butter(4, highest_hz, fs=RATE_HZ, output="sos"), drawn)
-    return CubicSpline(TIME_S, size * slow / slow.std() * np.minimum(1.0, np.minimum(TIME_S, TIME_S[::-1])) ** 2)
+    return Course(RATE_HZ, size * slow / slow.std() * np.minimum(1.0, np.minimum(TIME_S, TIME_S[::-1])) ** 2)
 
 
 @dataclass(frozen=True)
@@ -56,25 +57,28 @@ class Bench:
                 f"  suspension_damping_n_s_per_m: {self.damper}\n"
                 f"  tire_stiffness_n_per_m: {self.tire}\ncontact_patch_m: 0\n")
 
-    def moved(self, base: CubicSpline, on_body: Callable[[Array], Array], on_wheel: Callable[[Array], Array]
+    def moved(self, base: Course, on_body: Callable[[Array], Array], on_wheel: Callable[[Array], Array]
               ) -> Mapping[str, Array]:
         """What its sensors measure when forces push its parts up."""
-        def accelerations(t: Array, y: Array) -> Array:
-            body_m, wheel_m, body_mps, wheel_mps = y
+        def accelerations(t: Any, body_m: Any, wheel_m: Any, body_mps: Any, wheel_mps: Any) -> tuple[Any, Any]:
+            ground_m = base(t)
             if not self.wheel:
-                wheel_m, wheel_mps = base(t), base(t, 1)
+                wheel_m, wheel_mps = ground_m, base(t, 1)
             travel_m, rate_mps = body_m - wheel_m, body_mps - wheel_mps
-            felt_m = np.sign(travel_m) * np.maximum(np.abs(travel_m) - self.play_m, 0.0)
+            felt_m = travel_m
+            if self.play_m:
+                felt_m = np.sign(travel_m) * np.maximum(np.abs(travel_m) - self.play_m, 0.0)
             force = self.spring * felt_m + self.damper * rate_mps + self.cubic * travel_m**3
-            force = force + self.orifice * rate_mps * np.abs(rate_mps)
-            wheel = (force - self.tire * (wheel_m - base(t)) + on_wheel(t)) / (self.wheel or 1.0)
-            guide = self.guide_n * np.tanh(body_mps / 0.001) + self.guide_drag * body_mps
-            return np.stack([(on_body(t) - force - guide) / self.mass, wheel * (self.wheel > 0)])
+            force = force + self.orifice * rate_mps * abs(rate_mps)
+            guide = self.guide_drag * body_mps
+            if self.guide_n:
+                guide = guide + self.guide_n * np.tanh(body_mps / 0.001)
+            wheel = (force - self.tire * (wheel_m - ground_m) + on_wheel(t)) / self.wheel if self.wheel else 0.0
+            return (on_body(t) - force - guide) / self.mass, wheel
 
-        y = solve_ivp(lambda t, y: np.concatenate([y[2:], accelerations(t, y)]), (0, TIME_S[-1]), [0.0] * 4,
-                      t_eval=TIME_S, rtol=1e-8, atol=1e-11, max_step=0.004).y
+        y = integrated(lambda t, y: (*y[2:], *accelerations(t, *y)), 4, TIME_S, 1e-8, 1e-11, 0.004)
         wheel_m, wheel_mps = (y[1], y[3]) if self.wheel else (base(TIME_S), base(TIME_S, 1))
-        return {"accel_z_mps2": accelerations(TIME_S, y)[0], "displacement_m": y[0], "velocity_mps": y[2],
+        return {"accel_z_mps2": accelerations(TIME_S, *y)[0], "displacement_m": y[0], "velocity_mps": y[2],
                 "travel_m": y[0] - wheel_m, "wheel_m": wheel_m, "rate_mps": y[2] - wheel_mps}
 
 
@@ -87,7 +91,7 @@ def written(folder: Path, columns: Mapping[str, Array], driving: Mapping[str, Ar
     return folder
 
 
-NOTHING = CubicSpline(TIME_S, np.zeros(len(TIME_S)))
+NOTHING = Course(RATE_HZ, np.zeros(len(TIME_S)))
 BODY = "forces: {force_n: {on: body}}\n"
 
 

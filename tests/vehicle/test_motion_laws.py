@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 
 from logger.api.lab.bench import among, known_effects, sought_effects
 from logger.errors import BadInput
@@ -27,6 +27,8 @@ from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.modes import modes_of_car
 from logger.vehicle.stepping import Way, march
 from logger.vehicle.vehicle import Axle, Vehicle
+
+from ..support.drives.course import integrated
 
 RIG = Vehicle("rig", "quarter_car", 300.0, None, Axle(0.0, 40.0, 20000.0, 600.0, 2e5), None, 0.25)
 STEP_S, LASTS_S = 5e-4, 2.0
@@ -66,7 +68,7 @@ def by_newton(added, memory: int = 0) -> np.ndarray:
     """
     axle, m = RIG.front, RIG.sprung_mass_kg
 
-    def derivative(t: float, y: np.ndarray) -> list[float]:
+    def derivative(t: float, y: list[float]) -> list[float]:
         body, wheel, body_mps, wheel_mps = y[:4]
         travel, rate = body - wheel, body_mps - wheel_mps
         press, press_mps = wheel - shaken_m(t), wheel_mps - shaken_mps(t)
@@ -76,8 +78,7 @@ def by_newton(added, memory: int = 0) -> np.ndarray:
                 (strut - axle.tire_stiffness_n_per_m * press - on_wheel) / axle.unsprung_mass_kg, *grow]
 
     time_s = STEP_S * np.arange(round(LASTS_S / STEP_S) + 1)
-    return solve_ivp(derivative, (0, LASTS_S), np.zeros(4 + memory), "LSODA", time_s, rtol=1e-8, atol=1e-10,
-                     max_step=1e-3).y.T
+    return integrated(derivative, 4 + memory, time_s, 1e-8, 1e-10, 1e-3).T
 
 
 def off(found: np.ndarray, expected: np.ndarray, plain: np.ndarray) -> float:
@@ -149,13 +150,13 @@ def test_hysteresis_without_a_yield_travel_is_coulomb_friction() -> None:
 
 def loop_area_n_m(amplitude_m: float, values: SimpleNamespace) -> float:
     """Of a settled loop of the law, by SciPy along the way."""
-    def slope(t: float, z: np.ndarray) -> list[float]:
+    def slope(t: float, z: list[float]) -> list[float]:
         v = 2 * pi * amplitude_m * np.cos(2 * pi * t)
         return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
 
     settled = 12
-    t = np.linspace(settled, settled + 1, 4001)
-    z = solve_ivp(slope, (0, settled + 1), [0.0], "LSODA", t, rtol=1e-9, atol=1e-12, max_step=5e-3).y[0]
+    t = np.linspace(0, settled + 1, 4000 * (settled + 1) + 1)
+    t, z = (one[4000 * settled:] for one in (t, integrated(slope, 1, t, 1e-9, 1e-12, 5e-3)[0]))
     f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
     return float(np.trapezoid(f, amplitude_m * np.sin(2 * pi * t)))
 

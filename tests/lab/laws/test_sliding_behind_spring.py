@@ -23,14 +23,14 @@ FORCE_N, OVER_M, POWER, RATIO, PLAY_M, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 1
 
 def true_force(place_m: Array, ratio: float, play_m: float, rate_mps: float) -> Array:
     """Its equations as its docstring has them: shortening is a negative force."""
-    def size(stretch: Array | float) -> Array | float:
-        return (stretch - np.clip(stretch, -play_m, play_m)) / OVER_M
+    def rates(_t: float, _x: float, v: float, state: list[float]) -> list[float]:
+        s = (state[0] - min(max(state[0], -play_m), play_m)) / OVER_M
+        return [v - (rate_mps if s > 0 else -rate_mps) * abs(s * (ratio if s < 0 else 1.0)) ** POWER]
 
-    def rates(_t: float, _x: float, v: float, state: Array) -> list[float]:
-        s = float(size(state[0]))
-        return [v - np.sign(s) * rate_mps * abs(s * (ratio if s < 0 else 1.0)) ** POWER]
+    def force(x: Array, v: Array, s: Array) -> Array:
+        return STIFFNESS * x + DAMPING * v + FORCE_N * (s[0] - np.clip(s[0], -play_m, play_m)) / OVER_M
 
-    return force_of(rates, lambda x, v, s: STIFFNESS * x + DAMPING * v + FORCE_N * size(s[0]), 1, place_m)
+    return force_of(rates, force, 1, place_m)
 
 
 @pytest.mark.parametrize(("variant", "ratio", "play_m"), [

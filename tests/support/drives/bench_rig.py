@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.signal import chirp
+
+from .course import Course, integrated
 
 Array = npt.NDArray[np.float64]
 
@@ -78,26 +79,23 @@ def swept_table(lasts_s: float, from_hz: float = 1.0, to_hz: float = 25.0, at_on
 def shaken(rig: Rig, elevation_m: Array) -> Recorded:
     """What sensors on the rig say, without noise."""
     time_s = np.arange(len(elevation_m)) / RATE_HZ
-    table = CubicSpline(time_s, elevation_m)
+    table = Course(RATE_HZ, elevation_m)
 
-    rises = table.derivative()
-
-    def forces(t: Array, x: Array) -> tuple[Array, Array]:
+    def forces(t: Any, x: Any) -> tuple[Any, Any]:
         travel, rate = x[0] - x[1], x[2] - x[3]
         between = (rig.spring * travel + rig.cubic * travel**3 + rig.damper * rate
                    + rig.friction_n * np.tanh(rate / SLIP_MPS))
-        tire = rig.tire * (table(t) - x[1]) + rig.tire_damper * (rises(t) - x[3])
+        tire = rig.tire * (table(t) - x[1]) + rig.tire_damper * (table(t, 1) - x[3])
         return (-between - rig.body_guide_n * np.tanh(x[2] / SLIP_MPS),
                 between + tire - rig.wheel_guide_n * np.tanh(x[3] / SLIP_MPS))
 
-    def motion(t: float, x: Array) -> list[float]:
-        on_body, on_wheel = forces(np.asarray(t), x)
-        return [x[2], x[3], float(on_body) / rig.body_kg, float(on_wheel) / rig.wheel_kg]
+    def motion(t: float, x: list[float]) -> list[float]:
+        on_body, on_wheel = forces(t, x)
+        return [x[2], x[3], on_body / rig.body_kg, on_wheel / rig.wheel_kg]
 
     dense = 4
     fine_s = np.arange((len(time_s) - 1) * dense + 1) / RATE_HZ / dense
-    found = solve_ivp(motion, (0.0, fine_s[-1]), np.zeros(4), "LSODA", fine_s, rtol=1e-7, atol=1e-10, max_step=0.002)
-    x = found.y
+    x = integrated(motion, 4, fine_s, 1e-7, 1e-10, 0.002)
     on_body, on_wheel = forces(fine_s, x)
     body, wheel = on_body / rig.body_kg, on_wheel / rig.wheel_kg
     return Recorded(time_s, elevation_m, *(_sampled(one, dense) for one in (body, wheel, x[0] - x[1])))

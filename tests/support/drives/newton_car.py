@@ -112,9 +112,17 @@ def judge(
                           (left[across] * force).sum(axis=0) / roll_i])
         return body, (force - kt[across] * (heights[3:] - z)) / mu[across], x
 
-    def derivative(t: float, y: np.ndarray) -> np.ndarray:
-        body, wheel, _ = accelerations(y, under(np.asarray(t)))
+    def rates(y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        body, wheel, _ = accelerations(y, z)
         return np.concatenate([y[3 + w:], body, wheel])
+
+    # All of it is linear: what one state or one height does, a unit of it shows.
+    states = 2 * (3 + w)
+    by_state = rates(np.eye(states), np.zeros((w, states)))
+    by_height = rates(np.zeros((states, w)), np.eye(w))
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        return np.asarray(by_state @ y + by_height @ under(np.asarray(t)))
 
     start = under(np.asarray(time_s[0]))
     # Standing still: the plane through the road under the wheels, if they are all in one; tests take care of that.

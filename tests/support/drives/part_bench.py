@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
+
+from .course import Course, integrated
 
 Array = npt.NDArray[np.float64]
 
@@ -31,15 +31,13 @@ def moved(seed: int, seconds: float, reach_m: float, top_hz: float) -> Array:
     return np.asarray(reach_m * slowly * found / np.abs(found).max())
 
 
-def force_of(rates: Callable[[float, float, float, Array], list[float]], force: Callable[[Array, Array, Array], Array],
+def force_of(rates: Callable[[float, float, float, list[float]], list[float]], force: Callable[[Array, Array, Array], Array],
              states: int, place_m: Array) -> Array:
     """Force (n,) of a part with states: ``rates`` (time, place, rate, states), ``force`` (places, rates, states)."""
     time_s = np.arange(len(place_m)) / RATE_HZ
-    way = CubicSpline(time_s, place_m)
-    quick = way.derivative()
-    found = solve_ivp(lambda t, z: rates(t, float(way(t)), float(quick(t)), z), (0, time_s[-1]), np.zeros(states),
-                      "LSODA", time_s, rtol=1e-6, atol=1e-9, max_step=4 / RATE_HZ)
-    return force(way(time_s), quick(time_s), found.y)
+    way = Course(RATE_HZ, place_m)
+    found = integrated(lambda t, z: rates(t, way(t), way(t, 1), z), states, time_s, 1e-6, 1e-9, 4 / RATE_HZ)
+    return force(way(time_s), way(time_s, 1), found)
 
 
 def fluid_that_yields(place_m: Array) -> Array:
@@ -50,7 +48,7 @@ def fluid_that_yields(place_m: Array) -> Array:
     def inner(x: Any, v: Any, z: Any, y: Any) -> Any:
         return (alpha * z + c0 * v + k0 * (x - y)) / (c0 + c1)
 
-    def rates(_t: float, x: float, v: float, state: Array) -> list[float]:
+    def rates(_t: float, x: float, v: float, state: list[float]) -> list[float]:
         z, y = state
         dy = inner(x, v, z, y)
         w = v - dy
@@ -66,7 +64,7 @@ def valve_with_play(place_m: Array) -> Array:
     def pull(stretch: Array) -> Array:
         return k * (stretch - np.clip(stretch, -play, play))
 
-    def rates(_t: float, x: float, _v: float, state: Array) -> list[float]:
+    def rates(_t: float, x: float, _v: float, state: list[float]) -> list[float]:
         return [float(np.interp(pull(x - state[0]), XC90_N, XC90_MPS, -9.0, 9.0))]
 
     return force_of(rates, lambda x, v, s: pull(x - s[0]), 1, place_m)
@@ -76,7 +74,7 @@ def rubber(place_m: Array) -> Array:
     """Rubber: a spring, two frictions that give before they slide, and a branch that creeps."""
     k, frictions, branch, creep = 2.2e5, ((60.0, 2e-4), (60.0, 8e-4)), 6e4, 0.05
 
-    def rates(_t: float, x: float, v: float, state: Array) -> list[float]:
+    def rates(_t: float, x: float, v: float, state: list[float]) -> list[float]:
         slid = [v / y * (1 - 0.5 * abs(z) * (1 + np.sign(v * z))) for (_, y), z in zip(frictions, state, strict=False)]
         return [*slid, (x - state[2]) / creep]
 
