@@ -76,9 +76,12 @@ def test_words_that_the_glossary_replaces_are_in_no_document_help_message_or_pag
     replaced = re.findall(r"^\| [^|]+ \| ([a-z' ]+) \|$", rows, re.MULTILINE)[1:]
     assert len(replaced) >= 12
     found = re.compile(rf"\b(?:{'|'.join(replaced)})\b")
+    # Nearly all modules have none of them in any way, and need not be parsed.
+    nearly = re.compile("|".join(r"""[\s"'fr]+""".join(one.split()) for one in replaced))
     said = {page.name: [page.read_text("utf-8")] for page in PAGES if page != glossary}
     for package in ("logger", "drivers"):
-        said |= {str(file): strings(ast.parse(file.read_text("utf-8"))) for file in (ROOT / package).rglob("*.py")}
+        said |= {str(file): strings(ast.parse(file.read_text("utf-8"))) for file in (ROOT / package).rglob("*.py")
+                 if nearly.search(file.read_text("utf-8").lower())}
     assert [(name, one) for name, texts in said.items() for text in texts
             for one in found.findall(" ".join(text.lower().split()))] == []
     assert strings(ast.parse("'doc'\nx = f'at {x} first' + 'b'\n")) == ["at  first", "b"]

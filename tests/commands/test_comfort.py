@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,8 @@ from logger.commands.main import main
 from logger.dsp.weightings import wb, wd, wf, wk
 from logger.errors import BadInput
 from logger.plugins import catalogue
+
+from ..support.command import called
 
 WEIGHTINGS = ", ".join(catalogue("logger.dsp.weightings", "WEIGHTING"))
 AGREED = ["weighting", "a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor", "comfort"]
@@ -142,9 +143,8 @@ def test_wrong_use(tmp_path: Path, arguments: list[str], rate_hz: float, seconds
         main(["comfort", str(path), *arguments])
 
 
-def test_the_command_exits_2_with_one_line(tmp_path: Path, ridelog: Path) -> None:
-    done = subprocess.run([ridelog, "comfort", tmp_path / "none.csv", "--weighting", "none"], capture_output=True,
-                          text=True, check=False)
+def test_the_command_exits_2_with_one_line(tmp_path: Path) -> None:
+    done = called("comfort", tmp_path / "none.csv", "--weighting", "none")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert WEIGHTINGS in done.stderr
 

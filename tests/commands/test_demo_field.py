@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -51,8 +50,8 @@ def test_a_run_of_either_sensor_can_be_read_and_says_what_its_steps_are(
     assert fine.step_mps2 is None
 
 
-def test_one_demo_at_a_time(ridelog: Path) -> None:
-    done = subprocess.run([ridelog, "demo", "--field", "--lab"], capture_output=True, text=True, check=False)
+def test_one_demo_at_a_time() -> None:
+    done = called("demo", "--field", "--lab")
     assert (done.returncode, done.stdout) == (2, "")
 
 

@@ -17,6 +17,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 
 from ..support.drives.course import Course, integrated
+from ..support.slow import slow
 
 Array = npt.NDArray[np.float64]
 RATE_HZ = 250.0
@@ -95,7 +96,8 @@ NOTHING = Course(RATE_HZ, np.zeros(len(TIME_S)))
 BODY = "forces: {force_n: {on: body}}\n"
 
 
-@pytest.mark.parametrize("bench", [Bench(), Bench(60e3, 6e6, 5e4), Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0)])
+@pytest.mark.parametrize("bench", [
+    Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0), *slow(Bench(), Bench(60e3, 6e6, 5e4))])
 def test_every_signal_of_a_rig_on_a_shaken_base_under_forces_is_exact(
         bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     base, push = noise(15.0, 0.003, 1), noise(20.0, bench.spring / 100, 2)
@@ -148,8 +150,8 @@ def test_a_hardening_spring_under_a_force_is_what_the_integrator_says(tmp_path: 
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
 
 
-@pytest.mark.parametrize("bench", [Bench(0.3, 2000.0, 4.0, play_m=5.7e-4), Bench(
-    2.45, 980.0, 12.0, wheel=1.0, tire=6300.0, play_m=5.7e-4)])
+@pytest.mark.parametrize("bench", [
+    Bench(0.3, 2000.0, 4.0, play_m=5.7e-4), *slow(Bench(2.45, 980.0, 12.0, wheel=1.0, tire=6300.0, play_m=5.7e-4))])
 def test_a_spring_with_play_in_its_seat_is_what_the_integrator_says(
         bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """And the play is found where the file says another stiffness and no play."""
@@ -172,7 +174,8 @@ FRICTION = "{name: frame_friction, friction_force_n: 0.8, transition_velocity_m_
 DRAG = "{name: frame_damping, body_damping_n_s_per_m: 3}"
 
 
-@pytest.mark.parametrize("hidden", [{"guide_n": 0.8}, {"guide_drag": 3.0}, {"guide_n": 0.8, "guide_drag": 3.0}])
+@pytest.mark.parametrize("hidden", [
+    {"guide_n": 0.8}, {"guide_drag": 3.0}, *slow({"guide_n": 0.8, "guide_drag": 3.0})])
 def test_a_mass_that_goes_along_a_guide_on_the_ground_is_what_the_integrator_says(
         hidden: dict[str, float], tmp_path: Path) -> None:
     bench, base, push = Bench(1.2, 900.0, 4.0, **hidden), noise(12.0, 0.001, 5), noise(12.0, 0.5, 6)

@@ -1,7 +1,6 @@
 """``ridelog iri`` as people and programs call it."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,8 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.roads import iso8608
 from logger.roads.iri import iri
+
+from ..support.command import called
 
 SPACING_M = 0.05
 
@@ -129,10 +130,10 @@ def test_what_has_no_iri_is_refused_by_name(
     assert str(error.value).startswith(f"{path}: {message}")
 
 
-def test_the_installed_command_answers_in_one_line(ridelog: Path, tmp_path: Path) -> None:
+def test_the_command_answers_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "bad.csv"
     path.write_text("distance_m,elevation_m\n0,1\n0.25,oops\n")
-    ended = subprocess.run([ridelog, "iri", path, "--json"], capture_output=True, text=True, check=False)
+    ended = called("iri", path, "--json")
     assert (ended.returncode, ended.stdout) == (2, "")
     assert ended.stderr == f"ridelog: {path}:3: expected a number for elevation_m, found 'oops'\n"
 

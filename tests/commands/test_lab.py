@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from collections.abc import Callable
 from html import escape
 from html.parser import HTMLParser
@@ -22,6 +21,7 @@ from logger.store.formats.vehicle_file import read_model
 from logger.vehicle.effect import ForceEffect, chosen
 from logger.vehicle.laws import CornerLaws
 
+from ..support.command import called
 from ..support.lab.runs_with_effects import FEW, named, write_runs
 
 
@@ -168,11 +168,12 @@ def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: py
     assert told_of == sorted(told_of)
 
 
-def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+def test_nobody_to_ask_and_bad_input_is_one_line(runs: list[str], tmp_path: Path,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", StringIO())
     out = tmp_path / "file"
     out.touch()
-    done = subprocess.run([ridelog, "lab", "--vehicle", "rav4-2009", runs[0], "--out", str(out)], check=False,
-                          capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = called("lab", "--vehicle", "rav4-2009", runs[0], "--out", out)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == f"ridelog: --out {out}: expected a folder\n"
 

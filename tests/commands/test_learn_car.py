@@ -18,6 +18,7 @@ from logger.vehicle.uncertain import cars_off
 from ..support.command import called
 from ..support.drives.logged_rows import ROW
 from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, driven, mixed, written
+from ..support.slow import slow
 
 CAR = UnmeasuredCar()
 SECONDS = 120.0
@@ -59,7 +60,7 @@ def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[
     assert "Spectra at" in page.read_text() and "<svg" in page.read_text()
 
 
-@pytest.mark.parametrize("wrong_m", [2.66 * 1.1, 2.66 * 0.9])
+@pytest.mark.parametrize("wrong_m", [2.66 * 1.1, *slow(2.66 * 0.9)])
 def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     found = called("learn-car", *runs, "--wheelbase", wrong_m)
     assert found.returncode == 1 and found.stdout == ""

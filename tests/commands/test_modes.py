@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,8 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+
+from ..support.command import called
 
 AGREED = ["frequency_hz", "damping_ratio", "frequency_std_hz", "damping_std"]
 
@@ -128,6 +129,6 @@ def test_records_that_will_not_do(tmp_path: Path) -> None:
         main(["modes", str(big)])
 
 
-def test_the_command_exits_2_with_one_line(tmp_path: Path, ridelog: Path) -> None:
-    done = subprocess.run([ridelog, "modes", tmp_path / "none.csv"], capture_output=True, text=True, check=False)
+def test_the_command_exits_2_with_one_line(tmp_path: Path) -> None:
+    done = called("modes", tmp_path / "none.csv")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)

@@ -17,6 +17,8 @@ from logger.errors import BadInput
 from logger.report.charts import chart
 from logger.roads.iri import continuous_iri, rectified_slope, window_iri
 
+from ..support.slow import slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -44,7 +46,10 @@ COMMANDS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+LONG = ("classify", "comfort", "estimate")
+
+
+@pytest.mark.parametrize("name", [*(one for one in COMMANDS if one not in LONG), *slow(*LONG)])
 def test_a_result_is_a_page_that_stands_alone_and_pictures_are_files_of_their_kind(
         name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(folder)

@@ -25,6 +25,8 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
 from logger.vehicle.structure import body_point
 
+from ..support.command import called
+
 BUMP = "bump:start_m=20,height_m=0.08,width_m=3.6"
 ROAD = Track(0.05, iso8608.generate(256, 100, 0.05, 3), 30.0)
 
@@ -63,8 +65,7 @@ def test_the_installed_command(folder: Path, ridelog: Path) -> None:
          "12", "--out", folder / "drive.csv"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, f"Wrote {folder / 'drive.csv'}\n")
     assert "drive.csv: rav4-2009 (half car)" in done.stdout
-    failed = subprocess.run([ridelog, "simulate", "--vehicle", "rav5", "--flat", "9", "--speed", "1", "--out", "x.csv"],
-                            capture_output=True, text=True, check=False, cwd=folder)
+    failed = called("simulate", "--vehicle", "rav5", "--flat", "9", "--speed", "1", "--out", folder / "x.csv")
     assert failed.returncode == 2
     assert failed.stderr.startswith("ridelog: no vehicle 'rav5'")
     assert failed.stderr.count("\n") == 1

@@ -154,7 +154,7 @@ def test_other_cars_and_places_of_the_sensor(name: str, ahead_m: float) -> None:
     assert np.mean([window.iri_m_per_km for window in known]) == pytest.approx(truth.mean(), rel=0.05)
 
 
-@pytest.mark.parametrize("window_m", [3.0, 10.01, 100.0, *slow(7.62, 10.0, 30.48)])
+@pytest.mark.parametrize("window_m", [3.0, 100.0, *slow(7.62, 10.0, 10.01, 30.48)])
 def test_windows_of_any_length(window_m: float) -> None:
     one = driven(steady(20.0), 3.0, 2, window_m=window_m)
     found = estimated(an_estimator(window_m=window_m), one.read(FINE), one.distance_m)
@@ -344,9 +344,9 @@ def test_a_sensor_that_hangs(sensor: Sensor) -> None:
 
 
 @pytest.mark.parametrize(("sensor", "iri", "speed_mps"), [
-    (FINE, 0.3, 12.0), (COARSE, 0.3, 12.0), (COARSE, 10.0, 45.0), (FINE, 100.0, 9.0),
-    *slow((FINE, 10.0, 45.0), (FINE, 30.0, 20.0), (COARSE, 30.0, 20.0), (COARSE, 100.0, 9.0), (FINE, 100.0, 18.0),
-          (COARSE, 100.0, 18.0))])
+    (FINE, 0.3, 12.0), (COARSE, 0.3, 12.0), (FINE, 100.0, 9.0),
+    *slow((COARSE, 10.0, 45.0), (FINE, 10.0, 45.0), (FINE, 30.0, 20.0), (COARSE, 30.0, 20.0), (COARSE, 100.0, 9.0),
+          (FINE, 100.0, 18.0), (COARSE, 100.0, 18.0))])
 def test_smooth_rough_and_fast(sensor: Sensor, iri: float, speed_mps: float) -> None:
     one = driven(steady(speed_mps), iri, 6)
     found = estimated(an_estimator(sensor), one.read(sensor), one.distance_m)

@@ -19,6 +19,7 @@ from logger.fleet import summary
 from logger.fleet.dataset import Dataset
 
 from ..support.drives.fleet_town import drives, town, write_logs
+from ..support.slow import slow
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +200,7 @@ def test_wrong_use_is_one_line(arguments: list[str], complaint: str, logs: Path,
         main(["fleet", *(places.get(one, one) for one in arguments)])
 
 
-@pytest.mark.parametrize("most", [1, 8])
+@pytest.mark.parametrize("most", [1, *slow(8)])
 def test_biases_of_few_roads_with_many_passes_are_estimated(most: int, logs: Path, tmp_path: Path,
                                                             capsys: pytest.CaptureFixture[str],
                                                             monkeypatch: pytest.MonkeyPatch) -> None:

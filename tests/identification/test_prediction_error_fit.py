@@ -171,6 +171,7 @@ def test_another_record_than_this_one_is_not_explained() -> None:
     assert not fit(model, model.measured).verdict
 
 
+@pytest.mark.slow
 def test_all_starts_have_one_end() -> None:
     records = [bump_record(CAR, 8.0, seed=seed, height_m=height_m, start_m=12.0)
                for seed, height_m in enumerate((0.15, 0.10))]

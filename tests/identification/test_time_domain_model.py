@@ -126,6 +126,7 @@ def test_a_bump_of_which_only_the_kind_is_known_beside_friction() -> None:
     assert np.abs(off(found([run], [rubbing(60.0)], starts, road), truth)).max() < 3.0
 
 
+@pytest.mark.slow
 def test_a_speed_that_is_recorded_too_large() -> None:
     run = recorded(road_record(CAR, 12.0, 14.0, 5), [effect("sensor_gain", gain=1.1)])
     run = replace(run, distance_m=1.004 * run.distance_m, speed_mps=1.004 * run.speed_mps)

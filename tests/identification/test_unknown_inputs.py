@@ -35,6 +35,7 @@ from logger.vehicle.named_parameters import free
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.drives.bumps import bump_record
+from ..support.slow import slow
 
 Array = npt.NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
             assert slopes[run][:, index] == pytest.approx(difference, abs=1e-4 * max(size, 1e-9)), number.name
 
 
-@pytest.mark.parametrize("names", [(MASS, HEIGHT, START), (MASS, HEIGHT, WIDTH, START),
+@pytest.mark.parametrize("names", [(MASS, HEIGHT, START), *slow(((MASS, HEIGHT, WIDTH, START),)),
                                    (MASS, HEIGHT, WIDTH, START, SPEED)])
 def test_bump_and_mass_together(names: tuple[str, ...]) -> None:
     road = GUESS if WIDTH in names else RoadInput(bump=Bump(2.2, 0.12, 2.6))

@@ -131,6 +131,7 @@ def test_others_are_candidates_where_they_are_better_than_the_refit_the_least_pr
     assert all(best.error < one.error < refitted and one.held_out_gain < best.held_out_gain for one in others)
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_there_is_refitted_and_not_tried() -> None:
     present = [hidden("sensor_offset", offset_m=0.3)]
     found = diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)]), FEW, present)

@@ -19,6 +19,8 @@ import pytest
 from drivers.dump import Event, open_dump
 from logger.shipped import vehicle_file
 
+from ..support.command import called
+
 PATIENCE_S = 90.0
 
 
@@ -261,11 +263,11 @@ def test_status_for_a_person_and_for_a_program(
     ],
 )
 def test_wrong_settings_are_refused_with_their_line(
-    ridelog: Path, tmp_path: Path, text: str, line: int, word: str
+    tmp_path: Path, text: str, line: int, word: str
 ) -> None:
     config = tmp_path / "ridelog.yaml"
     config.write_text(text)
-    done = subprocess.run([ridelog, "run", "--config", config], capture_output=True, text=True, timeout=PATIENCE_S)
+    done = called("run", "--config", config)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert f"{config}:{line}" in done.stderr
@@ -328,6 +330,7 @@ def test_a_serial_accelerometer_pulled_and_put_back(
     assert any("gap" in words for words in flags)
 
 
+@pytest.mark.slow
 def test_systemd_is_reported(
     ridelog: Path, gps: SerialDevice, short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

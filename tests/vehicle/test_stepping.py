@@ -201,6 +201,7 @@ def test_each_law_leaves_what_newton_says(case: str) -> None:
     assert np.sqrt(np.mean((found(*effects) - expected)[inside] ** 2)) < allowed * own
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_is_simulated_as_newton_says(tmp_path: Path) -> None:
     """The example of docs/own-effect.md."""
     page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")

@@ -57,6 +57,7 @@ def test_a_steady_tone_and_one_by_the_way(monkeypatch: pytest.MonkeyPatch) -> No
     assert spatial_frequency(turning, (0.3, 1.6)) == pytest.approx(0.531, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_noise_does_not_repeat(monkeypatch: pytest.MonkeyPatch) -> None:
     context = look_at(monkeypatch, [np.zeros(COUNT)] * 2)
     assert tone_in_time(context, (5.0, 37.0), False) is None and spatial_frequency(context, (0.3, 1.6)) is None

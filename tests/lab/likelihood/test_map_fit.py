@@ -55,6 +55,7 @@ def test_a_car_that_lacks_nothing_ends_at_the_noise_with_the_numbers_that_it_has
     assert np.abs(found.state.logs / posterior.prior.deviations).max() < 1.0
 
 
+@pytest.mark.slow
 def test_a_car_that_is_off_within_its_tolerance_ends_at_the_noise_too() -> None:
     posterior = drawn([], 4, plain().state.size).posterior
     found = from_start(posterior)

@@ -15,6 +15,7 @@ from logger.vehicle.effect import chosen
 
 from ...support.lab.runs_with_residual import CAR, a_run, measuring
 from ...support.lab.secret_runs import EFFECTS, Dense, hidden, posterior_of, secret_runs
+from ...support.slow import slow
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +98,7 @@ def test_a_road_that_hardly_moves_the_car_hides_them_all() -> None:
 
 
 @pytest.mark.parametrize(("name", "values"), [
-    ("payload", {"mass_kg": 90.0}), ("cg_shift", {"shift_m": -0.1}), (None, {})])
+    ("payload", {"mass_kg": 90.0}), *slow(("cg_shift", {"shift_m": -0.1})), (None, {})])
 def test_an_effect_that_the_numbers_absorb_is_told_by_their_move(name: str | None, values: dict[str, float]) -> None:
     """A load, or another centre of gravity, within the tolerance of 20 %; with nothing hidden there is no word."""
     runs = posterior_of(secret_runs([hidden(name, **values)] if name else []), tolerance=Tolerance())

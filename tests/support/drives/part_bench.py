@@ -31,8 +31,8 @@ def moved(seed: int, seconds: float, reach_m: float, top_hz: float) -> Array:
     return np.asarray(reach_m * slowly * found / np.abs(found).max())
 
 
-def force_of(rates: Callable[[float, float, float, list[float]], list[float]], force: Callable[[Array, Array, Array], Array],
-             states: int, place_m: Array) -> Array:
+def force_of(rates: Callable[[float, float, float, list[float]], list[float]],
+             force: Callable[[Array, Array, Array], Array], states: int, place_m: Array) -> Array:
     """Force (n,) of a part with states: ``rates`` (time, place, rate, states), ``force`` (places, rates, states)."""
     time_s = np.arange(len(place_m)) / RATE_HZ
     way = Course(RATE_HZ, place_m)
