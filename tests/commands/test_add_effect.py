@@ -14,6 +14,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 
 from ..support.lab.runs_with_effects import OWN, named, write_runs
+from ..support.slow import release
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +100,7 @@ def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("absent", ["wheel_lift", "dry_friction"])
+@pytest.mark.parametrize("absent", ["wheel_lift", *release("dry_friction")])
 def test_what_the_cars_own_numbers_have_left_to_gain_is_no_merit_of_an_effect(
     absent: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

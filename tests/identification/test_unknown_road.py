@@ -184,7 +184,7 @@ def test_distances_that_disagree_a_little_are_found() -> None:
         found(HALF, [[slow, stretched]], MASS, probes=2)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_drives_over_two_roads_are_not_over_one() -> None:
     drives = [driven(HALF, track(120.0, seed), speed, 90.0, seed) for seed, speed in ((4, 10.0), (5, 18.0))]
     with pytest.raises(NotIdentifiable) as caught:

@@ -79,7 +79,7 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: DemoDrive, expected: list[str], seed: int) -> None:
     assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
@@ -95,7 +95,7 @@ def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
 
 
 @pytest.mark.slow
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=st.integers(0, 1000))
 def test_waking_at_any_time_changes_nothing(short_drive: DemoDrive, expected: list[str], seed: int) -> None:
     rng = random.Random(seed)
@@ -225,7 +225,7 @@ def with_outages(events: list[Event], seed: int) -> list[Event]:
 
 
 @pytest.mark.slow
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
 def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
     short_drive: DemoDrive, seed: int, only: str, bridge_s: int

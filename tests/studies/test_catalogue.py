@@ -30,6 +30,8 @@ SLOW = ("section-7-2-input", "table-6-3", "iso-8041-bursts", "table-6-1", "fig-4
         "section-7-2-speed", "fig-5-22", "fig-6-9", "section-7-2-other-vehicles", "section-7-2-sensor-position",
         "fig-6-23", "fig-6-16", "table-6-5", "fig-4-22", "fig-4-21", "fig-4-31", "table-5-4")
 """Studies that take more than a third of a second with the least effort."""
+LONG = ("section-7-2-input", "table-6-3", "fig-6-9")
+"""Those that take 10 to 40 s."""
 
 
 def stands_alone(text: str, pictures: int) -> None:
@@ -39,7 +41,8 @@ def stands_alone(text: str, pictures: int) -> None:
 
 
 @pytest.mark.parametrize("name", [
-    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name, study in STUDIES.items()
+    pytest.param(name, marks=pytest.mark.release if name in LONG else pytest.mark.slow if name in SLOW else ())
+    for name, study in STUDIES.items()
     if not study.data])
 def test_a_study_runs_and_is_whole(name: str) -> None:
     study = STUDIES[name]

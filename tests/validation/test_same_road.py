@@ -27,7 +27,7 @@ def reported_of(seed: int, effect: str | None, folder: Path) -> dict[str, Any]:
                             same_road=True, candidates=FEW).as_json()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_missing_effect_is_found(tmp_path: Path) -> None:
     reported = reported_of(1, "sensor_mount_resonance", tmp_path)
     first = next(one for one in reported["candidates"] if one["effect"] == reported["verdict"][0])

@@ -21,7 +21,7 @@ from logger.vehicle.effect import Chosen, Misalignment, chosen
 
 from ...support.lab.runs_with_residual import CAR
 from ...support.lab.secret_runs import EFFECTS, hidden, posterior_of, secret_runs
-from ...support.slow import slow
+from ...support.slow import release, slow
 
 STILL = Misalignment(1.0, 0.0)
 FEW = ("sensor_gain", "sensor_offset", "time_offset", "tire_damping")
@@ -184,8 +184,14 @@ STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": 
 ROUGHER = {"progressive_spring": 2.0, "bump_stop": 2.0, "wheel_lift": 6.0}
 
 
+OF_EACH_KIND = ("tire_damping", "dry_friction", "bump_stop", "payload", "sensor_mount_resonance", "body_bending",
+                "time_offset", "tire_enveloping", "top_mount_compliance")
+"""A linear force, one that is not, one that acts seldom, a number of the car, a filter, a mode, a clock, the road under
+a tire, and one with states of its own: of each kind one at every change, the others before a release."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ALONE)
+@pytest.mark.parametrize("name", [*OF_EACH_KIND, *release(*(one for one in ALONE if one not in OF_EACH_KIND))])
 def test_every_effect_is_found_where_it_is_what_is_missing(name: str) -> None:
     there = chosen(EFFECTS[name], EFFECTS[name].usual | STRONGER.get(name, {}))
     runs = secret_runs([there], rougher=ROUGHER.get(name, 1.0), lasts_s=15.0)
@@ -215,7 +221,7 @@ def test_a_bracket_and_a_bending_body_are_distinguished_though_one_can_take_the_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scale", "delay_s"), [(1.01, 0.05), pytest.param(1.02, 0.08, marks=pytest.mark.release)])
+@pytest.mark.parametrize(("scale", "delay_s"), release((1.01, 0.05), (1.02, 0.08)))
 def test_a_wrong_speed_and_a_late_clock_are_both_found_though_either_alone_gains_little(
         scale: float, delay_s: float) -> None:
     both = [hidden("speed_scale", scale=scale), hidden("time_offset", delay_s=delay_s)]
