@@ -25,7 +25,6 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize_scalar
 
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
@@ -198,6 +197,8 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
 
     For each ratio of the two the common level has a formula; the ratio is searched.
     """
+    from scipy.optimize import minimize_scalar
+
     rate_hz = 2 * float(f_hz[-1])
     periodograms, road_parts, sensor_parts = [], [], []
     for residual, road in zip(residuals, roads, strict=True):

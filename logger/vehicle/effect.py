@@ -389,6 +389,12 @@ class Chosen:
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)
 
+    def is_shaped_as(self, other: Chosen) -> bool:
+        """Whether another is the same effect with the same frequencies, knees and choices, whatever its strength."""
+        return self.effect is other.effect and all(
+            self.values[one.name] == other.values[one.name] for one in self.effect.parameters
+            if one.null is None or not one.is_free)
+
     def resonates_above(self, high_hz: float, by_flank: bool = False) -> bool:
         """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing.
 

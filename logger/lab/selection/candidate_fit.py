@@ -70,13 +70,15 @@ def _shapes(effect: Effect) -> int:
     return len({tuple(values[one.name] for one in effect.parameters if one.null is None) for values in effect.trials()})
 
 
-def fit_roughly(score: float, base: Baseline, screen: Screened) -> list[CandidateFit]:
+def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -np.inf) -> list[CandidateFit]:
     """Fit an effect from each of its trials, with the derivatives of the model without it; best first. A trial whose
     car cannot be simulated, as its numbers were extrapolated too far, is left out.
 
     score    of the model that gains are counted from
+    least    gain of a trial below which it is no start, if it is not the first
     """
-    fits = (_rough_fit(score, base, trial) for trial in screen.trials)
+    fits = (_rough_fit(score, base, trial) for place, trial in enumerate(screen.trials)
+            if not place or trial.gain > least)
     return sorted((one for one in fits if one is not None), key=lambda one: -one.gain)
 
 
@@ -103,7 +105,8 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | Non
     except NotSimulated:
         return None
     one = CandidateFit.of(score, relinearise(posterior, found, linear.numbers, score))
-    return _fit_by_squares(score, base, state) if one.gain < -min_gain(1) else one
+    lost = one.found.score - base.score - len(free_parameters_of([one.chosen])) * float(np.log(posterior.freedom))
+    return _fit_by_squares(score, base, state) if lost > min_gain(1) else one
 
 
 def _fit_by_squares(score: float, base: Baseline, start: State) -> CandidateFit:

@@ -164,6 +164,10 @@ class Screened:
         """The largest gain of the trials."""
         return self.trials[0].gain
 
+    def begins_at(self, one: Chosen) -> bool:
+        """Whether the first trial has the shape of an effect: the fit that it would begin is known."""
+        return self.trials[0].one.is_shaped_as(one)
+
 
 def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     """Values of those parameters of an effect that another one has as well, clipped to their ranges: a resonance keeps

@@ -50,6 +50,10 @@ class Started(Screened):
         """The larger gain of the two."""
         return max(self.trials[0].gain, self.gain_by_squares)
 
+    def begins_at(self, one: Chosen) -> bool:
+        """Never: it begins in cars that were drawn, too."""
+        return False
+
 
 @dataclass(eq=False)
 class UnknownNumbers(MeasuredRoad):
@@ -95,7 +99,7 @@ class UnknownNumbers(MeasuredRoad):
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
         """It is the fitted one."""
 
-    def fitted_roughly(self, score: float, base: Baseline, one: Screened) -> list[CandidateFit]:
+    def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
         """Fits from the best trial on the model, and from the best of the cars that were drawn."""
         found = fit_roughly(score, base, replace(one, trials=one.trials[:1]))
         if not isinstance(one, Started):

@@ -48,6 +48,8 @@ class Effort:
     fitted                     how many effects are fitted at most
     fit_share, refine_share    least gain for that, and for a fit with derivatives of its own, as a share of the largest
                                gain or of the required one (with a tenth for fitting, a sensor's bandwidth was missed)
+    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained: fits gain up
+                               to seven times what their screening did (measured on the cases of the examination)
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
@@ -58,6 +60,7 @@ class Effort:
     fitted: int = 6
     fit_share: float = 0.03
     refine_share: float = 0.25
+    win_share: float = 0.1
     tie_share: float = 0.9
     round_share: float = 0.02
     least: float = 0.0
@@ -93,6 +96,9 @@ class Promise(Protocol):
 
     @property
     def gain(self) -> float: ...
+
+    def begins_at(self, one: Chosen) -> bool:
+        """Whether a fit of it would begin at this effect, with the same shape."""
 
 
 class Fitted(Protocol):
@@ -130,8 +136,9 @@ class Likelihood(Protocol[M, P, F]):
     def without(self, now: M, name: str) -> M:
         """The model without one of its effects, fitted."""
 
-    def fitted_roughly(self, score: float, base: M, one: P) -> list[F]:
-        """Rough fits of an effect on a model, best first; gains are counted from a score."""
+    def fitted_roughly(self, score: float, base: M, one: P, least: float) -> list[F]:
+        """Rough fits of an effect on a model, best first, from its first trial and from those that gain more than
+        this; gains are counted from a score."""
 
     def refined(self, base: M, one: F, least: float) -> F:
         """A rough fit that goes on until a round gains less than this; its gain is counted from a model."""
@@ -185,9 +192,9 @@ class MeasuredRoad:
         start = LinearModel(posterior, posterior.state_at(rest, now.state.logs, now.state.record, now.state.size))
         return Baseline.of(fit_to_the_end(start, now.linear.numbers))
 
-    def fitted_roughly(self, score: float, base: Baseline, one: Screened) -> list[CandidateFit]:
+    def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
         """Fits from each trial, with the derivatives of the model."""
-        return fit_roughly(score, base, one)
+        return fit_roughly(score, base, one, least)
 
     def refined(self, base: Baseline, one: CandidateFit, least: float) -> CandidateFit:
         """The fit with derivatives of its own."""
@@ -316,7 +323,7 @@ class Search(Generic[M, P, F]):
             return None
         fits = [one for one in tried.fits if one.effect.underlies]
         fits += [one for each in tried.unfitted if each.effect.underlies
-                 for one in self.likelihood.fitted_roughly(now.score, now, each)]
+                 for one in self.likelihood.fitted_roughly(now.score, now, each, 0.0)]
         return self.likelihood.with_effect(fits[0]) if fits else None
 
     def without_effect(self, found: Selection[M, P, F], name: str) -> Selection[M, P, F]:
@@ -334,29 +341,36 @@ class Search(Generic[M, P, F]):
         """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
-            near = instead.one.values if instead is not None else {}
-            unfitted = self._screen_all(pool, now, effects, near)
-            worth = [(now, one) for one in self._promising_of(unfitted, required_gain)]
-            if instead is not None and (
-                    there := self.likelihood.stripped(instead.now, instead.one.effect.name)) is not None:
-                worth += [(there, one) for one in self._promising_of(
-                    self._screen_all(pool, there, effects, near), required_gain)]
+            base, near, least = now, dict[str, float](), effort.fit_share * required_gain
+            if instead is not None:
+                near = dict(instead.one.values)
+                base = self.likelihood.stripped(instead.now, instead.one.effect.name) or now
+                least = effort.win_share * (base.score - instead.now.score)
+            unfitted = self._screen_all(pool, base, effects, near)
+            worth = [(base, one) for one in self._promising_of(unfitted, least)]
             self._promising |= {one.effect.name for _, one in worth}
+            if instead is not None:
+                worth = [(base, one) for base, one in worth if not one.begins_at(instead.one)]
             aligning = [one for one in effects if one.realigns]
             if aligning and (there := self.likelihood.laid_anew(now)) is not None:
-                worth += [(there, one) for one in self._promising_of(
-                    self._screen_all(pool, there, aligning), required_gain)]
+                worth += [(there, one) for one in self._promising_of(self._screen_all(pool, there, aligning), least)]
             self.progress(f"fitting {len(worth)} of them")
-            tries = self._fit_all_roughly(pool, now.score, worth)
+            tries = self._fit_all_roughly(pool, now.score, worth[:1], least)
+            least = max(least, effort.win_share * self._reached(now, tries))
+            tries += self._fit_all_roughly(pool, now.score, [pair for pair in worth[1:] if pair[1].gain > least], least)
             rough = _best_of_each(tries)
             enough = effort.refine_share * max(rough[0].gain, required_gain) if rough else np.inf
             best = {one.effect.name: one.gain for one in rough if one.gain > enough}
-            good = [one for one in tries if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
+            good = [one for one in sorted(tries, key=lambda one: -one.gain)
+                    if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
             if len(good) == 1 and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
-            least = effort.round_share * now.explanation
-            fine = list(pool.map(lambda one: self.likelihood.refined(now, one, least), good))
+            refine = partial(self.likelihood.refined, now, least=effort.round_share * now.explanation)
+            fine = list(map(refine, good[:1]))
+            enough = effort.refine_share * self._reached(now, fine)
+            good = [*good[:1], *(one for one in good[1:] if one.gain > enough)]
+            fine += pool.map(refine, good[1:])
         # A fit that is much worse than the model without the effect has diverged: its screening says more.
         fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
                 if one.gain > -min_gain(len(self.effects))]
@@ -368,14 +382,21 @@ class Search(Generic[M, P, F]):
         """Screenings of effects on a model, the largest gain first."""
         return self.likelihood.screened(base, effects, self.misalignment, near, pool, self.progress)
 
-    def _fit_all_roughly(self, pool: ThreadPoolExecutor, score: float, worth: Sequence[tuple[M, P]]) -> list[F]:
-        """Rough fits of screened effects, each on its model."""
-        return [one for some in pool.map(lambda pair: self.likelihood.fitted_roughly(score, *pair), worth)
+    def _fit_all_roughly(self, pool: ThreadPoolExecutor, score: float, worth: Sequence[tuple[M, P]],
+                         least: float) -> list[F]:
+        """Rough fits of screened effects, each on its model, from all their trials that gain more than this."""
+        return [one for some in pool.map(lambda pair: self.likelihood.fitted_roughly(score, *pair, least), worth)
                 for one in some]
 
-    def _promising_of(self, unfitted: Sequence[P], required_gain: float) -> list[P]:
-        """The first of some screenings in the order of their gain, down to a share of the largest."""
-        least = max(self.effort.least, self.effort.fit_share * max(unfitted[0].gain, required_gain))
+    def _reached(self, now: M, fits: Sequence[F]) -> float:
+        """The largest gain of fits that may be taken; 0: there is none."""
+        return max((one.gain for one in fits if one.gain > self._required_gain(now)
+                    and not self.likelihood.is_doubtful(now, one)), default=0.0)
+
+    def _promising_of(self, unfitted: Sequence[P], least: float) -> list[P]:
+        """The first of some screenings in the order of their gain, down to a least one and to a share of the largest.
+        """
+        least = max(self.effort.least, self.effort.fit_share * unfitted[0].gain, least)
         return [one for one in unfitted[: self.effort.fitted] if one.gain > least]
 
     def is_accepted(self, now: M, one: F) -> bool:
@@ -438,8 +459,9 @@ class Search(Generic[M, P, F]):
             return now
         self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in related)}?")
         with ThreadPoolExecutor(self.workers) as pool:
-            worth = self._promising_of(self._screen_all(pool, without, related, here.values), gain)
-            rough = _best_of_each(self._fit_all_roughly(pool, without.score, [(without, one) for one in worth]))
+            worth = self._promising_of(self._screen_all(pool, without, related, here.values),
+                                       self.effort.win_share * gain)
+            rough = _best_of_each(self._fit_all_roughly(pool, without.score, [(without, one) for one in worth], 0.0))
             fine = _best_of_each(list(pool.map(lambda one: self.likelihood.refined(without, one, 0.0), rough)))
         best = self._simplest(without, Round(tuple(fine), ()))
         if best is None or not self._is_preferred(best, here, gain):

@@ -161,6 +161,10 @@ class RoadTrial:
         """The largest gain."""
         return self.starts[0].gain
 
+    def begins_at(self, one: Chosen) -> bool:
+        """Never: a fit of few steps is no end."""
+        return False
+
 
 @dataclass(frozen=True, eq=False)
 class RoadCandidate:
@@ -218,7 +222,7 @@ class UnmeasuredRoad:
             one for one in now.effects if one.effect.name == name))
         return RoadModel(replace(there, problem=there.problem.preconditioned(there.state)), now.score + lost)
 
-    def fitted_roughly(self, score: float, base: RoadModel, one: RoadTrial) -> list[RoadCandidate]:
+    def fitted_roughly(self, score: float, base: RoadModel, one: RoadTrial, least: float) -> list[RoadCandidate]:
         """The best of fits of some steps."""
         first = one.starts[0]
         begins = [first.best, *(start.chosen for start in one.starts[: self.starts] if start.gain > 0.5 * first.gain)]

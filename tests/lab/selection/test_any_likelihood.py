@@ -54,6 +54,9 @@ class Tried:
     def effect(self) -> Effect:
         return self.chosen.effect
 
+    def begins_at(self, one: Chosen) -> bool:
+        return False
+
 
 @dataclass(frozen=True)
 class MadeUp:
@@ -74,7 +77,7 @@ class MadeUp:
     def without(self, now: Made, name: str) -> Made:
         return replace(now, effects=tuple(one for one in now.effects if one.effect.name != name))
 
-    def fitted_roughly(self, score: float, base: Made, one: Tried) -> list[Tried]:
+    def fitted_roughly(self, score: float, base: Made, one: Tried, least: float) -> list[Tried]:
         return [replace(one, gain=score - one.model.score)]
 
     def refined(self, base: Made, one: Tried, least: float) -> Tried:
