@@ -48,8 +48,8 @@ class Effort:
     fitted                     how many effects are fitted at most
     fit_share, refine_share    least gain for that, and for a fit with derivatives of its own, as a share of the largest
                                gain or of the required one (with a tenth for fitting, a sensor's bandwidth was missed)
-    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained: fits gain up
-                               to seven times what their screening did (measured on the cases of the examination)
+    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained: fits gain
+                               up to seven times what their screening did (measured on the examination's cases)
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
