@@ -385,8 +385,8 @@ class Search(Generic[M, P, F]):
     def _fit_all_roughly(self, pool: ThreadPoolExecutor, score: float, worth: Sequence[tuple[M, P]],
                          least: float) -> list[F]:
         """Rough fits of screened effects, each on its model, from all their trials that gain more than this."""
-        return [one for some in pool.map(lambda pair: self.likelihood.fitted_roughly(score, *pair, least), worth)
-                for one in some]
+        fits = pool.map(lambda pair: self.likelihood.fitted_roughly(score, pair[0], pair[1], least), worth)
+        return [one for some in fits for one in some]
 
     def _reached(self, now: M, fits: Sequence[F]) -> float:
         """The largest gain of fits that may be taken; 0: there is none."""
