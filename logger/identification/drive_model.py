@@ -42,7 +42,7 @@ from logger.identification.unknown_inputs import (
     read_input,
     run_and_name,
 )
-from logger.profiles.track import Stance, Surface, Track, Way, WheelPath, WheelTracks, along_paths, as_it_is
+from logger.profiles.track import Alterations, Stance, Track, Way, WheelPath, WheelTracks, along_paths, as_it_is
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
@@ -437,7 +437,7 @@ class _TrackWithObstacles:
     track: Track
     obstacles: tuple[Obstacle, ...]
 
-    def resurfaced(self, surface: Surface) -> _TrackWithObstacles:
+    def resurfaced(self, surface: Alterations) -> _TrackWithObstacles:
         """The road itself under the obstacles, which stay what they are."""
         return replace(self, track=self.track.resurfaced(surface))
 

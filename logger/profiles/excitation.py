@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.white_noise import Denoised, without_white_noise
-from logger.profiles.track import Actuators, Stance, Way
+from logger.profiles.track import Alterations, Stance, Way
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -135,7 +135,7 @@ class Excitation:
         """The parts that the forces act on."""
         return tuple(one.parts for one in self.forces)
 
-    def actuated(self, actuators: Actuators) -> Excitation:
+    def actuated(self, actuators: Alterations) -> Excitation:
         """The same with the forces that act."""
         if self.force_n is None:
             return self

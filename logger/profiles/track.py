@@ -58,30 +58,17 @@ class Stance(Protocol):
     def on_base(self) -> bool: ...
 
 
-class Resurfaced(Protocol):
-    """What a road is that differs from its profile; equal for two that differ alike."""
+class Alteration(Protocol):
+    """How a road differs from its profile, or a force from its record; equal for two that differ alike."""
 
-    def __call__(self, spacing_m: float, elevation_m: Array, /) -> Array:
-        """Elevations of the road (n,), of those of a track in its profile (n,) at this spacing [m]."""
-
-    def __hash__(self) -> int: ...
-
-
-Surface = tuple[Resurfaced, ...]
-"""What is done to a profile, one after the other; nothing: the road is what its profile says."""
-
-
-class Actuator(Protocol):
-    """What a force is that differs from its record; equal for two that differ alike."""
-
-    def __call__(self, rate_hz: float, force_n: Array, /) -> Array:
-        """The force that acts (n,), of the one recorded (n,) at this rate [N]."""
+    def __call__(self, sampling: float, samples: Array, /) -> Array:
+        """What acts (n,), of what was written (n,): elevations [m] at this spacing [m], or a force [N] at this rate."""
 
     def __hash__(self) -> int: ...
 
 
-Actuators = tuple[Actuator, ...]
-"""What is done to each force of a record, one after the other; nothing: what acts is what was recorded."""
+Alterations = tuple[Alteration, ...]
+"""What is done to a profile, or to each force, one after the other; nothing: what acts is what was written."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +92,7 @@ class WheelTracks(Protocol):
 class Profiled(WheelTracks, Protocol):
     """A road of which a profile was written."""
 
-    def resurfaced(self, surface: Surface) -> WheelTracks:
+    def resurfaced(self, surface: Alterations) -> WheelTracks:
         """The road itself, where it differs from its profile."""
 
 
@@ -117,11 +104,11 @@ class Pushing(WheelTracks, Protocol):
     def acts_on(self) -> tuple[tuple[str, ...], ...]:
         """The parts that each of its forces acts on."""
 
-    def actuated(self, actuators: Actuators) -> WheelTracks:
+    def actuated(self, actuators: Alterations) -> WheelTracks:
         """The forces that act, where they differ from their records."""
 
 
-def as_it_is(track: WheelTracks, surface: Surface, actuators: Actuators) -> WheelTracks:
+def as_it_is(track: WheelTracks, surface: Alterations, actuators: Alterations) -> WheelTracks:
     """What moves the wheels where a road differs from its profile, and a force from its record."""
     if surface and isinstance(track, Profiled):
         return track.resurfaced(surface)
@@ -168,7 +155,7 @@ class Track:
         return {}
 
     @cached_property
-    def _resurfaced(self) -> dict[Surface, Track]:
+    def _resurfaced(self) -> dict[Alterations, Track]:
         """The roads of the last few surfaces."""
         return {}
 
@@ -186,7 +173,7 @@ class Track:
         """As ``WheelTracks``."""
         return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
 
-    def resurfaced(self, surface: Surface) -> Track:
+    def resurfaced(self, surface: Alterations) -> Track:
         """The road itself, of which this is a profile that differs from it."""
         known = self._resurfaced.get(surface)  # another thread may put others in its place at any time
         if known is None:

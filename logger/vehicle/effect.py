@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from itertools import product
 from math import ceil, log, log1p
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -192,6 +192,8 @@ class Effect(ABC):
     underlies    whether it is nearly always there and hides others: these are tried on top of it where none is seen
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
+    variants     by the vehicle's model: the effect that stands in its place, where that has fewer parts than the
+                 parameters speak of
     """
 
     name: str
@@ -213,6 +215,7 @@ class Effect(ABC):
     underlies: bool = False
     also_by: tuple[str, ...] = ()
     stage: int = 0
+    variants: Mapping[str, Effect] = MappingProxyType({})
 
     @property
     def usual(self) -> dict[str, float]:
@@ -220,8 +223,8 @@ class Effect(ABC):
         return {one.name: one.start if one.default is None else one.default for one in self.parameters}
 
     def on(self, vehicle: Vehicle) -> Effect:
-        """The effect as this vehicle can have it: another where that has fewer parts than the parameters speak of."""
-        return self
+        """The effect as this vehicle can have it."""
+        return self.variants.get(vehicle.model, self)
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         """Why it cannot be there in this vehicle on this road; None if it can."""

@@ -35,7 +35,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import Actuators, Surface
+from logger.profiles.track import Alterations
 from logger.vehicle.vehicle import Axle
 
 Array = npt.NDArray[np.float64]
@@ -188,8 +188,8 @@ class Structure:
     dampers: Array
     tires: Array
     sides: int = 1
-    surface: Surface = ()
-    actuators: Actuators = ()
+    surface: Alterations = ()
+    actuators: Alterations = ()
     on_base: bool = False
     held: bool = False
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import BodyEffect, Effect, Parameter, Scale, Sought
+from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought
 from logger.vehicle.structure import BASE_INPUTS, Structure
-from logger.vehicle.vehicle import Vehicle
 
 
 class FrameDamping(BodyEffect):
@@ -31,9 +30,6 @@ class FrameDamping(BodyEffect):
     shown_by = "shake the rig through bounce and wheel hop, strongly enough that nothing sticks"
     sought = Sought.ON_RIGS
     also_by: tuple[str, ...] = ("body_damping_n_s_per_m",)
-
-    def on(self, vehicle: Vehicle) -> Effect:
-        return _OF_MASS if vehicle.model == "single_mass" else self
 
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
         wheels, ends = structure.wheels, structure.travel + structure.wheels
@@ -55,5 +51,5 @@ class _OfMass(FrameDamping):
         return replace(structure, damping=structure.damping + p.body_damping_n_s_per_m, road=road)
 
 
-_OF_MASS = _OfMass()
 EFFECT = FrameDamping()
+EFFECT.variants = {"single_mass": _OfMass()}

@@ -15,9 +15,8 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import Effect, ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import CornerLaws
-from logger.vehicle.vehicle import Vehicle
 
 
 class FrameFriction(ForceEffect):
@@ -39,9 +38,6 @@ class FrameFriction(ForceEffect):
     sought = Sought.ON_RIGS
     also_by: tuple[str, ...] = ("body_friction_force_n",)
 
-    def on(self, vehicle: Vehicle) -> Effect:
-        return _OF_MASS if vehicle.model == "single_mass" else self
-
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0 and p.body_friction_force_n == 0:
             return laws
@@ -62,5 +58,5 @@ class _OfMass(FrameFriction):
                                             transition_velocity_m_per_s=p.transition_velocity_m_per_s), laws)
 
 
-_OF_MASS = _OfMass()
 EFFECT = FrameFriction()
+EFFECT.variants = {"single_mass": _OfMass()}

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Effect, Misalignment, Parameter, Scale, SensorEffect
-from logger.vehicle.vehicle import OWN_NAMES, Vehicle
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.vehicle import OWN_NAMES
 
 Complex = npt.NDArray[np.complex128]
 
@@ -34,9 +34,6 @@ class TimeOffset(SensorEffect):
     shown_by = "drive one bump at two speeds: its apparent shift in distance grows with speed"
     realigns, reshapes = True, False
     stage = 4
-
-    def on(self, vehicle: Vehicle) -> Effect:
-        return _OF_ONE_RECORDER if vehicle.model in OWN_NAMES else self
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         if seen is None:
@@ -62,5 +59,5 @@ class _OfOneRecorder(TimeOffset):
                           trials=(-0.002, 0.002)),)
 
 
-_OF_ONE_RECORDER = _OfOneRecorder()
 EFFECT = TimeOffset()
+EFFECT.variants = dict.fromkeys(OWN_NAMES, _OfOneRecorder())
