@@ -27,10 +27,9 @@ from logger.estimation.batch import (
     score,
 )
 from logger.estimation.error_bound import ErrorBound, pooled_r2
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.road_profile import RoadProfile
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
 from logger.roads.iri import likely_unit

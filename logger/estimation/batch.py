@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.error_bound import ErrorBound
-from logger.estimation.noise_belief import UNKNOWN_LOG_STD, NoiseBelief
 from logger.estimation.road_profile import RoadProfile, road_profile
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import UNKNOWN_LOG_STD, NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
 from logger.roads.iri import START_M, rectified_slope, window_iri

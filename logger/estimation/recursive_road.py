@@ -16,11 +16,8 @@ from math import exp, log, pi
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
 from logger.estimation.level_response import RISE, Answer, HeldLevel, LevelResponse
-from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
-from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
 from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
     GaussianReadings,
@@ -32,9 +29,18 @@ from logger.estimation.quantisation import (
     without_own,
 )
 from logger.estimation.road_solver import Block, Solution
-from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learnt
 from logger.estimation.roughness import Roughness, mean_resolved
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import (
+    NoiseBelief,
+    NoiseLearner,
+    Sensor,
+    interval_evidence,
+    noise_slope,
+    parked_evidence,
+    residual_evidence,
+    with_noise,
+)
 from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
 
@@ -102,7 +108,7 @@ class FollowedRoad:
         self._sensor = sensor
         self._spacing_m = spacing_m
         self._other = OtherMotion()
-        self._belief = Belief(COMMON_ROAD)
+        self._spectrum, self._log_noise = COMMON_ROAD, 0.0  # of the variance, over the sensor's
         self._learner: NoiseLearner | None = None
         if noise is not None:
             usual = NoiseBelief.guessed(sensor.noise_rms_mps2)
@@ -171,8 +177,7 @@ class FollowedRoad:
             noise_mps2 = max(noise_mps2, _LEAST_SHARE_OF_STEP * self._step_mps2)
         self._sensor = Sensor(noise_mps2, self._step_mps2 if self._is_coarse else 0.0)
         if not self._is_coarse:
-            log_noise = self._belief.log_noise + log(before / self._sensor.variance_mps2_2)
-            self._belief = replace(self._belief, log_noise=log_noise)
+            self._log_noise += log(before / self._sensor.variance_mps2_2)
 
     @property
     def begun(self) -> bool:
@@ -236,7 +241,7 @@ class FollowedRoad:
         most = rounds + _MORE_ROUNDS // turns if self._is_coarse else rounds
         if not self._begun:
             rounds, most, steps = _FIRST_ROUNDS, _FIRST_ROUNDS, _FIRST_STEPS
-        before = self._belief.spectrum if self._begun else None
+        before = self._spectrum if self._begun else None
         self._begun = True
         seen = block.seen(read)
         for done in range(1, most + 1):
@@ -271,7 +276,7 @@ class FollowedRoad:
         much roughness scatters once per block, the last time."""
         readings, reads = self._as_gaussian(samples), samples.reading_mps2.shape[1]
         each = np.repeat(read, reads) & samples.usable.ravel()
-        first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
+        first, spectrum = round(block.start_m / self._spacing_m), self._spectrum
         above_common = spectrum.log_level - COMMON_ROAD.log_level
         log_variance = self._roughness.solved_with(first, block.count)
         local = np.exp(np.maximum(log_variance, _SMOOTHEST_SOLVED) - above_common)
@@ -288,7 +293,7 @@ class FollowedRoad:
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain, ratio, free = solution.gain, np.ones(block.count), None
         if self._is_coarse:
-            motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(samples), reads)
+            motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples), reads)
             solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
             motion = self._other.beside(motion)
             relative = np.repeat(block.felt(local), reads)  # motion as strong as where it was felt
@@ -308,7 +313,7 @@ class FollowedRoad:
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
 
-        now = self._belief
+        now = spectrum
         if learns or before is None:
             resolved = mean_resolved(gain, (local * ratio)[seen > 0])
             # A lone obstacle is no level: an innovation counts with at most some expected deviations.
@@ -322,8 +327,8 @@ class FollowedRoad:
                               learns and is_last and before is not None, free)
         found = self._roughness.at(first, block.count)
         level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
-        self._belief = replace(now, spectrum=replace(now.spectrum, log_level=level))
-        self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
+        self._spectrum = replace(now, log_level=level)
+        self._solved_last = block, block.same_road(solution.waves, spectrum, self._spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
             improved_ones = self._improved(readings, samples, each, solution, others + drift_variance, usable)
@@ -335,7 +340,7 @@ class FollowedRoad:
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())
-            self._belief = with_noise(self._belief, residual, weight, resolved_waves)
+            self._log_noise = with_noise(self._log_noise, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
         other_psd = None if self._other.psd is None else self._other.psd[:len(samples) // 2 + 1]
@@ -355,7 +360,7 @@ class FollowedRoad:
 
     def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
-            noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
+            noise = self._sensor.variance_mps2_2 * exp(self._log_noise)
             return GaussianReadings(samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, noise))
         return first_guess(samples.reading_mps2.ravel(), self._sensor) if self._gaussian is None else self._gaussian
 
@@ -406,7 +411,7 @@ class FollowedRoad:
         """The spectrum at points ``first`` ... ``first + count - 1`` of the distance grid, and the standard error of
         its log level."""
         variance = np.exp(self._roughness.at(first, count))
-        there = replace(self._belief.spectrum, log_level=COMMON_ROAD.log_level)
+        there = replace(self._spectrum, log_level=COMMON_ROAD.log_level)
         return _levelled(there, variance), self._roughness.log_std(first, count)
 
 

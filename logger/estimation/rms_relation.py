@@ -24,7 +24,7 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.hyperparameters import COMMON_ROAD
+from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.roads import iso8608
 from logger.vehicle.linearise import KnownCar
 

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.bent_forces import BentForces
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
-from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
@@ -29,12 +28,11 @@ from logger.estimation.iri_posterior import (
     unseen_share,
     window_iri,
 )
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
 from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
-from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.time_grid import RATE_HZ, Samples, between
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar, MovedCar

@@ -23,9 +23,8 @@ from typing import Any, Generic, Protocol, TypeVar
 from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import heading_deg
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.receiver_delay import Belief, combined
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
 from logger.store.log.atomic_file import replace_file

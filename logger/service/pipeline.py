@@ -28,8 +28,8 @@ from logger.comfort.uncertain_ride import NO_FIGURES
 from logger.dsp.windows import Floats, GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation
+from logger.estimation.sensor_noise import NoiseBelief
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class

@@ -33,8 +33,7 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.resample import Decimator, GridResampler, GridRun
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
 from logger.dsp.windows import GridSamples, Window, joined
-from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import WindowEstimate
 from logger.units import US_PER_S
 

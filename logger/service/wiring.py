@@ -32,12 +32,11 @@ from logger.errors import BadInput
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import SpectraKeeper
-from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import SlopeErrors
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.road_spectrum import COMMON_ROAD
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.service.config import (
     AUTO,

@@ -39,8 +39,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.report.placed import column, iri_errors, placed
 from logger.roads.sections import WindowErrors, Windows, even_edges, sections

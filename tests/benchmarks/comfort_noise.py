@@ -31,8 +31,7 @@ import numpy.typing as npt
 
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0

@@ -43,10 +43,9 @@ import numpy.typing as npt
 
 from logger.dsp.filters import BlockFilter, butterworth_sos, frequency_response
 from logger.estimation.error_bound import ErrorBound, pooled_r2
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.records import WindowRecord
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections

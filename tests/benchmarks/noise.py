@@ -45,8 +45,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.accelerometers.bma220 import Bma220Settings
-from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 
 from ..support.drives.measured import GRID_HZ, Accelerometer, Receiver, iso_road, steady_drive

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from logger.estimation.car_response import CarResponse
-from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
 from logger.estimation.road_solver import Block, Solution, TimeGrid
-from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum, log_waves
+from logger.estimation.road_spectrum import COMMON_ROAD, FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum, learnt, log_waves
 from logger.estimation.roughness import mean_resolved
+from logger.estimation.sensor_noise import with_noise
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -62,7 +62,7 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
 
     resolved = gain / (1 + gain)
     # The most probable waves have this power.
-    found = learnt(Belief(now), resolved * power / (1 + gain), resolved, log_waves(n), 1.0, before)
+    found = learnt(now, resolved * power / (1 + gain), resolved, log_waves(n), 1.0, before)
     h = 1e-4
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
@@ -74,8 +74,8 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
         expected += np.diag([0.3**-2, 0.1**-2])
     step = np.linalg.solve(expected, slope)
     assert np.abs(step).max() < 0.7
-    assert found.spectrum.log_level - now.log_level == pytest.approx(step[0], rel=1e-4)
-    assert found.spectrum.waviness - now.waviness == pytest.approx(step[1], rel=1e-4)
+    assert found.log_level - now.log_level == pytest.approx(step[0], rel=1e-4)
+    assert found.waviness - now.waviness == pytest.approx(step[1], rel=1e-4)
 
 
 def whitened(block: Block, solution: Solution, variance: np.ndarray) -> np.ndarray:
@@ -121,8 +121,8 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     solution = block.solve(reading, weight, now, variance, 400)
     share = block.seen_points(weight > 0) / block.count
     resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
-    found = learnt(Belief(now), whitened(block, solution, variance), resolved, block.log_waves, share, None)
-    step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
+    found = learnt(now, whitened(block, solution, variance), resolved, block.log_waves, share, None)
+    step = np.array([found.log_level - now.log_level, found.waviness - now.waviness])
     h = 0.02
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
@@ -153,29 +153,27 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
         for _ in range(10):
             road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_factors(true)
             reading = block.driven(road) + rng.normal(0, NOISE_MPS2, count)
-            belief, waves = Belief(COMMON_ROAD), None
+            spectrum, waves = COMMON_ROAD, None
             for _ in range(8):
-                solution = block.solve(reading, weight, belief.spectrum, even, 8, waves)
+                solution = block.solve(reading, weight, spectrum, even, 8, waves)
                 waves = solution.waves
                 resolved = solution.gain / (1 + solution.gain)
-                belief = learnt(
-                    belief, whitened(block, solution, even), resolved, block.log_waves, share, None
-                )
+                spectrum = learnt(spectrum, whitened(block, solution, even), resolved, block.log_waves, share, None)
             rows = np.stack([np.ones(len(resolved)), -block.log_waves])
             information = (rows * share * resolved**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
             std = np.sqrt(np.linalg.inv(information)[0, 0])
-            scores.append((belief.spectrum.log_level - true.log_level) / std)
-            wavinesses.append(belief.spectrum.waviness - waviness)
+            scores.append((spectrum.log_level - true.log_level) / std)
+            wavinesses.append(spectrum.waviness - waviness)
     assert abs(np.mean(scores)) < 0.6
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.4
     assert abs(np.mean(wavinesses)) < 0.08 and np.std(wavinesses) < 0.2
 
 
 def noise_found(residual: np.ndarray, weight: np.ndarray, resolved_waves: float = 0.0) -> float:
-    belief = Belief(COMMON_ROAD)
+    log_noise = 0.0
     for _ in range(12):
-        belief = with_noise(belief, residual, weight / noise_factor(belief), resolved_waves)
-    return noise_factor(belief)
+        log_noise = with_noise(log_noise, residual, weight / np.exp(log_noise), resolved_waves)
+    return float(np.exp(log_noise))
 
 
 def only(noise: np.ndarray, highest_hz: float) -> np.ndarray:
@@ -223,18 +221,18 @@ def test_a_pothole_that_is_not_explained_yet_is_no_noise() -> None:
 
 
 def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
-    belief = Belief(COMMON_ROAD)
+    log_noise = 0.0
     for _ in range(200):
-        belief = with_noise(belief, np.zeros(1000), np.full(1000, 1e6), 300.0)
-    assert noise_factor(belief) == pytest.approx(np.exp(-2.0), rel=1e-6)
+        log_noise = with_noise(log_noise, np.zeros(1000), np.full(1000, 1e6), 300.0)
+    assert log_noise == pytest.approx(-2.0, rel=1e-6)
 
 
 def test_nothing_read_leaves_what_roads_are_like() -> None:
     block = a_block(1024, 15.0)
     waves = np.zeros(len(block.wave_number_cpm))
-    found = learnt(Belief(COMMON_ROAD), waves, waves, block.log_waves, 0.0, None)
-    assert found.spectrum == COMMON_ROAD
-    assert with_noise(found, np.zeros(1024), np.zeros(1024), 0.0).log_noise == pytest.approx(0.0, abs=0.2)
+    found = learnt(COMMON_ROAD, waves, waves, block.log_waves, 0.0, None)
+    assert found == COMMON_ROAD
+    assert with_noise(0.0, np.zeros(1024), np.zeros(1024), 0.0) == pytest.approx(0.0, abs=0.2)
 
 
 @pytest.mark.parametrize("waviness", [1.6, 2.0, 2.4])

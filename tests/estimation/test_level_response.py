@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from logger.estimation.car_response import CarResponse
-from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
+from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ, Samples
 from logger.profiles.track import Track

@@ -9,10 +9,9 @@ import pytest
 from logger.estimation.assessment import Estimable, assess
 from logger.estimation.batch import estimated
 from logger.estimation.car_response import CarResponse
-from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import Block, TimeGrid
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.estimation.time_grid import Samples
 from logger.profiles.track import Track

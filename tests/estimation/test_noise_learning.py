@@ -8,10 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
-from logger.estimation.noise_evidence import interval_evidence, parked_evidence, residual_evidence
 from logger.estimation.quantisation import bounds, cavity, first_guess, improved, without_own
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import (
+    NoiseBelief,
+    NoiseLearner,
+    Sensor,
+    interval_evidence,
+    parked_evidence,
+    residual_evidence,
+)
 from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.streaming import RoadEstimator
 from logger.profiles.track import Track

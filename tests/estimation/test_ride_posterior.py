@@ -11,8 +11,8 @@ import pytest
 from logger.comfort.uncertain_ride import RideFigures
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.car_response import CarResponse
-from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.ride_posterior import RidePlace, RidePosterior
+from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.shipped import vehicle_file

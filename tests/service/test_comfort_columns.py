@@ -12,8 +12,7 @@ from logger.comfort.iso2631 import comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RideFigures, Uncertain
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.windows import Window
-from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.sensor_noise import Sensor
+from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import WindowEstimate
 from logger.records import WindowRecord
 from logger.service.config import Config, GpsConfig
