@@ -24,7 +24,7 @@ from logger.api.vehicles import car_on, model_of
 from logger.chart_data import Array, line
 from logger.errors import BadInput
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
-from logger.estimation.road_profile import RESOLVED_SHARE
+from logger.estimation.batch import RESOLVED_SHARE
 from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation

@@ -1,8 +1,8 @@
 """The road and its IRI from a car's acceleration.
 
 In the order of reading: ``road_spectrum`` (prior of the road), ``sensor_noise`` and ``quantisation`` (likelihood of the
-readings), ``car_response``, ``steady_motion``, ``road_solver`` (the most probable road of one stretch),
-``iri_posterior`` (its IRI), ``hyperparameters`` and ``roughness`` (what is learnt on the way), ``recursive_road``
-and ``streaming`` (in the car), ``batch``, ``road_profile`` and ``assessment`` (at the desk), ``error_bound``; and the
-relation of r.m.s. and IRI, ``rms_relation`` and ``rms_calibration``.
+readings), ``car_response``, ``road_solver`` (the most probable road of one stretch), ``iri_posterior`` (its IRI),
+``roughness`` (what is learnt on the way), ``recursive_road`` and ``streaming`` (in the car), ``batch`` and
+``assessment`` (at the desk), ``error_bound``; and the relation of r.m.s. and IRI, ``rms_relation`` and
+``rms_calibration``.
 """

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from logger.bounds import time_hint
 from logger.estimation.batch import (
+    RoadProfile,
     Windows,
     estimated,
     exact_iri,
@@ -27,7 +28,6 @@ from logger.estimation.batch import (
     score,
 )
 from logger.estimation.error_bound import ErrorBound, pooled_r2
-from logger.estimation.road_profile import RoadProfile
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.time_grid import RATE_HZ

@@ -1,4 +1,17 @@
-"""Batch estimation of a complete drive: its windows, their errors, and the errors that are the least possible."""
+"""Batch estimation of a complete drive: its windows, their errors, and the errors that are the least possible; and the
+road itself, from the pieces that the estimator gives: joined, and cut to the wavelengths that the readings resolve.
+
+Problem. Neighbouring pieces come from different solutions and may stand at different heights by a slow wave that no
+reading tells; joined end to start, their heights would be steps. And an estimate holds waves that are mostly belief.
+
+Solution. Pieces are joined by their increments, which the slow waves hardly touch. Then waves longer than the longest
+and shorter than the shortest resolved wavelength are taken out. That range changes with the speed; one range is taken
+for the whole drive, the one resolved over at least ``RESOLVED_SHARE`` of the distance at either end. Where a piece is
+missing one part of the profile ends and another begins.
+
+A piece says which wavelengths the readings resolve; beyond ``LONGEST_M`` the estimator expects no more of a road than
+at it (``RoadSpectrum``), as roads of ISO 8608 end there too.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +19,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from math import ceil, exp, sqrt
+from math import ceil, exp, isfinite, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.error_bound import ErrorBound
-from logger.estimation.road_profile import RoadProfile, road_profile
-from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, RoadSpectrum
 from logger.estimation.sensor_noise import UNKNOWN_LOG_STD, NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
@@ -29,6 +41,10 @@ _NOISE_ROUNDS, _NEAR_ENOUGH = 3, 0.3
 _COARSEST_M = 0.25
 _SMOOTHED_S = 2.0
 _FINEST_RATIO = 2000
+RESOLVED_SHARE = 0.75
+LONGEST_M = 1 / FLATTENED_BELOW_CPM
+_ORDER = 8
+_NEARLY_SPACINGS = 1e-3
 _STEPS_PER_E = 20  # limits are computed for speeds and levels in steps of 5 %
 
 
@@ -98,16 +114,15 @@ def estimated(
     found += estimator.finish()
     first = found[0].number if found else 0
     edges_m: Array = window_m * np.arange(first, first + len(found) + 1, dtype=np.float64)
-    starts_m = np.array([piece.start_m for piece in pieces])
-    lengths_m = np.array([(len(piece.elevation_m) - 1) * piece.spacing_m for piece in pieces])
+    passed_s = np.interp(edges_m, distance_m, np.arange(count) / RATE_HZ)
     return Windows(
         edges_m,
-        _mean_speed(edges_m[:-1], edges_m[1:], distance_m),
+        np.diff(edges_m) / np.diff(passed_s),
         np.array([one.iri_m_per_km for one in found]),
         np.array([one.iri_std_m_per_km for one in found]),
         np.array([one.resolved for one in found]),
         tuple(one.flags for one in found),
-    ), road_profile(pieces, _mean_speed(starts_m, starts_m + lengths_m, distance_m))
+    ), road_profile(pieces)
 
 
 def learnt_noise(
@@ -132,13 +147,6 @@ def learnt_noise(
         if abs(belief.log_mean - before.log_mean) < _NEAR_ENOUGH * belief.log_std:
             break
     return belief
-
-
-def _mean_speed(begin_m: Array, end_m: Array, distance_m: Array) -> Array:
-    """Mean speed (n,) [m/s] between places (n,), by distances (t,) at 100 Hz."""
-    passed_s = np.interp([begin_m, end_m], distance_m, np.arange(len(distance_m)) / RATE_HZ)
-    speed_mps: Array = (end_m - begin_m) / (passed_s[1] - passed_s[0])
-    return speed_mps
 
 
 def exact_iri(edges_m: Array, elevation_m: Array, spacing_m: float, start_m: float) -> Array:
@@ -220,3 +228,84 @@ def least_errors(limits: ErrorBound, speed_mps: Array, level_m_per_km: Array) ->
     steps = (np.round(np.log(row[known]) * _STEPS_PER_E).astype(int).tolist() for row in (speed_mps, level))
     result[known] = [least(speed, level) for speed, level in zip(*steps, strict=True)]
     return result
+
+
+@dataclass(frozen=True)
+class ProfilePart:
+    """Elevations (n,) [m] at ``start_m + k spacing_m``; their mean and all waves out of the range are missing."""
+
+    start_m: float
+    spacing_m: float
+    elevation_m: Array
+
+    @property
+    def length_m(self) -> float:
+        """From the first sample to the last [m]."""
+        return (len(self.elevation_m) - 1) * self.spacing_m
+
+
+@dataclass(frozen=True)
+class RoadProfile:
+    """An estimated road.
+
+    shortest_m, longest_m    the wavelengths that it holds
+    parts                    in the order they were driven
+    left_out_m               what was driven in parts shorter than the longest wavelength, which are left out
+    """
+
+    shortest_m: float
+    longest_m: float
+    parts: tuple[ProfilePart, ...]
+    left_out_m: float
+
+
+def road_profile(pieces: Sequence[RoadPiece]) -> RoadProfile | None:
+    """The profile that pieces make, in the order they came; None when the readings resolve no wavelength over enough of
+    them."""
+    resolved = [piece for piece in pieces if isfinite(piece.shortest_m)]
+    if not resolved or len(resolved) < RESOLVED_SHARE * len(pieces):
+        return None
+    shortest_m = float(np.quantile([piece.shortest_m for piece in resolved], RESOLVED_SHARE))
+    longest_m = float(np.quantile([min(piece.longest_m, LONGEST_M) for piece in resolved], 1 - RESOLVED_SHARE))
+    if shortest_m >= longest_m:
+        return None
+    joined = [_joined(run) for run in _runs(resolved)]
+    parts = tuple(
+        ProfilePart(part.start_m, part.spacing_m, band_passed(part.elevation_m, part.spacing_m, shortest_m, longest_m))
+        for part in joined if part.length_m >= longest_m
+    )
+    left_out_m = sum(part.length_m for part in joined if part.length_m < longest_m)
+    return RoadProfile(shortest_m, longest_m, parts, left_out_m)
+
+
+def band_passed(elevation_m: Array, spacing_m: float, shortest_m: float, longest_m: float) -> Array:
+    """Elevations (n,) with only the waves between two lengths [m], without shift.
+
+    At either length half of a wave's amplitude is left, a factor of 1.5 beyond it 4 %. At both ends the road is gone
+    on with as its own image through the end point; within half of the longest wavelength of an end that is felt.
+    """
+    count = len(elevation_m)
+    line = np.linspace(elevation_m[0], elevation_m[-1], count)
+    level = elevation_m - line
+    waves = np.fft.rfft(np.concatenate([level, -level[-2:0:-1]]))
+    n = np.asarray(np.fft.rfftfreq(2 * count - 2, spacing_m), dtype=np.float64)
+    high_pass = 1 / (1 + (1 / (longest_m * np.maximum(n, n[1]))) ** _ORDER)
+    passed = np.fft.irfft(waves * high_pass / (1 + (n * shortest_m) ** _ORDER), 2 * count - 2)
+    return np.asarray(passed[:count])
+
+
+def _runs(pieces: Sequence[RoadPiece]) -> list[list[RoadPiece]]:
+    """Pieces that follow each other without a gap."""
+    runs: list[list[RoadPiece]] = []
+    end_m = float("nan")
+    for piece in pieces:
+        if not abs(piece.start_m - end_m) < _NEARLY_SPACINGS * piece.spacing_m:
+            runs.append([])
+        runs[-1].append(piece)
+        end_m = piece.start_m + (len(piece.elevation_m) - 1) * piece.spacing_m
+    return runs
+
+
+def _joined(pieces: Sequence[RoadPiece]) -> ProfilePart:
+    rises = np.concatenate([np.diff(piece.elevation_m) for piece in pieces])
+    return ProfilePart(pieces[0].start_m, pieces[0].spacing_m, np.concatenate([[0.0], np.cumsum(rises)]))

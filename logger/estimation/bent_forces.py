@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM
+from logger.estimation.time_grid import frequencies_hz
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.linear_car import CornerSlopes, LinearCar
 from logger.vehicle.linearise import MovedCar
@@ -41,7 +42,7 @@ class BentForces:
 
     def __init__(self, moved: MovedCar, linear: LinearCar, speed_mps: float, count: int, rate_hz: float) -> None:
         self._laws, self._slopes = moved.car.laws, linear.corners
-        f_hz = np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+        f_hz = frequencies_hz(count, rate_hz)
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
         axle = np.unique(linear.structure.behind_m, return_inverse=True)[1]
         by_wheel = linear.travel_by_wheel(f_hz[seen])

@@ -1,15 +1,18 @@
-"""How a car's reading depends on the road, by frequency: the bridge from a car to the estimator."""
+"""How a car's reading depends on the road, by frequency: the bridge from a car to the estimator. Its acceleration at a
+steady speed, and what even readings of it leave open."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import exp, log
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.road_spectrum import log_waves
+from logger.estimation.road_spectrum import RoadSpectrum, log_waves
+from logger.estimation.time_grid import frequencies_hz
 from logger.roads.iri import STANDARD_SPEED_MPS, TIRE_BASE_M
 from logger.vehicle.linear_car import LinearCar, frequency_response
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
@@ -135,6 +138,54 @@ class _Axles:
         at = np.log(f_hz)
         looked_up = [np.interp(at, _LOG_TABLE_HZ, one) for one in self._by_axle]
         return np.asarray(sum(one * shift for one, shift in zip(looked_up, self._shift, strict=True)))
+
+
+@dataclass(frozen=True)
+class SteadyMotion:
+    """psd    (f,) spectrum of the acceleration, one-sided, at frequencies evenly from 0 to half the rate [(m/s2)2/Hz]
+    rate_hz   of the readings
+
+    Readings are even where each has the same variance [(m/s2)2]; they leave S N / (S + N), N their own spectrum.
+    """
+
+    psd: Array
+    rate_hz: float
+
+    @property
+    def variance(self) -> float:
+        """Of the acceleration before anything is read [(m/s2)2]."""
+        return float(self.psd.mean()) * self.rate_hz / 2
+
+    def covariance_left(self, variance: float) -> Array:
+        """What is left by lag, (2 (f - 1),), as in a record that repeats [(m/s2)2], for readings of one variance."""
+        return np.fft.irfft(self._resolved(variance), 2 * (len(self.psd) - 1)) * variance
+
+    def resolved_per_reading(self, variance: Array | float) -> Array | float:
+        """Degrees of freedom that the motion takes of each reading, 0 to 1; for one variance or for many."""
+        return self._resolved(variance).sum(axis=-1) / len(self.psd)
+
+    def _resolved(self, variance: Array | float) -> Array:
+        """Share S / (S + N) of each frequency, (..., b) for variances (...), up to the last that has any motion."""
+        noise = np.asarray(2 * variance / self.rate_hz)[..., None]
+        share: Array = self._moved / (self._moved + noise)
+        return share
+
+    @cached_property
+    def _moved(self) -> Array:
+        """The spectrum up to its last frequency that is not 0: readings are taken far more often than a car moves."""
+        moved = np.flatnonzero(self.psd)
+        return self.psd[:moved[-1] + 1] if len(moved) else self.psd[:1]
+
+
+def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int,
+                  reads: int = 1) -> SteadyMotion:
+    """What such a road makes of the car, at the frequencies of ``count`` samples (even) that are read ``reads`` times
+    each: nothing above half the rate of the samples."""
+    per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
+    f_hz = frequencies_hz(count, rate_hz)
+    psd = np.zeros(count // 2 * reads + 1)
+    psd[:len(f_hz)] = np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0)
+    return SteadyMotion(psd, rate_hz * reads)
 
 
 @lru_cache(maxsize=32)

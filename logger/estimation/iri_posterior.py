@@ -26,7 +26,6 @@ from logger.estimation.car_response import (
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
 from logger.estimation.road_solver import quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.steady_motion import SteadyMotion
 from logger.roads.iri import PER_KM
 
 Array = npt.NDArray[np.float64]
@@ -70,22 +69,6 @@ def vehicle_error_variance(
         turned = _SLOPE_POWER[seen] / gain[seen]
         density = max(density, float((car.changed_power(speed_mps) * road)[seen] @ turned / turned.sum()))
     return density * rate_hz / (2 * speed_mps)
-
-
-def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int,
-                  reads: int = 1) -> SteadyMotion:
-    """What such a road makes of the car, at the frequencies of ``count`` samples (even) that are read ``reads`` times
-    each: nothing above half the rate of the samples."""
-    per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
-    f_hz = _frequencies_hz(count, rate_hz)
-    psd = np.zeros(count // 2 * reads + 1)
-    psd[:len(f_hz)] = np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0)
-    return SteadyMotion(psd, rate_hz * reads)
-
-
-@lru_cache(maxsize=4)
-def _frequencies_hz(count: int, rate_hz: float) -> Array:
-    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
 
 
 @dataclass(frozen=True)

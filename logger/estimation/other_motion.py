@@ -16,8 +16,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.car_response import HIGHEST_HZ
-from logger.estimation.steady_motion import SteadyMotion
+from logger.estimation.car_response import HIGHEST_HZ, SteadyMotion
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

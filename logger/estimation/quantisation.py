@@ -20,9 +20,9 @@ from math import log
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.car_response import SteadyMotion
 from logger.estimation.normal_distribution import within
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.steady_motion import SteadyMotion
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from math import exp, log, pi
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
+from logger.estimation.car_response import SteadyMotion, steady_motion
+from logger.estimation.iri_posterior import vehicle_error_variance
 from logger.estimation.level_response import RISE, Answer, HeldLevel, LevelResponse
 from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
@@ -41,7 +42,6 @@ from logger.estimation.sensor_noise import (
     residual_evidence,
     with_noise,
 )
-from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.time_grid import RATE_HZ, Samples, between
 
 Array = npt.NDArray[np.float64]

@@ -27,6 +27,7 @@ from logger.comfort.uncertain_ride import (
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import frequencies_hz
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -102,8 +103,8 @@ class RidePosterior:
         self._car = car
         self._rate_hz = rate_hz
         self._count = count
-        self._response = response(_frequencies_hz(count, rate_hz))
-        self._f_hz = _frequencies_hz(_LINES, rate_hz)
+        self._response = response(frequencies_hz(count, rate_hz))
+        self._f_hz = frequencies_hz(_LINES, rate_hz)
         self._power = np.abs(response(self._f_hz)) ** 2
         self._lags = round(_LAGS_S * rate_hz)
         self._running = round(_RUNNING_S * rate_hz)
@@ -124,7 +125,7 @@ class RidePosterior:
         road = np.interp(self._f_hz / place.speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / place.speed_mps
         other: Array | float = 0.0
         if place.other_psd is not None:
-            other = np.interp(self._f_hz, _frequencies_hz(self._count, self._rate_hz), _thinned(place.other_psd))
+            other = np.interp(self._f_hz, frequencies_hz(self._count, self._rate_hz), _thinned(place.other_psd))
         return self._known(road + other, place.variance), self._known(exp(_LEVEL_TRIAL) * road + other, place.variance)
 
     def _known(self, ride: Array, variance: float) -> RideKnowledge:
@@ -184,10 +185,6 @@ class RidePosterior:
             largest, before = running if largest is None else larger(largest, running, common), end
         assert largest is not None
         return RideSums(len(numbers), squares, fourths, largest, self._running)
-
-
-def _frequencies_hz(count: int, rate_hz: float) -> Array:
-    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
 
 
 def _thinned(psd: Array) -> Array:

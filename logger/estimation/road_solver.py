@@ -29,7 +29,7 @@ import numpy.typing as npt
 
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.road_spectrum import RoadSpectrum, log_waves
-from logger.estimation.time_grid import at_readings
+from logger.estimation.time_grid import at_readings, frequencies_hz
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -75,7 +75,7 @@ class TimeGrid:
         self.car = car
         self.rate_hz = rate_hz
         self.reads = reads
-        self.by_axle = car.by_axle(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
+        self.by_axle = car.by_axle(frequencies_hz(count, rate_hz))
         in_a_step = np.zeros_like(self.by_axle)
         in_a_step[:, 1:] = self.by_axle[:, 1:] / np.arange(1, self.by_axle.shape[1])
         power = np.fft.irfft(1j * in_a_step) ** 2

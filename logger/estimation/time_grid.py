@@ -7,6 +7,7 @@ the samples from them, so each reading is one of the acceleration at its own ins
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -75,3 +76,9 @@ def between(row: Array, reads: int) -> Array:
 def at_readings(waves: ComplexArray, count: int, reads: int) -> Array:
     """The same from its rfft."""
     return np.fft.irfft(waves, count * reads) * reads
+
+
+@lru_cache(maxsize=8)
+def frequencies_hz(count: int, rate_hz: float) -> Array:
+    """Those of the rfft of ``count`` samples (count // 2 + 1,) [Hz]; kept, for there are few counts."""
+    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)

@@ -12,7 +12,7 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.estimation.road_profile import band_passed
+from logger.estimation.batch import band_passed
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import iri

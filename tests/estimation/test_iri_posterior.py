@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import sosfilt
 
-from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
+from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope, steady_motion
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     resolved_share,
-    steady_motion,
     unseen_share,
     window_iri,
 )

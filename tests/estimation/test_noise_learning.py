@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
+from logger.estimation.car_response import SteadyMotion
 from logger.estimation.quantisation import bounds, cavity, first_guess, improved, without_own
 from logger.estimation.sensor_noise import (
     NoiseBelief,
@@ -17,7 +18,6 @@ from logger.estimation.sensor_noise import (
     parked_evidence,
     residual_evidence,
 )
-from logger.estimation.steady_motion import SteadyMotion
 from logger.estimation.streaming import RoadEstimator
 from logger.profiles.track import Track
 from logger.roads import iso8608

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.estimation.car_response import SteadyMotion
 from logger.estimation.other_motion import OtherMotion
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.steady_motion import SteadyMotion
 
 from ..support.drives.measured import Drive
 from . import test_ride_posterior as ride

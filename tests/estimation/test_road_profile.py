@@ -7,13 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from logger.estimation.road_profile import RESOLVED_SHARE, band_passed, road_profile
+from logger.estimation.batch import RESOLVED_SHARE, band_passed, road_profile
 from logger.estimation.streaming import RoadPiece
 
 SPACING_M = 0.15
 POINTS = 50
 PIECE_M = SPACING_M * POINTS
-FAST = 30.0
 
 
 def cut(
@@ -28,17 +27,13 @@ def cut(
     ]
 
 
-def at(speed_mps: float, pieces: list[RoadPiece]) -> np.ndarray:
-    return np.full(len(pieces), speed_mps)
-
-
 def wave(length_m: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda x: np.sin(2 * np.pi * x / length_m + 1.0)
 
 
 def test_pieces_at_any_height_join_to_the_road() -> None:
     pieces = cut(lambda x: wave(10.0)(x) + 0.5 * wave(3.0)(x) + 0.02 * x, range(-3, 60))
-    profile = road_profile(pieces, at(FAST, pieces))
+    profile = road_profile(pieces)
     assert profile is not None
     assert (profile.shortest_m, profile.longest_m, profile.left_out_m) == (1.0, 50.0, 0.0)
     part, = profile.parts
@@ -69,7 +64,7 @@ def test_a_missing_piece_begins_another_part_and_short_parts_are_left_out() -> N
     pieces = cut(road, range(20)) + cut(road, range(22, 25)) + cut(road, range(30, 45))
     unknown = RoadPiece(20 * PIECE_M, SPACING_M, np.zeros(POINTS + 1), float("nan"), float("nan"))
     pieces.insert(20, unknown)
-    profile = road_profile(pieces, at(FAST, pieces))
+    profile = road_profile(pieces)
     assert profile is not None
     assert [part.start_m for part in profile.parts] == pytest.approx([0.0, 30 * PIECE_M])
     assert [part.length_m for part in profile.parts] == pytest.approx([20 * PIECE_M, 15 * PIECE_M])
@@ -79,26 +74,24 @@ def test_a_missing_piece_begins_another_part_and_short_parts_are_left_out() -> N
 def test_the_range_is_reported_over_most_of_the_way() -> None:
     road = wave(10.0)
     pieces = cut(road, range(70), (0.5, 30.0)) + cut(road, range(70, 100), (0.8, 20.0))
-    profile = road_profile(pieces, at(FAST, pieces))
+    profile = road_profile(pieces)
     assert profile is not None
     assert np.mean([piece.shortest_m <= profile.shortest_m for piece in pieces]) >= RESOLVED_SHARE
     assert np.mean([piece.longest_m >= profile.longest_m for piece in pieces]) >= RESOLVED_SHARE
     assert (profile.shortest_m, profile.longest_m) == (0.8, 20.0)
 
 
-def test_slow_waves_are_drift_and_very_long_ones_no_road() -> None:
-    pieces = cut(wave(10.0), range(40), (0.5, 400.0))
-    slow, fast = road_profile(pieces, at(4.0, pieces)), road_profile(pieces, at(FAST, pieces))
-    assert slow is not None
-    assert fast is not None
-    assert (slow.longest_m, fast.longest_m) == (pytest.approx(32.0), pytest.approx(100.0))
+def test_very_long_waves_are_no_road() -> None:
+    profile = road_profile(cut(wave(10.0), range(40), (0.5, 400.0)))
+    assert profile is not None
+    assert profile.longest_m == pytest.approx(100.0)
 
 
 def test_no_profile_where_too_little_is_reported() -> None:
     nothing = cut(wave(10.0), range(40), (float("nan"), float("nan")))
-    assert road_profile([], np.empty(0)) is None
-    assert road_profile(nothing, at(FAST, nothing)) is None
+    assert road_profile([]) is None
+    assert road_profile(nothing) is None
     mixed = nothing[:15] + cut(wave(10.0), range(15, 40))
-    assert road_profile(mixed, at(FAST, mixed)) is None
+    assert road_profile(mixed) is None
     crossed = cut(wave(10.0), range(20), (1.0, 3.0)) + cut(wave(10.0), range(20, 40), (5.0, 50.0))
-    assert road_profile(crossed, at(FAST, crossed)) is None
+    assert road_profile(crossed) is None

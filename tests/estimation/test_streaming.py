@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.streaming import LAG_S, RoadEstimator, RoadPiece, WindowEstimate
+from logger.estimation.streaming import LAG_S, SLOWEST_WAVE_HZ, RoadEstimator, RoadPiece, WindowEstimate
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
@@ -379,6 +379,15 @@ def test_pieces_of_road_join_and_have_the_roads_shape() -> None:
         bent = [row - np.polyval(np.polyfit(place, row, 2), place) for row in (exact, piece.elevation_m)]
         correlations.append(np.corrcoef(*bent)[0, 1])
     assert np.median(correlations) > 0.85  # what is resolved by less than a half is missing
+
+
+def test_no_piece_holds_waves_that_pass_as_slowly_as_a_sensor_drifts() -> None:
+    one = driven(steady(4.0), 4.0, 5)
+    pieces: list[RoadPiece] = []
+    structure = car("rav4-2009")
+    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), FINE, WINDOW_M, on_road=pieces.append)
+    estimated(estimator, one.read(FINE), one.distance_m)
+    assert max(piece.longest_m for piece in pieces) == pytest.approx(4.0 / SLOWEST_WAVE_HZ, rel=0.03)
 
 
 @pytest.mark.slow

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.estimation.batch import estimated
+from logger.estimation.batch import RoadProfile, band_passed, estimated
 from logger.estimation.error_bound import ErrorBound
 from logger.estimation.rms_relation import rms_relation
-from logger.estimation.road_profile import RoadProfile, band_passed
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.identifiability import NotIdentifiable
