@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
-from logger.estimation.roughness import Roughness, evidence_slope
+from logger.estimation.roughness import evidence_slope
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -50,26 +50,6 @@ class Answer:
         """Of the log evidence, in a level that all points ``counted`` (n,) share, and its expected curvature."""
         return evidence_slope(self.innovations, self.log_variance, self.gain, self.seen, self.sharper, self.free,
                               counted)
-
-
-class HeldLevel(Roughness):
-    """A road whose log variance (n,) is given, point by point of one block, and stays."""
-
-    def __init__(self, spacing_m: float, log_variance: Array) -> None:
-        super().__init__(spacing_m)
-        self._log_variance = log_variance
-
-    def solved_with(self, first: int, count: int) -> Array:
-        """As it was given."""
-        return self._log_variance
-
-    def at(self, first: int, count: int) -> Array:
-        """As it was given."""
-        return self._log_variance
-
-    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
-              sharper: Array | float = 1.0, learns: bool = False, free: float | None = None) -> None:
-        """Nothing."""
 
 
 class LevelResponse:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from logger.estimation.car_response import SteadyMotion, steady_motion
 from logger.estimation.iri_posterior import vehicle_error_variance
-from logger.estimation.level_response import RISE, Answer, HeldLevel, LevelResponse
+from logger.estimation.level_response import RISE, Answer, LevelResponse
 from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
     GaussianReadings,
@@ -262,7 +262,7 @@ class FollowedRoad:
         """As before the round of ``answer``, with a level that is higher than in it and stays; learns nothing."""
         raised = copy(self)
         raised._other, raised._learner = copy(self._other), None
-        raised._roughness = HeldLevel(self._spacing_m, answer.log_variance + RISE)
+        raised._roughness = self._roughness.held_at(answer.log_variance + RISE)
         if self._gaussian is not None:
             raised._gaussian = self._response.readings_at(self._gaussian, RISE)
         raised._solved_last = block, self._response.waves_at(block, answer.waves, np.full(block.count, RISE))
@@ -309,7 +309,8 @@ class FollowedRoad:
                 drift_variance = solution.drift_variance / float(ratio[seen > 0].mean())
                 free = float((weight / (1 / others + weight))[moving].sum())
                 free *= 1 / (1 + block.car.behind_m.max() / self._spacing_m / float(seen.sum()))
-                as_read = samples.reading_mps2.ravel() + _at_each(beyond_mps2, reads)
+                taken_off = between(beyond_mps2, reads) if isinstance(beyond_mps2, np.ndarray) else beyond_mps2
+                as_read = samples.reading_mps2.ravel() + taken_off
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
 
@@ -413,11 +414,6 @@ class FollowedRoad:
         variance = np.exp(self._roughness.at(first, count))
         there = replace(self._spectrum, log_level=COMMON_ROAD.log_level)
         return _levelled(there, variance), self._roughness.log_std(first, count)
-
-
-def _at_each(row: Array | float, reads: int) -> Array | float:
-    """A row by samples, or one number, by readings."""
-    return between(row, reads) if isinstance(row, np.ndarray) else row
 
 
 def _beyond_two(reading_mps2: Array, step_mps2: float) -> int:

@@ -21,6 +21,7 @@ Kalman filter, for such processes are Markov's. Their variances are learnt by sc
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -115,6 +116,7 @@ class Roughness:
         self._curvature: Array | float = 0.0
         self.curvature: float | None = None
         self.moved = 0.0
+        self._held: Array | None = None
         self._common = _COMMON
         self._scattered, self._heard = 0.0, 0.0  # sum of weight x scatter, and of the weights
 
@@ -123,13 +125,23 @@ class Roughness:
         """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
         return np.exp(self._log_variances)
 
+    def held_at(self, log_variance: Array) -> Roughness:
+        """The same road with this log variance (n,), point by point of one block, which stays."""
+        held = copy(self)
+        held._held = log_variance
+        return held
+
     def solved_with(self, first: int, count: int) -> Array:
         """Log variance (count,) with which points ``first`` ... ``first + count - 1`` are to be solved: their
         precision's mean."""
+        if self._held is not None:
+            return self._held
         return self._levels(first, count) + self._kept(self._log_scale, first, count)
 
     def at(self, first: int, count: int) -> Array:
         """Mean log variance (count,) of the same points; beyond what is known the level goes on as there."""
+        if self._held is not None:
+            return self._held
         return self.solved_with(first, count) + self._kept(self._excess, first, count)
 
     def log_std(self, first: int, count: int) -> float:
@@ -169,7 +181,7 @@ class Roughness:
         free           degrees of freedom that the road takes of the readings where it was read, at most; None: what
                        follows from ``gain``
         """
-        if not seen.any():
+        if self._held is not None or not seen.any():
             return
         count = len(innovations)
         strength = log_before + np.log(sharper)
