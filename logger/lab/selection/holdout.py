@@ -3,8 +3,9 @@
 Problem: an error is honest on data that the fit did not see, and twenty models cannot be fitted three times over.
 Solution: three sets of stretches are held out in turn, and one Gauss-Newton step from the fit of all data gives the fit
 without them (A. Beirami et al., Advances in Neural Information Processing Systems 30, 2017). Where the car was is not
-judged: distance errors stay as fitted to all data. Nor is a number of an effect that acts once, as a stop that is hit
-by one pothole: without the stretch that holds the event nothing tells it, and it stays as fitted too.
+judged: distance errors stay as fitted to all data. Nor is a number that one stretch alone tells, as a stop that is hit
+by one pothole, or the damping of a mode that a sweep passes once: without that stretch nothing tells it, and one step
+would extrapolate without limit. It stays as fitted too.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _STRETCH_S, _FOLDS = 6.0, 3
 """Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
 set."""
 _ONCE = 0.1
-"""An effect's number of which the other stretches hold a smaller share of the information acts once: of one that acts
+"""A number of which the other stretches hold a smaller share of the information is told once: of one that acts
 throughout they hold two thirds."""
 
 
@@ -70,7 +71,6 @@ def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> H
     prior = np.concatenate([posterior.prior.precision[: linear.count], np.zeros(own_count)])
     prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
     unseen = [one.copy() for one in residuals]
-    of_effects = np.arange(len(prior)) >= linear.count
     everything = sum(np.einsum("ij,ij->i", part, part) for part in white)
     for fold in range(_FOLDS):
         information, gradient = np.diag(prior), -prior_gradient
@@ -78,7 +78,7 @@ def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> H
             seen = which != fold
             information = information + part[:, seen] @ part[:, seen].T
             gradient = gradient + part[:, seen] @ residual[seen]
-        once = of_effects & (np.diag(information) < _ONCE * everything)
+        once = np.diag(information) < prior + _ONCE * everything
         information[once], information[:, once], gradient[once] = 0.0, 0.0, 0.0
         step = _solve_scaled(information, gradient)
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
