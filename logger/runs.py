@@ -301,14 +301,26 @@ class Run:
         return self.track.timed
 
     @property
+    def begins_freely(self) -> bool:
+        """Whether the state in which it begins is one of its unknowns."""
+        return begins_freely(self.track)
+
+    @property
     def at_rest(self) -> bool:
         """Whether what the rig stands on rests, so that forces alone drive it."""
         return isinstance(self.track, Excitation) and not np.ptp(self.track.elevation_m)
 
 
+def begins_freely(track: Track | Excitation | None) -> bool:
+    """Whether the state in which a run begins is one of its unknowns: that of a rig which nothing drives."""
+    return isinstance(track, Excitation) and track.is_still
+
+
 def unknown_past_s(track: Track | Excitation | None) -> float:
-    """How much of the beginning of a run over this road, or on this rig, is left out: ``SKIP_S``, ``PART_SKIP_S``."""
-    return PART_SKIP_S if isinstance(track, Excitation) and track.moves_part else SKIP_S
+    """How much of the beginning of a run over this road, or on this rig, is left out: ``SKIP_S``, ``PART_SKIP_S``, and
+    nothing where the state that it begins in is found with the rest."""
+    return PART_SKIP_S if isinstance(track, Excitation) and track.moves_part else (
+        0.0 if begins_freely(track) else SKIP_S)
 
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:

@@ -47,7 +47,7 @@ from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
 from logger.lab.selection.stepwise import Effort, MeasuredRoad, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
-from logger.vehicle.effect import Chosen, Effect
+from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
@@ -295,6 +295,8 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
             why = f"no {' or '.join(sorted({one.kind or f'sensor of {one.measures}' for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
             why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
+        if why is None and isinstance(effect, SensorEffect) and all(run.begins_freely for run in runs):
+            why = "nothing drives the run: what a sensor does to free vibrations, another beginning of them does"
         if why is None and effect.against_ground and at_rest:
             why = "its base rests: what acts against the ground acts against the base"
         if why is None and by_road and not effect.reshapes:

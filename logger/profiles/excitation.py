@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _CUBIC = 3
+FEWEST = _CUBIC + 1
+"""Samples that an excitation has at least."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Excitation:
 
     def __post_init__(self) -> None:
         shape = self.elevation_m.shape
-        is_table = len(shape) in (1, 2) and shape[0] > _CUBIC and shape[1:] in ((), (2,))
+        is_table = len(shape) in (1, 2) and shape[0] >= FEWEST and shape[1:] in ((), (2,))
         if not (0 < self.rate_hz < np.inf and is_table):
             raise ValueError(f"excitation: expected a rate and elevations of shape (n,) or (n, 2), four or more, found "
                              f"{self.rate_hz} and {shape}")
@@ -76,6 +78,12 @@ class Excitation:
         if self.forces and (self.force_n is None or self.force_n.shape != (shape[0], len(self.forces))
                             or not np.isfinite(self.force_n).all()):
             raise ValueError(f"excitation: expected finite samples of each of {len(self.forces)} forces")
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing drives the rig: what it does goes on from how it begins. A part is moved by its bench."""
+        return not (self.moves_part or np.ptp(self.elevation_m, axis=0).any()
+                    or (self.force_n is not None and np.ptp(self.force_n, axis=0).any()))
 
     @property
     def end_s(self) -> float:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.runs import ACCELERATION, SENSOR, Run, Signal
+from logger.runs import ACCELERATION, READING, SENSOR, Run, Signal
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
@@ -170,11 +170,70 @@ class SimulatedRuns:
             key = fine_hz, distance.tobytes(), track
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(track, run.rate_hz, distance, fine_hz, index)
+                passage = Passage(track, run.rate_hz, distance, fine_hz, index, run.begins_freely)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
-            found.append(passage)
+            found.append(_begun(car, passage, run) if run.begins_freely else passage)
         return found
+
+
+_STATE_STEP, _STATE_CLOSE, _MOST_STATE_STEPS = 1e-3, 1e-6, 12
+_UNSEEN = 1e-4
+
+
+def _begun(car: Car, passage: Passage, run: Run) -> Passage:
+    """The passage begun in the state with which the car's records come nearest to what the run measured.
+
+    Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
+    and every number of the car that is tried has its own best one. Solution: the state is eliminated wherever the run
+    is predicted (variable projection: G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The records of a linear
+    car are linear in it, so that one solution of least squares finds it; from there Gauss-Newton steps lead to that of
+    a car whose laws are bent. Each signal counts by its own size, and its zero is free. What the record does not show
+    of the state stays at rest.
+    """
+    signals, main = run.signals, run.facts.main
+    read = (run.read if run.usable is None else run.usable == READING) & (np.arange(run.count) >= run.first)
+    measured = np.stack([run.measured_mps2, *run.more])[:, read]
+    sizes = measured.std(axis=1, keepdims=True)
+    sizes[sizes == 0] = 1.0
+
+    def weighed(samples: Array) -> Array:
+        return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / sizes).ravel()
+
+    def record(of: Car, state: Array) -> Array:
+        joined = run.in_band(_recorded(of, passage.begun_with(state), signals, main))
+        return weighed(joined.reshape(-1, run.count)[:, read])
+
+    passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
+    wanted, none = weighed(measured), np.zeros(2 * len(car.structure.mass))
+    plain = replace(car, laws=(), bends_laws=False, body=(car.body, "linear"))
+    still = record(plain, none)
+    columns = np.stack([record(plain, unit) - still for unit in np.eye(len(none))], axis=1)
+    seen = np.linalg.norm(columns, axis=0)
+    usual = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)
+
+    def step(columns: Array, left: Array) -> Array:
+        return np.asarray(usual * np.linalg.lstsq(columns * usual, left, rcond=_UNSEEN)[0])
+
+    state = step(columns, wanted - still)
+    if not car.bends_laws:
+        return passage.begun_with(state)
+    here = record(car, state)
+    for _ in range(_MOST_STATE_STEPS):
+        for index, one in enumerate(_STATE_STEP * usual):
+            if one > 0:
+                columns[:, index] = (record(car, state + one * (np.arange(len(usual)) == index)) - here) / one
+        way, least = step(columns, wanted - here), float(np.sum((wanted - here) ** 2))
+        for share in (1.0, 0.5, 0.25, 0.1, 0.02):
+            there = record(car, state + share * way)
+            if np.sum((wanted - there) ** 2) < least:
+                break
+        else:
+            break
+        state, here = state + share * way, there
+        if (np.abs(share * way) <= _STATE_CLOSE * usual).all():
+            break
+    return passage.begun_with(state)
 
 
 def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal) -> Array:

@@ -220,7 +220,7 @@ def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws or car.structure.held:
         return stepper_of(car, passage.step_s, passage.forces).march(
-            *passage.under_wheels(car.structure), passage.way)
+            *passage.under_wheels(car.structure), passage.way, passage.begins)
     states = in_blocks(passage.driven(car.structure), passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 
@@ -274,12 +274,12 @@ def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Seq
 
 
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
-    """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car from rest."""
+    """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car."""
     inputs, mean = passage.under_wheels(structure)
     around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
     transition, gain = _linear_step(structure, passage.step_s)
     return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]),
-                          structure.at_rest(inputs[0]))
+                          structure.at_rest(inputs[0]) + passage.begins)
 
 
 @lru_cache(maxsize=16)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from copy import copy
 from functools import lru_cache
 from math import ceil
 
@@ -214,12 +215,17 @@ class Passage:
     distance_m    (N,) where the front tires stand at each sample [m]; on a rig 0
     fine_hz       at least so many steps a second
     run           which one it is of the runs that are looked at together, from 0 on
+    is_free       it begins at the first sample, in any state (``begun_with``): nothing is known of what was before.
+                  For the recorder's filter the record is continued there by its mirror image about the first sample
 
     ValueError unless there are two or more finite distances.
     """
 
+    begins: Array | float = 0.0
+    """By how much the state (2 n,) that it begins in differs from the one at rest."""
+
     def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ,
-                 run: int = 0) -> None:
+                 run: int = 0, is_free: bool = False) -> None:
         if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
@@ -227,12 +233,14 @@ class Passage:
         self.steps = max(1, int(np.ceil(fine_hz / rate_hz - _EVEN)))
         self.step_s = 1 / (rate_hz * self.steps)
         self._lead, self._tail = round(APPROACH_S * rate_hz), round(_TAIL_S * rate_hz)
+        self._mirrored = self._lead if is_free else 0
+        before = self._lead - self._mirrored
         pace_m, ahead_m = distance_m[1] - distance_m[0], distance_m[-1] - distance_m[-2]
-        way = np.concatenate([distance_m[0] + pace_m * np.arange(-self._lead, 0), distance_m,
+        way = np.concatenate([distance_m[0] + pace_m * np.arange(-before, 0), distance_m,
                               distance_m[-1] + ahead_m * np.arange(1, self._tail + 1)])
         way_m = finer(way, self.steps)
-        self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - self._lead * self.steps) * self.step_s), run)
-        coarse = len(way) + round(_REST_S * rate_hz)
+        self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - before * self.steps) * self.step_s), run)
+        coarse = len(way) + self._mirrored + round(_REST_S * rate_hz)
         self._coarse = smooth_length(coarse)
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
         self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
@@ -249,6 +257,12 @@ class Passage:
     def speed_mps(self) -> Array:
         """How fast the car is at the samples (N,) [m/s]."""
         return np.asarray(np.gradient(self.distance_m, 1 / self.rate_hz))
+
+    def begun_with(self, state: Array) -> Passage:
+        """The same passage begun in a state that differs by this (2 n,) from the one at rest."""
+        found = copy(self)
+        found.begins, found._bodies = state, {}
+        return found
 
     @property
     def way(self) -> Way:
@@ -300,6 +314,8 @@ class Passage:
         return self._kept(transform, factor)
 
     def _transform(self, fine: Array) -> Complex:
+        if mirrored := self._mirrored * self.steps:
+            fine = np.concatenate([2 * fine[..., :1] - fine[..., mirrored:0:-1], fine], axis=-1)
         return np.asarray(np.fft.rfft(fine, self._coarse * self.steps)[..., : len(self._s)] * self._recorder)
 
     def _kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
@@ -311,7 +327,7 @@ class Passage:
 
     def sampled(self, fine: Array) -> Array:
         """Fine instants (M, ...) at the samples (N, ...), as they are."""
-        return fine[self._lead * self.steps :: self.steps][: self.count]
+        return fine[(self._lead - self._mirrored) * self.steps :: self.steps][: self.count]
 
 
 @lru_cache(maxsize=32)

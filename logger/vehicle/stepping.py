@@ -133,18 +133,18 @@ class Stepper:
             _tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
             np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
 
-    def march(self, elevation: Array, mean: Array, way: Way | None = None) -> Motion:
-        """The motion on a road, as ``stepping.march``."""
+    def march(self, elevation: Array, mean: Array, way: Way | None = None, begins: Array | float = 0.0) -> Motion:
+        """The motion on a road, as ``stepping.march``, from a state that differs by ``begins`` (2 n,) from rest."""
         from logger.vehicle.stepping_loop import steps
 
         structure, n = self.structure, len(self.structure.mass)
         around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
-        rest = structure.at_rest(elevation[0])
+        first = structure.at_rest(elevation[0]) + begins
         stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
         return Motion(*steps(
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
             _asked(structure, self.laws, way or stands),
-            self.state_and_seen @ rest + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
+            self.state_and_seen @ first + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
 
 
 @dataclass(frozen=True)

@@ -526,7 +526,15 @@ def steps(
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
     passes = _PASSES if acts else 0
     sweeps = 1 if (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
+    mounts = np.zeros((w, 3))
+    if passes:  # what the laws do in the state that it begins in, to a mount that is at rest
+        begun = np.zeros(2 * w)
+        for i in range(w):
+            begun[i] = _suspension(i, tables, pairs, numbers, start[m + i], start[m + w + i], mounts, 0.0)
+            begun[w + i] = _tire(i, tables, numbers, start[m + 2 * w + i] - road[i], start[m + 3 * w + i] - road[w + i])
+        known[m : m + 2 * w] = begun
+        recorded[0] = begun
     _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,
-          np.zeros_like(before), start.copy(), np.zeros(len(by_force)), road, np.zeros((w, 3)), np.zeros(len(rubs)),
+          np.zeros_like(before), start.copy(), np.zeros(len(by_force)), road, mounts, np.zeros(len(rubs)),
           passes, rubs, rubs_at, sweeps, asked)
     return states, recorded

@@ -20,7 +20,7 @@ from logger.api.lab.bench import slow_words, word_of
 from logger.api.lab.checks import check_roads, moves_freely, of_rates
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
-from logger.api.vehicles import Model, model_of
+from logger.api.vehicles import Model, check_forces, model_of
 from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
 from logger.identification.drive_model import DriveModel
@@ -35,6 +35,7 @@ from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
 from logger.store.formats import vehicle_file
+from logger.store.formats.drive_file import RUN
 from logger.vehicle.named_parameters import Coordinates, Free
 
 if TYPE_CHECKING:
@@ -169,6 +170,8 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
     if (run := off_rate(rates_hz)) is not None:
         raise BadInput(f"{records[run].name}: expected {rates_hz[0]:g} samples a second as in {records[0].name}, found "
                        f"{rates_hz[run]:g}")
+    for drive, record in zip(drives, records, strict=True):
+        check_forces(vehicle, record.track, str(drive.path / RUN))
     return [of_rates(record) for record in records] if moves_freely(vehicle) else records
 
 
@@ -417,9 +420,10 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
 
 def _head(given: vehicle_file.Model, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
     vehicle, runs = given.vehicle, "1 run" if len(records) == 1 else f"{len(records)} runs"
+    begun = (f"the first {records[0].skip_s:g} s of a run left out" if records[0].skip_s else
+             "nothing drives it: the state that a run begins in is found with the rest")
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, "
-            f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} the "
-            f"first {records[0].skip_s:g} s of a run left out")
+            f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} {begun}")
 
 
 NORMAL_95 = 1.959964

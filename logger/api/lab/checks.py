@@ -257,6 +257,7 @@ _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a
 _RATE_HZ, _NEARLY = 100.0, 0.25
 LEAST_S = 5.0
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
+_LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
@@ -380,17 +381,18 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
             for part in parts]
 
 
-def _past_s(drive: Drive) -> float:
-    from logger.runs import unknown_past_s
+def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
+    """How long a drive, or a test of a part, has to be; of a rig that nothing drives three periods of the vehicle's
+    slowest vibration, or what there is where that is not known [s]."""
+    from logger.runs import begins_freely
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.modes import undamped_frequencies_hz
 
-    return unknown_past_s(getattr(drive, "track", None))
-
-
-def least_s(drive: Drive) -> float:
-    """How long a drive, or a test of a part, has to be [s]."""
-    from logger.runs import PART_SKIP_S
-
-    return _LEAST_OF_PART_S if _past_s(drive) == PART_SKIP_S else LEAST_S
+    track = getattr(drive, "track", None)
+    if begins_freely(track):
+        slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
+        return min(_LEAST_PERIODS / slowest_hz, LEAST_S) if slowest_hz else 0.0
+    return _LEAST_OF_PART_S if getattr(track, "moves_part", False) else LEAST_S
 
 
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
@@ -506,16 +508,16 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
 
     from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
-    from logger.runs import READING
+    from logger.runs import READING, unknown_past_s
 
-    past_s = _past_s(drive)
+    past_s, shortest_s = unknown_past_s(getattr(drive, "track", None)), least_s(drive, vehicle)
     least_hz, seen = _least_hz(drive, vehicle)
     if drive.rate_hz < (1 - _CLOCK) * least_hz:
         raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
                        f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
     lasts_s = len(drive.time_s) / drive.rate_hz
-    if lasts_s < least_s(drive):
-        raise BadInput(f"{file}: expected a drive of {least_s(drive):g} s or longer, found {lasts_s:.3g} s")
+    if lasts_s < shortest_s:
+        raise BadInput(f"{file}: expected a drive of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")

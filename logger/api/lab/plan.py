@@ -102,6 +102,8 @@ def plan_by(question: PlanQuestion) -> Plan:
         question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile))
     if each(question.runs):
         bench = bench_with(question, "ridelog plan")
+        if alone := next((run.name for run in bench.runs.runs if run.begins_freely), None):
+            raise BadInput(f"{alone}: expected a run that something drives, as a plan repeats it: nothing drives this")
     elif not question.speeds_mps:
         raise BadInput("plan: expected a run, or --profile and --speed of a planned drive")
     drives = _empty_drives(model, road, question)

@@ -28,7 +28,7 @@ import yaml
 from logger import bounds
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded, write_text
-from logger.profiles.excitation import AppliedForce, Excitation
+from logger.profiles.excitation import FEWEST, AppliedForce, Excitation
 from logger.profiles.track import Track
 from logger.runs import ACCELERATION, BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts, Signal
 from logger.store.formats.csv_table import find_table, parse_columns, place, taken
@@ -306,18 +306,22 @@ def header_of(path: Path) -> tuple[str, ...]:
 
 
 def driven_by_time(folder: Path) -> bool:
-    """Whether a run's folder has an excitation. BadInput where it has a profile as well."""
-    timed = (folder / EXCITATION).exists()
-    if timed and (folder / PROFILE).exists():
+    """Whether a run's folder has an excitation, or a drive that went nowhere and nothing that drove it: a rig that was
+    pulled and let go. BadInput where it has a profile as well."""
+    timed, on_road = (folder / EXCITATION).exists(), (folder / PROFILE).exists()
+    if timed and on_road:
         raise BadInput(f"{folder}: expected {PROFILE} or {EXCITATION}, found both: a run is driven over a road or by "
                        "time")
-    return timed
+    return timed or not on_road and (folder / DRIVE).exists() and {SPEED, DISTANCE}.isdisjoint(
+        header_of(folder / DRIVE))
 
 
 def excitation_beside(drive: Drive) -> Excitation:
-    """What drives a rig, out of the run's folder, on the drive's clock. BadInput as ``read_excitation``, and where it
-    moves nothing while the drive lasts."""
+    """What drives a rig, out of the run's folder, on the drive's clock; nothing where there is none. BadInput as
+    ``read_excitation``, and where it moves nothing while the drive lasts."""
     path = drive.path / EXCITATION
+    if not path.exists():
+        return Excitation(drive.rate_hz, np.zeros(max(len(drive.time_s), FEWEST)))
     found = read_excitation(path, read_forces(drive.path))
     first_s, last_s = float(drive.time_s[0]), float(drive.time_s[-1])
     if found.end_s < first_s or found.start_s > last_s:

@@ -1,0 +1,81 @@
+"""A mass that is pulled and let go, with a record of what it did and nothing else, through the commands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.support.command import called
+
+M, K, C = 0.79, 280.0, 2.1
+VEHICLE = f"name: mass\nmodel: single_mass\nmass_kg: {M} +- 1%\nstiffness_n_per_m: 350\ndamping_n_s_per_m: 4\n"
+
+
+def decay(place: Path, lasts_s: float = 3.0, friction_n: float = 0.0, step_m: float = 0.0005) -> Path:
+    """A run with a record of a mass from 7 cm below its rest, read in steps."""
+    time_s = np.arange(0, lasts_s, 0.01)
+    state = solve_ivp(lambda _t, s: [s[1], -(K * s[0] + C * s[1] + friction_n * np.tanh(s[1] / 1e-3)) / M],
+                      (0, lasts_s), [-0.07, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-10, max_step=2e-3).y
+    noisy = state[0] + np.random.default_rng(3).normal(0, 2e-4, len(time_s))
+    place.mkdir()
+    rows = zip(time_s, step_m * np.round(noisy / step_m), strict=True)
+    (place / "drive.csv").write_text("t_s,displacement_m\n" + "".join(f"{t:.2f},{x:.6f}\n" for t, x in rows))
+    (place.parent / "vehicle.yaml").write_text(VEHICLE)
+    return place
+
+
+def test_spring_and_damper_are_found_from_a_record_alone(tmp_path: Path) -> None:
+    found = called("identify", "--json", "--vehicle", tmp_path / "vehicle.yaml", "--free",
+                   "stiffness_n_per_m,damping_n_s_per_m", decay(tmp_path / "run"))
+    answer = json.loads(found.stdout)
+    assert answer["error_after"] < 0.02
+    for name, true in (("stiffness_n_per_m", K), ("damping_n_s_per_m", C)):
+        assert answer["parameters"][name] == pytest.approx(true, abs=4 * answer["standard_errors"][name])
+        assert answer["standard_errors"][name] < 0.03 * true
+    (run := tmp_path / "run" / "excitation.csv").write_text(
+        "t_s,elevation_m\n" + "".join(f"{i / 100:.2f},0\n" for i in range(300)))
+    again = json.loads(called("identify", "--json", "--vehicle", tmp_path / "vehicle.yaml", "--free",
+                              "stiffness_n_per_m,damping_n_s_per_m", run.parent).stdout)
+    assert again["parameters"] == pytest.approx(answer["parameters"])
+
+
+def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
+    run = decay(tmp_path / "run")
+    answer = json.loads(called("compare", "--json", "--tolerance", "0.5", "--vehicle", tmp_path / "vehicle.yaml", run
+                               ).stdout)
+    assert answer["runs"][0]["samples"] == 300
+    assert "lacks nothing" in answer["evidence"][0]
+
+
+@pytest.mark.parametrize(("vehicle", "lasts_s", "words"), [
+    (VEHICLE, 0.6, "run/drive.csv: expected a drive of 0.896 s or longer, found 0.6 s"),
+    ("name: part\nmodel: component\nstiffness_n_per_m: 1\ndamping_n_s_per_m: 1\n", 3.0,
+     "run: expected an excitation.csv with t_s,displacement_m, as the vehicle is a part that its bench moves"),
+])
+def test_what_is_no_free_decay_is_refused_in_one_line(tmp_path: Path, vehicle: str, lasts_s: float, words: str) -> None:
+    run = decay(tmp_path / "run", lasts_s)
+    (tmp_path / "vehicle.yaml").write_text(vehicle)
+    for verb in ("compare", "diagnose", "plan"):
+        found = called(verb, "--vehicle", tmp_path / "vehicle.yaml", run)
+        assert (found.returncode, found.stderr.count("\n")) == (2, 1)
+        assert found.stderr.endswith(f"{words}\n")
+
+
+def test_a_plan_needs_a_run_that_something_drives(tmp_path: Path) -> None:
+    found = called("plan", "--vehicle", tmp_path / "vehicle.yaml", decay(tmp_path / "run"))
+    assert found.returncode == 2
+    assert "nothing drives this" in found.stderr
+
+
+@pytest.mark.slow
+def test_friction_of_what_is_let_go_is_named(tmp_path: Path) -> None:
+    run = decay(tmp_path / "run", friction_n=0.4)
+    answer = json.loads(called("diagnose", "--json", "--tolerance", "0.5", "--vehicle", tmp_path / "vehicle.yaml", run
+                               ).stdout)
+    assert answer["verdict"] == ["dry_friction"]
+    (friction,) = (one for one in answer["candidates"] if one["effect"] == "dry_friction")
+    assert friction["parameters"]["friction_force_n"] == pytest.approx(0.4, rel=0.05)

@@ -1,0 +1,72 @@
+"""Runs that nothing drives: the state that they begin in is found, against closed solutions and an integrator of
+scipy's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+
+from logger.profiles.excitation import Excitation
+from logger.runs import RecordFacts, Run, Signal
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen
+from logger.vehicle.vehicle import Axle, Vehicle
+
+Array = npt.NDArray[np.float64]
+M, K, C, RATE_HZ = 0.8, 260.0, 1.2, 100.0
+MASS = Vehicle("mass", "single_mass", M, None, Axle(0.0, 0.0, K, C, 0.0), None, 0.0)
+TIME_S = np.arange(300) / RATE_HZ
+SIGNALS = {"displacement": Signal("displacement_m", "displacement"), "velocity": Signal("velocity_mps", "velocity"),
+           "acceleration": Signal("accel_z_mps2", "acceleration")}
+
+
+def let_go(place_m: float, speed_mps: float, more: Callable[[float, float], float]) -> dict[str, Array]:
+    """The motion of the mass with a further force, by what is measured of it."""
+    def rates(_t: float, state: Array) -> list[float]:
+        return [state[1], -(K * state[0] + C * state[1] + more(*state)) / M]
+
+    found = solve_ivp(rates, (0, TIME_S[-1]), [place_m, speed_mps], t_eval=TIME_S, rtol=1e-9, atol=1e-11,
+                      max_step=2e-3).y
+    return {"displacement": found[0] - found[0].mean(), "velocity": found[1],
+            "acceleration": np.array([rates(0, one)[1] for one in found.T])}
+
+
+def run_of(measures: str, samples: Array) -> Run:
+    still = Excitation(RATE_HZ, np.zeros(len(samples)))
+    return Run(measures, RATE_HZ, samples, *np.zeros((2, len(samples))), still, 0.0,
+               RecordFacts(main=SIGNALS[measures]))
+
+
+CUBIC = Chosen(shipped_effects()["progressive_spring"], {"cubic_stiffness_n_per_m3": -8000.0})
+FRICTION = Chosen(shipped_effects()["dry_friction"], {"friction_force_n": 0.3, "transition_velocity_m_per_s": 0.01})
+
+
+@pytest.mark.parametrize(("effects", "more", "nearly"), [
+    ((), lambda _x, _v: 0.0, 2e-3),
+    ((CUBIC,), lambda x, _v: -8000 * x**3, 2e-3),
+    ((FRICTION,), lambda _x, v: 0.3 * np.tanh(v / 0.01), 6e-3),
+], ids=["linear", "cubic", "friction"])
+def test_the_right_car_does_what_was_measured_from_its_first_sample_on(
+        effects: tuple[Chosen, ...], more: Callable[[float, float], float], nearly: float) -> None:
+    for measures, samples in let_go(-0.07, 0.3, more).items():
+        (found,) = SimulatedRuns([run_of(measures, samples)], steps_hz(MASS)).predict(compose(MASS, effects))
+        assert found == pytest.approx(samples, abs=nearly * samples.std() * (10 if measures == "acceleration" else 1))
+
+
+def test_a_wrong_car_begins_where_squares_are_least() -> None:
+    """A car with another spring: by the normal equations of its own two free vibrations and a constant."""
+    samples = let_go(0.05, -0.2, lambda _x, _v: 0.0)["displacement"] + 0.001 * np.cos(70 * TIME_S)
+    wrong = Vehicle("wrong", "single_mass", M, None, Axle(0.0, 0.0, 1.3 * K, C, 0.0), None, 0.0)
+    (found,) = SimulatedRuns([run_of("displacement", samples)], steps_hz(wrong)).predict(compose(wrong))
+    decay = C / 2 / M
+    turns = np.sqrt(1.3 * K / M - decay**2) * TIME_S
+    columns = np.stack([np.exp(-decay * TIME_S) * np.cos(turns), np.exp(-decay * TIME_S) * np.sin(turns),
+                        np.ones(len(TIME_S))], axis=1)
+    expected = columns @ np.linalg.lstsq(columns, samples)[0]
+    assert found == pytest.approx(expected - expected.mean(), abs=2e-3 * samples.std())
