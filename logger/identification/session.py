@@ -136,8 +136,8 @@ def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequenc
                 road: RoadInput) -> DriveModel:
     """The model of these drives: in frequency where a car without effects drove, or stood on a rig that elevations
     alone moved, and its acceleration was measured. ValueError as ``DriveModel``."""
-    benches = any(one.facts.main.name != SENSOR or one.begins_freely or (isinstance(one.track, Pushing) and one.track.acts_on)
-                  for one in records)
+    benches = any(one.facts.main.name != SENSOR or one.begins_freely
+                  or (isinstance(one.track, Pushing) and one.track.acts_on) for one in records)
     if effects or benches or vehicle.model in OWN_NAMES:
         return SimulatedModel(vehicle, parameters, records, road, effects)
     return VehicleModel(vehicle, parameters, records, road)

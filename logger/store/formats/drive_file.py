@@ -312,8 +312,8 @@ def driven_by_time(folder: Path) -> bool:
     if timed and on_road:
         raise BadInput(f"{folder}: expected {PROFILE} or {EXCITATION}, found both: a run is driven over a road or by "
                        "time")
-    return timed or not on_road and (folder / DRIVE).exists() and {SPEED, DISTANCE}.isdisjoint(
-        header_of(folder / DRIVE))
+    return timed or (not on_road and (folder / DRIVE).exists()
+                     and {SPEED, DISTANCE}.isdisjoint(header_of(folder / DRIVE)))
 
 
 def excitation_beside(drive: Drive) -> Excitation:
