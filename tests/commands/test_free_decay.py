@@ -16,7 +16,7 @@ VEHICLE = f"name: mass\nmodel: single_mass\nmass_kg: {M} +- 1%\nstiffness_n_per_
 
 
 def decay(place: Path, lasts_s: float = 3.0, friction_n: float = 0.0, step_m: float = 0.0005) -> Path:
-    """A run with a record of a mass from 7 cm below its rest, read in steps."""
+    """A run with a record of a mass from 7 cm below its rest, read in steps [m]."""
     time_s = np.arange(0, lasts_s, 0.01)
     state = solve_ivp(lambda _t, s: [s[1], -(K * s[0] + C * s[1] + friction_n * np.tanh(s[1] / 1e-3)) / M],
                       (0, lasts_s), [-0.07, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-10, max_step=2e-3).y

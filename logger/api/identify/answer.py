@@ -17,7 +17,7 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_roads, moves_freely, of_rates
+from logger.api.lab.checks import check_decay, check_roads, moves_freely, of_rates
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
@@ -35,7 +35,7 @@ from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
 from logger.store.formats import vehicle_file
-from logger.store.formats.drive_file import RUN
+from logger.store.formats.drive_file import DRIVE, RUN
 from logger.vehicle.named_parameters import Coordinates, Free
 
 if TYPE_CHECKING:
@@ -172,6 +172,7 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
                        f"{rates_hz[run]:g}")
     for drive, record in zip(drives, records, strict=True):
         check_forces(vehicle, record.track, str(drive.path / RUN))
+        check_decay(drive, drive.path / DRIVE)
     return [of_rates(record) for record in records] if moves_freely(vehicle) else records
 
 

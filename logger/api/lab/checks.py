@@ -257,6 +257,7 @@ _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a
 _RATE_HZ, _NEARLY = 100.0, 0.25
 LEAST_S = 5.0
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
+_DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
 _LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
@@ -395,6 +396,19 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     return _LEAST_OF_PART_S if getattr(track, "moves_part", False) else LEAST_S
 
 
+def check_decay(drive: Drive, file: Path) -> None:
+    """Raise BadInput for a record that does not die down, of a run that nothing drives."""
+    from logger.runs import begins_freely
+
+    half = len(drive.accel_z_mps2) // 2
+    if begins_freely(getattr(drive, "track", None)):
+        first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
+        if last > _DIES_DOWN * first:
+            raise BadInput(f"{file}: expected an excitation that moves the car, or a record that dies down, as of what "
+                           f"is let go: nothing drives it, and its second half has {last / max(first, 1e-300):.2g} "
+                           "times the r.m.s. of the first")
+
+
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
     """Where in a drive the car moved, or was driven ``on_rig`` (n,), and there were readings.
 
@@ -528,6 +542,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
         found = f"{counted[0]:g}{unit} all along" if counted[0] else "zeros only"
         what = "accelerations" if is_acceleration else drive.facts.main.name
         raise BadInput(f"{file}: expected {what} after the first {past_s:g} s, found {found}")
+    check_decay(drive, file)
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     if is_acceleration and abs(counted.mean()) > _MOST_MEAN_MPS2:
