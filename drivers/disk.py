@@ -1,15 +1,10 @@
 """The disk as recordings and logs use it: opening what somebody named, and every change.
 
-Opening a file that somebody named, which has to be one.
-
-Problem. The name may be that of a pipe, where to open it already waits until somebody writes, or of a device. Solution:
-it is opened without waiting, and what is no regular file is refused.
-
-The few ways in which recordings and logs change the disk.
-
-Problem. What happens to a file when the power goes, the card is full or dies can only be tested if every change to the
-disk can be watched, cut off or refused. Solution. Whoever writes in the car does so through a ``FileSystem``; a test
-hands in one that fails. Every method raises ``OSError`` for what the system refuses.
+A name may be that of a pipe, where to open it already waits until somebody writes, or of a device: a file is opened
+without waiting, and what is no regular file is refused. What happens to a file when the power goes, the card is full or
+dies can only be tested if every change to the disk can be watched, cut off or refused: whoever writes in the car does
+so through a ``FileSystem``, and a test hands in one that fails. Every method raises ``OSError`` for what the system
+refuses.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 # Small matrices: a second thread in the algebra library only waits for the first, badly so where tests run in parallel.
@@ -25,9 +26,12 @@ from .support.drives.simulated_drive import DemoDrive, record, simulate_drive
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# A busy machine is no fault of an example.
-hypothesis.settings.register_profile("any_machine", deadline=None)
-hypothesis.settings.load_profile("any_machine")
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A busy machine is no fault of an example; where slow tests are left out, 30 examples are enough of each rule."""
+    few = "not slow" in config.option.markexpr
+    hypothesis.settings.register_profile("any_machine", deadline=None, max_examples=30 if few else 100)
+    hypothesis.settings.load_profile("any_machine")
 
 
 @pytest.hookimpl(trylast=True)
@@ -37,9 +41,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path not in long)
 
 
-def pytest_collection_finish() -> None:
-    """The tests themselves stay to the end: no search for garbage need go through them."""
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """The tests themselves stay to the end: no search for garbage need go through them, nor while they are found."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 MANY_TESTS = 1000

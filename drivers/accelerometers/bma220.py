@@ -1,17 +1,11 @@
-"""The Bosch BMA220 over I2C: its registers, the chip as an emulation, and the driver.
-
-The registers of the Bosch BMA220 on I2C.
+"""The Bosch BMA220, a three-axis accelerometer with six bits per axis, over I2C: registers, emulation and driver.
 
 Addresses are those on I2C, twice the numbers that the data sheet gives for SPI. Facts from the Linux kernel's driver
 (drivers/iio/accel/bma220), Bosch's API of 2014 and the UPM library, which agree.
 
-The BMA220 as a set of registers, side effects and all, for recorded buses and for tests.
-
-Problem: a driver of a chip whose reads change its state cannot be tried against a table of canned answers. Solution:
-the chip's own behaviour, one register access at a time. Where the data sheet's behaviour is not known (what the data
+A driver of a chip whose reads change its state cannot be tried against a table of canned answers: the emulation behaves
+as the chip, one register access at a time. Where the data sheet's behaviour is not known (what the data
 registers answer while it is suspended or held in reset), the model answers zero and takes no sample.
-
-Driver of the Bosch BMA220, a three-axis accelerometer with six bits per axis, on I2C.
 
 Problem: the chip is easy to stop by accident (reading register 0x30 suspends it, reading 0x32 holds it in reset), it
 can hold the bus low for ever, and after a dip of its supply it goes on delivering plausible numbers at the wrong scale

@@ -1,4 +1,4 @@
-"""Biases of cars, and the least squares behind them.
+"""Which car reads how much too high, from the roads that cars share: their biases, and the least squares behind them.
 
 Least squares with a level and a growth for each road and a bias for each car, the roads eliminated.
 
@@ -9,8 +9,6 @@ Henderson, Best linear unbiased estimation and prediction, Biometrics 31, 1975).
 With X the columns of the cars and of time, R those of the roads, W the weights and B = (R'WR + ridge)^-1 R'WX, the
 cars follow from U'v, U = W (X - R B), and A = U'X. Whatever the covariance V of the passes, that of the cars is
 A^-1 U'VU A^-1.
-
-Which car reads how much too high, from the roads that cars share.
 
 A pass of car j over road i at time t reads IRI m_i (1 + growth_i t) g_j (1 + e): errors of an IRI go with it. With a
 logarithmic link and a variance that goes with the square of the mean this is a generalised linear model of the gamma

@@ -1,20 +1,15 @@
-"""From passes to figures: expressions, the statistics of roads, and the summary.
-
-The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
+"""The figures of a dataset (roads, sections, cells or routes, and the cars that measured them) as relational
+expressions, written once in Ibis for any engine it knows; and mean and change of each road, with their errors.
 
 Three groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and
 time. ``passes_by_session``: means by session, of a part of the roads, from which the biases of cars follow.
 ``roads``: the sums of each piece of road over all cars, each car's readings divided by its gain. What follows from the
 sums is arithmetic over as many rows as there are pieces of road.
 
-Mean and change of each road from sums over its passes, with their errors.
-
 Few passes show little of their own scatter. Their variance is drawn towards that of all roads by as much as the roads'
 variances agree (G. K. Smyth, Linear models and empirical Bayes methods, 2004, sections 3 and 6.2: a scaled inverse
 chi-square prior whose two numbers follow from mean and variance of the logarithms). Changes are significant where the
 share of false ones among them stays below a limit (Y. Benjamini and Y. Hochberg, 1995).
-
-The figures of a dataset: roads, sections, cells or routes, and the cars that measured them.
 """
 
 from __future__ import annotations

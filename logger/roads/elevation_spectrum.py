@@ -1,6 +1,5 @@
-"""The spectrum of a road's elevation, its level by ISO 8608, and the IRI that it means.
-
-The spectrum of a measured profile, its degree of roughness, its waviness and its class (ISO 8608).
+"""The spectrum of a measured profile, its degree of roughness, waviness and class (ISO 8608), and the IRI that it
+means.
 
 A road's spectrum falls so steeply that the plain method lies: a window leaks the long waves into the short ones, and a
 hill outweighs everything. And the bare spectrum is so ragged that no line through it can be seen (Fig 2.7, 2.9).
@@ -31,8 +30,6 @@ The suspension's slope s of the IRI's car on a random road is a Gaussian process
 and the IRI is the mean of |s| over the road. Its expectation is sqrt(2 / pi) times the standard deviation of s. Two
 values of |s| whose slopes have the correlation rho are correlated themselves: their covariance, in units of the mean
 squared, is sqrt(1 - rho^2) + rho asin(rho) - 1. Its integral along the road is how much the IRI spreads.
-
-What kind of road a wheel track is: its spectrum's line, its exact IRI, and the IRI that such a line lets expect.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """Roads in sections of one length: their IRI with its error, and the words for how rough they are.
 
-Standard errors of means over windows, from what the errors of windows have in common.
-
 Problem: the IRI of a section is the mean of its windows', but their errors are not independent: added as if they were,
 sections of 0.1 mi were out by 1.6 to 3.8 times their standard errors. Solution: each error is the sum of four parts,
 and each part has its own rule.
@@ -26,8 +24,6 @@ Words for an IRI: which roads have it (Table 2.3 of Blum 2015) and how they ride
 Table 2.3 gives ranges that overlap on purpose: an old pavement may be as smooth as a new one. So a value has every
 kind of road whose range holds it, and none below or above all of them. Table 2.4 writes its descriptions along a
 scale from 0 to 12 m/km; here each one holds from the mark it stands at (the first from 0) to that of the next.
-
-Means of windows over sections of road that are as long as an agency files them.
 
 The IRI of a section is the mean of the rectified slope over it (ASTM E1926), so it is the mean of its windows' IRI by
 length; a window across a limit counts in both sections by its parts.

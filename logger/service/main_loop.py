@@ -1,24 +1,13 @@
 """The loop of the service, and where its events come from: threads that listen, or a recording.
 
-Events of several sources, brought into order of time.
-
-A thread per source, which only looks at its device at the right moment and queues what it got, with the time.
-
-So a slow card or a slow window never delays a sample.
-
-A recorded drive through the service: its events to the core, as the live service gave them.
+Each source has a thread of its own, which only looks at its device at the right moment and queues what it got, with the
+time: so a slow card or a slow window never delays a sample. The main loop empties the queue twice a second, brings the
+events into order of time, as far as no source holds earlier ones back, records them if asked to, feeds the core, and
+reports to systemd and the status file. A pipeline that hangs stops feeding the watchdog. What was written is synced at
+every second round: a row is on the disk half a second after it was made, or later where ``sync_s`` allows it.
 
 A dump holds what the core was given while it was recorded, in that order: what a driver had made sure of, and merged
 by time. So nothing of the drivers' part is done again, and what the live service made of the drive comes out.
-
-The live service: threads that listen, one loop that thinks.
-
-Each source has a thread of its own (``logger.service.main_loop``) that puts what it got into a queue. The main loop
-empties the queue twice a second, brings the events into order of time, as far as no source holds earlier ones back,
-records them if asked to, feeds the core, and reports to systemd and the status file. A pipeline that hangs
-stops feeding the watchdog.
-What was written is synced at every second round: a row is on the disk half a second after it was made, or later where
-``sync_s`` allows it.
 """
 
 from __future__ import annotations

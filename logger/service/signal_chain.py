@@ -1,6 +1,4 @@
-"""The accelerometer's samples through filters, and the columns of comfort that come of them.
-
-From jittered accelerometer samples to filtered samples on the time grid.
+"""From jittered accelerometer samples to filtered ones on the time grid, and to a row's columns of comfort.
 
 One vertical axis is taken, put on a uniform grid, decimated where the sensor was read faster, freed of gravity
 by a high-pass, low-passed if the settings ask for it, and weighted for comfort. Holes are never hidden: samples
@@ -8,11 +6,10 @@ that the sensor did not deliver are `present = False`. Over a short hole the fil
 line, so that one loose contact does not cost seconds of road; after a long one they start from rest and their output
 is not `settled` until they have forgotten the start.
 
-The comfort columns of a row: what is known of the ride itself, with standard errors, beside the raw values.
-
-Where the estimated road under a window says what the car did, the figures are those of that ride: the model of the car
-is in the prior, the readings are bounds. Where there is none (no speed, the ends of a drive, a sensor whose noise blurs
-its steps), the power of the noise is taken off the readings, which needs no model. Where neither is possible, the only
+The comfort columns are what is known of the ride itself, with standard errors, beside the raw values. Where the
+estimated road under a window says what the car did, the figures are those of that ride: the model of the car is in the
+prior, the readings are bounds. Where there is none (no speed, the ends of a drive, a sensor whose noise blurs its
+steps), the power of the noise is taken off the readings, which needs no model. Where neither is possible, the only
 figure is the word that a bound allows.
 """
 

@@ -1,9 +1,7 @@
-"""The parts of the service put together, out of settings or out of a recording.
+"""From settings or a recording to working parts: decoders, pipeline, and what a log must carry to stand alone.
 
-Whether a recording's readings came as often as its header says: at another rate all samples of the grid would be
-holes, and every window would be flagged for it without a word on why.
-
-From settings to working parts: decoders, pipeline, and what a log must carry to stand alone.
+Readings that come at another rate than a recording's header says are refused: all samples of the grid would be holes,
+and every window would be flagged for it without a word on why.
 """
 
 from __future__ import annotations

@@ -222,8 +222,9 @@ def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [["diagnose", "--same-road"], ["diagnose"], ["lab"]],
-                         ids=["same road", "diagnose", "lab"])
+@pytest.mark.parametrize("more", [
+    pytest.param(["diagnose", "--same-road"], id="same road"), pytest.param(["diagnose"], id="diagnose"),
+    pytest.param(["lab"], id="lab", marks=pytest.mark.release)])
 def test_a_search_is_the_commands(
     more: list[str], names: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

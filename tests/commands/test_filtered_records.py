@@ -93,7 +93,7 @@ def test_what_is_asked_is_left_out_of_the_record_and_of_the_model(
         main(["compare", "--vehicle", "rav4-2009", run, "--low-pass", "70"])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_nothing_is_missing_in_a_record_that_was_filtered(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     found = answer(capsys, "diagnose", *drives["filtered"])

@@ -26,7 +26,7 @@ HUGE_GB = 0.02
 LONGEST_S = 20.0
 
 
-@pytest.mark.parametrize("share", [pytest.param(0.2, id="a fifth"), pytest.param(1, id="all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("share", [pytest.param(0.1, id="a tenth"), pytest.param(1, id="all", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_input_is_refused_in_one_line_or_read_as_it_stands(name: str, share: float) -> None:
     with Workshop() as folder:

@@ -17,6 +17,7 @@ import pytest
 from drivers.dump import open_dump
 
 from ..support.faults.foreign import NUMBERS, ROOT_VARIABLE
+from ..support.slow import release
 from .test_process import SerialDevice, Service, rows_in, write_config
 
 ROOT = Path(__file__).parents[2]
@@ -59,7 +60,7 @@ def iio_device(root: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["serial", "i2c", "iio"])
+@pytest.mark.parametrize("kind", ["serial", "i2c", *release("iio")])
 def test_no_error_of_any_call_of_a_device_ends_the_service(
         kind: str, receiver: SerialDevice, short_dump: Path, ridelog: Path, tmp_path: Path) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'" if kind == "serial" else "1")

@@ -304,7 +304,7 @@ def test_a_second_service_on_the_same_folder_is_refused(
     assert service.terminate() == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_serial_accelerometer_pulled_and_put_back(
     gps: SerialDevice, start: Callable[[], Service], tmp_path: Path
 ) -> None:

@@ -1,15 +1,10 @@
-"""Finished logs copied to a stick, and what a folder of logs remembers of it.
+"""Finished logs copied to a stick that may be pulled at any instant, and remembered as exported when they are safe.
 
-What a folder of logs remembers of its exports: which of its files lie on a stick already.
-
-Problem. Room on the card may be made by removing what has been exported, and nothing else: so the memory must never
-say yes too early, nor of a file that has changed since, as a log does that learns its UTC after it was exported.
-Solution. A mark carries size, time of change and SHA-256 of what was exported; it counts while the file still has that
-size and time. The marks are one list with a checksum over itself, replaced in one step; one that is damaged is as good
-as none, and the files are marked again by the next export that finds them on its stick. Exports to two sticks at once
-take turns.
-
-Finished logs copied to a stick that may be pulled at any instant, and remembered as exported when they are safe.
+Room on the card may be made by removing what has been exported, and nothing else: so the memory of it must never say
+yes too early, nor of a file that has changed since, as a log does that learns its UTC after it was exported. A mark
+carries size, time of change and SHA-256 of what was exported; it counts while the file still has that size and time.
+The marks are one list with a checksum over itself, replaced in one step; one that is damaged is as good as none, and
+the files are marked again by the next export that finds them on its stick. Exports to two sticks at once take turns.
 
 Problem. A person plugs a stick into a car and pulls it when it suits them. What is on the stick then must be right or
 absent, what is remembered as exported must really be there, and the next try must put right what is missing. The stick

@@ -1,18 +1,11 @@
-"""The list of what an export has put into a folder, and the form that such lists have.
-
-A list in a text file that shows when it was cut or changed: its last line counts the lines and bears their SHA-256.
-
-Problem. The lists of what was exported may be as long as a folder has files, are read by a small machine, and come from
-sticks that anybody had in hand. Solution: they are written and read line by line, and no reader believes a line before
-the last one has been checked.
-
-The list of what an export has put into a folder, by which the folder can be checked anywhere.
+"""The list of what an export has put into a folder, by which the folder can be checked anywhere.
 
 Problem. A stick travels, is pulled early, and is written to by others; at the desk somebody has to know that what
 arrived is what left. Solution: one text file with a SHA-256 per file, in the form that ``sha256sum -c`` reads too, with
-the logger's name in the first line and a checksum of the list in the last, so that a list that was cut or changed
-shows. Names are those of our own files: a list cannot point anywhere else. It is read line by line, and not beyond what
-a logger could ever have written, for a small machine reads it too.
+the logger's name in the first line. The last line counts the lines and bears their SHA-256, so that a list that was cut
+or changed shows, and no line is believed before it. Names are those of our own files: a list cannot point anywhere
+else. It is written and read line by line, and not beyond what a logger could ever have written, for a small machine
+reads it too.
 """
 
 from __future__ import annotations

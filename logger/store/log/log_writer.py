@@ -1,6 +1,5 @@
-"""Writing a log: its files, and what is kept while the disk refuses them.
-
-The files of a log: opened, filled, finished, and put right after a power cut.
+"""The files of a log: opened, filled, finished, put right after a power cut, and what is kept while the disk refuses
+them.
 
 Problem. The power of a car goes at any instant. Whoever looks into the folder afterwards must find every row that
 had reached the disk, once, and no file that looks finished and is not. The rows written before the first GPS fix
@@ -26,15 +25,11 @@ What is promised, whatever is cut and wherever (``tests/benchmarks/faults.py`` t
 The disk has to keep its side: what fsync returned for stays, and a rename happens or does not. ext4 as on a Raspberry
 Pi does; FAT does not promise the second, nor that a cut leaves no old content of the disk in a new file.
 
-A log that the disk cannot stop.
-
-Problem. A card fills up, dies or turns read-only while the car drives. The service must not end by that: the sensors
-still work, the disk may come back, and somebody has to say what is wrong.
-
-Solution. ``BufferedLog`` stands before a ``SegmentLog`` and never raises what the disk says. It keeps every row that is
-not known to be on the disk, so many of them at most, and writes them to a new part once the disk takes them again: the
-part that failed is never trusted beyond its last sync. Tries come at growing intervals. A disk that fails before there
-is a log (at the start of the service) is the same case.
+A card fills up, dies or turns read-only while the car drives. The service must not end by that: the sensors still work,
+the disk may come back, and somebody has to say what is wrong. ``BufferedLog`` stands before a ``SegmentLog`` and never
+raises what the disk says. It keeps every row that is not known to be on the disk, so many of them at most, and writes
+them to a new part once the disk takes them again: the part that failed is never trusted beyond its last sync. Tries
+come at growing intervals. A disk that fails before there is a log (at the start of the service) is the same case.
 """
 
 from __future__ import annotations

@@ -319,7 +319,7 @@ def test_cut_at_every_change_then_repair(tmp_path: Path, power: bool) -> None:
         assert texts(folder) == before
 
 
-@pytest.mark.parametrize(("power", "each"), [(True, 12), *slow((True, 3), (False, 3))])
+@pytest.mark.parametrize(("power", "each"), [(True, 36), *slow((True, 3), (False, 3))])
 def test_cut_of_the_repair_at_every_change(tmp_path: Path, power: bool, each: int) -> None:
     total = changes_of(lambda files: Drive().run(_fresh(tmp_path, "whole"), files))
     for cut_at in range(0, total, each):
