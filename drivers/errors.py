@@ -1,7 +1,5 @@
 """Errors of the drivers, and the two boundaries at which whatever a library raises becomes one of them.
 
-Errors of the drivers, one small tree.
-
 DriverError
 |- DeviceError        the outside world; the supervisor closes the device, waits and tries again
 |  |- NotPresent      nothing answers: cable out, wrong address, no such port
@@ -12,8 +10,6 @@ DriverError
 |     '- SettingsLost it no longer holds what was written to it: restart it at once
 |- SettingsError      a setting the device does not have; trying again cannot help
 '- DumpError          a recorded dump that cannot be read: file, line, what was expected
-
-Whatever a library or the kernel raises, as a fault of the device that it was asked about.
 
 Problem. pyserial lets the kernel's ``OSError`` and ``termios.error`` through where an adapter refuses a control
 transfer, and raises ``TypeError`` or ``struct.error`` for a port that was torn away between two calls; files of the

@@ -1,6 +1,4 @@
-"""GPS over NMEA 0183: sentences to fixes, and how full the line is.
-
-How full a serial line is, by when its bytes come.
+"""GPS over NMEA 0183: sentences to fixes, and how full the line is, by when its bytes come.
 
 Problem: a device that has more to send than its line carries puts the rest into a buffer, and what it sends is late by
 what waits there. Solution: a buffer that is not empty leaves its line no pause. Of a line that has paused lately,
@@ -11,11 +9,9 @@ two quartz clocks and their dividers do (``TOLERANCE``), and a look at it is lat
 sleep between two looks and a USB adapter (``LOOK_S``). What brings more bytes than that has no such line: a receiver on
 USB.
 
-GPS receivers that speak NMEA 0183: bytes into fixes.
-
-The problem: what receivers send differs by maker, age and setting. Fields are empty or stale, a receiver without a fix
-may repeat its last position or invent a time, the date is two digits and may be 1024 weeks wrong, and the sentences of
-one fix come one after the other in any order.
+Another problem: what receivers send differs by maker, age and setting. Fields are empty or stale, a receiver without a
+fix may repeat its last position or invent a time, the date is two digits and may be 1024 weeks wrong, and the sentences
+of one fix come one after the other in any order.
 
 The solution: ``drivers.nmea_sentences`` says what one sentence says; ``NmeaDecoder`` puts sentences of one time
 together into a ``Fix`` and decides what to believe:

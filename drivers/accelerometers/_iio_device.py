@@ -1,6 +1,5 @@
-"""Accelerometers of the Linux kernel's IIO: what they say of themselves, and how they are read.
-
-What the bytes of an IIO buffer mean, from what the kernel says of it in sysfs.
+"""Accelerometers that a driver of the Linux kernel reads (Industrial I/O), as its files in sysfs: what they say of
+themselves, and how they are read.
 
 A description holds the kernel's own texts, so that a recording can be decoded by them alone:
 
@@ -18,13 +17,9 @@ Source: Linux, Documentation/ABI/testing/sysfs-bus-iio (in_accel_*_raw, _scale, 
 _en, _index, _type; current_timestamp_clock) and Documentation/iio/iio_devbuf.rst (alignment). Each channel is aligned
 to its own size, and a scan to that of its largest channel (iio_compute_scan_bytes, drivers/iio/industrialio-buffer.c).
 
-An accelerometer that a driver of the Linux kernel reads (Industrial I/O), as its files in sysfs.
-
 Problem: whether the kernel collects samples by itself depends on the chip's driver, on a trigger, and on who may write
 to sysfs. Solution: the buffer is set up where that can be done, or taken as somebody has set it up; otherwise the raw
 values are read one by one, and ``why_polled`` says what was missing.
-
-Source: Linux, Documentation/ABI/testing/sysfs-bus-iio and Documentation/iio/iio_devbuf.rst.
 """
 
 from __future__ import annotations

@@ -1,18 +1,13 @@
-"""What the studies of public records of real roads share.
-
-Studies of public records of real roads: what a folder has to hold, and what is said where it does not.
+"""What the studies of public records of real roads share: what a folder has to hold, a pass through the program's own
+path, and what is shown: the car beside the profiler, road by road, and what the best could reach.
 
 Every file of ``logger/api/datasets`` knows one set and offers a study of it: it reads the folder that a person
 downloaded and compares what ridelog says of the car's acceleration with what a profiler measured. Nothing of a set is
 kept here.
 
-A pass of a public record of roads, through the same path as any recording: CSV, extraction, estimate.
-
 Problem: a figure of a data set says something of the program only if the program's own path was gone: a reader that
 filters, levels and aligns by itself measures itself. Solution: a pass is written as the CSV files that a phone would
 have left, ``extract --csv`` makes its runs, ``estimate`` its windows; what is left here is where each window lies.
-
-What is shown of a public record of roads: the car beside the profiler, road by road, and what the best could reach.
 
 A factor, where one is fitted, is fitted on the other roads and judged on this one.
 """

@@ -1,20 +1,13 @@
-"""What a fleet's owner sees: words, layers, tiles, page and folder.
-
-Figures of a fleet in words and as JSON.
-
-Figures of roads as a layer for the formats of other programs: a line each, or a point for what has no direction.
-
-Roads in tiles by zoom level, as scripts that lie beside a page.
+"""What a fleet's owner sees: figures in words and as JSON; a layer of roads for other programs, a line each, or a point
+for what has no direction; and a page of some ten kilobytes with a map, whose tiles lie beside it, and the lists to act
+on.
 
 Problem: a county has a million segments, and a page that holds them does not open. Solution: squares of Web Mercator
 (EPSG:3857), as street maps have them; down to the last level but one a tile holds means over 1/64 of its side, at the
 last level segments with their history. A reader loads what is in view. A page opened from a folder may not fetch, but
 may load scripts: so each tile is one, which calls ``fleetTile``.
 
-The overview of a fleet: a page of some ten kilobytes with a map, whose tiles lie beside it, and the lists to act
-on.
-
-The folder of a report: written beside its place, and moved there when it is whole.
+The folder of a report is written beside its place, and moved there when it is whole.
 """
 
 from __future__ import annotations

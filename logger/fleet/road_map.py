@@ -1,19 +1,15 @@
-"""Integers for pieces of road, without a map and with one.
-
-An integer for a piece of road without a map: a cell of the ground, and the direction driven.
+"""Integers for pieces of road: by cells of the ground or by lines of a map, and by the direction driven.
 
 Problem: rows of many drives over one place have to meet in a grouping, which is quick by an integer and slow by
-geometry. Solution: the ground in cells of 0.1 mi / 8 = 66 ft, eight directions in each. A key reads from its highest
-bits: row and column of a block of 64 x 64 cells, row and column inside it, direction. So a block, or a section of 8 x 8
-cells, is found by leaving bits away. Rows of blocks are even in latitude; each is cut into as many columns as make its
-blocks about square.
+geometry. Solution without a map: the ground in cells of 0.1 mi / 8 = 66 ft, eight directions in each. A key reads from
+its highest bits: row and column of a block of 64 x 64 cells, row and column inside it, direction. So a block, or a
+section of 8 x 8 cells, is found by leaving bits away. Rows of blocks are even in latitude; each is cut into as many
+columns as make its blocks about square.
 
-An integer for a piece of road of a map: the line of roads that a window lies on, and the direction driven on it.
-
-Candidates are pieces of 66 ft near a place (P. Newson and J. Krumm, Hidden Markov map matching through noise and
-sparseness, 2009: a receiver's errors as a normal distribution across the road). A road is chosen by distance and
-direction, of the row itself and of its neighbours along the drive, so that one bad fix does not jump to the parallel
-road. Rows near no road get the key of their cell.
+With a map: candidates are pieces of 66 ft near a place (P. Newson and J. Krumm, Hidden Markov map matching through
+noise and sparseness, 2009: a receiver's errors as a normal distribution across the road). A road is chosen by distance
+and direction, of the row itself and of its neighbours along the drive, so that one bad fix does not jump to the
+parallel road. Rows near no road get the key of their cell.
 """
 
 from __future__ import annotations

@@ -4,17 +4,13 @@ Problem: a page is made of hundreds of texts, many of them from files that anybo
 escaped is a hole. Solution: HTML is a type of its own. ``html`` fills a template and escapes what it puts in; adding
 text to HTML escapes the text; so a text that nobody thought of is shown, never obeyed.
 
-The style sheet of the page: one column of text and pictures, for light and dark screens and for paper.
+The page is one column of text and pictures, for light and dark screens and for paper. The eight class colours run from
+blue over yellow and red to purple, fall in lightness from the third on, and are apart with any common colour vision; a
+casing around them carries the light ones on white and the dark ones on black.
 
-The eight class colours run from blue over yellow and red to purple, fall in lightness from the third on, and are
-apart with any common colour vision; a casing around them carries the light ones on white and the dark ones on black.
-
-An HTML page that stands alone: one style, no network. Every text is escaped (``logger.report.document``).
-
-A page may have one script of ours. The page's policy names it by its hash, so that no other one runs even if a hostile
-file got a tag past us.
-
-What a notebook shows of a result: its text and its charts, in the style of the pages, within its own cell.
+It stands alone: one style, no network. It may have one script of ours, which its policy names by its hash, so that no
+other one runs even if a hostile file got a tag past us. A notebook shows a result's text and charts in the same style,
+within its own cell.
 """
 
 from __future__ import annotations

@@ -4,10 +4,6 @@ It opens from a stick on a machine without network or rights: no script, no pict
 content policy that forbids them even if a hostile file got a tag past us. Every text that comes from a file is
 escaped. The map and the curves are drawn by a script of ours (``assets``) out of packed numbers; all else is plain.
 
-What the page's script fills: the places of the map, the curves and the table, with their keys and words.
-
-The windows of drives as the page's script takes them: columns of whole numbers, packed small.
-
 Problem: 100,000 windows of some fifteen numbers are 15 MB as text, and a page has to hold them. Solution: a number is
 kept in the steps that can be read off the page (a millimetre, a hundredth of a m/km), differences from row to row are
 kept where neighbours are alike, and what is left is deflated byte by byte of equal weight, so that the bytes that are

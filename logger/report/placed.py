@@ -1,8 +1,5 @@
-"""Rows of logs that have a place, as arrays.
-
-What of logs stands in no figure, and why.
-
-Which rows of several drives lie on one place of the road, and what they say together: for the page of logs.
+"""Rows of logs that have a place, as arrays; which of several drives lie on one place of the road, and what they say
+together; and what of logs stands in no figure, and why.
 """
 
 from __future__ import annotations

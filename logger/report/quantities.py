@@ -1,8 +1,5 @@
-"""Numbers with their errors and units, as a person reads them.
-
-Units in which a table is printed for a person: SI, or those of road agencies in the US.
-
-Paragraphs and columns of plain text, as wide as a screen.
+"""Numbers with their errors, as a person reads them, in SI or in the units of road agencies in the US; paragraphs and
+columns of plain text, as wide as a screen.
 """
 
 from __future__ import annotations

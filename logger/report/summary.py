@@ -4,7 +4,7 @@ Lengths weigh, not rows: a window by time has no length and counts in the time o
 windows, but of those within ``APART_M`` of each other, on the ground, only the worst is named, so that one pothole,
 or a bad bridge driven both ways, does not fill the list.
 
-A summary as one screen of text, for a terminal that can draw blocks or for one that cannot.
+At a terminal it is one screen of text, whether it can draw blocks or not.
 """
 
 from __future__ import annotations

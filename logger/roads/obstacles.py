@@ -1,8 +1,4 @@
-"""Single obstacles on a road.
-
-Speed bumps: single obstacles that no spectrum of a road describes.
-
-Single obstacles on a road, as elevations that are added to it.
+"""Single obstacles on a road, which no spectrum describes, as elevations that are added to it.
 
 All are functions of distance, so that they can be laid on any profile and on each other. A track lays straight lines
 between its samples: an edge that is steep here is as steep there as one step of the track allows.

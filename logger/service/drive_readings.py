@@ -1,6 +1,4 @@
-"""Readings of a drive as they come, and how much of its range the sensor uses.
-
-How a drive fills the sensor's range, and which other setting would suit it better.
+"""Readings of a drive as they come, how they fill the sensor's range, and which other setting would suit it better.
 
 Problem: a range that is too small cuts off what is rough, and one that is too large has steps in which smooth roads
 hide. Solution: count both, and compare with what was measured of a BMA220 with 4 reads per sample on roads of IRI 2 to
@@ -9,9 +7,8 @@ for long: with 8 % of windows clipped R2 was 0.972 at 2 g and 0.959 at 4 g, with
 any clipped window the smaller range was better by 0.01 to 0.1 of R2 at every speed. Where windows hid below a step, the
 next finer setting gave more of them and 0.05 to 0.06 more of R2.
 
-What a recorded drive holds, before anything is made of it: readings on the 100 Hz grid, and fixes.
-
-It stands where the pipeline stands in a replay (``event_core``), so that bytes become readings by the same drivers,
+What a recorded drive holds, before anything is made of it, are readings on the 100 Hz grid, and fixes. What reads it
+stands where the pipeline stands in a replay (``event_core``), so that bytes become readings by the same drivers,
 filters and checks; but it keeps them, where the pipeline makes rows of them.
 """
 

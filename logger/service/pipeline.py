@@ -1,12 +1,8 @@
-"""From readings to rows: windows, and the queue in which they wait for their IRI.
-
-Windows wait here for their roughness.
+"""Samples and fixes in, records of windows out, which wait in a queue for their IRI.
 
 Problem. Comfort is known when a window ends; the road under it is known some seconds later, once the rear axle and the
 slow swing of the body have passed it. Rows must leave in order all the same. Solution: windows stand in a queue, the
 readings go to the estimator, and the head of the queue leaves as soon as its estimate has come or can come no more.
-
-Samples and fixes in, records of windows out.
 
 The pipeline moves in steps of event time, so that what it does depends on the data alone and never on how the
 data were delivered. Samples wait until the motion of the car at their instant is settled: between two fixes it

@@ -1,8 +1,5 @@
-"""The running service, and what it reports of itself.
-
-What the running service reports of itself: a snapshot for the status file, a line for systemd.
-
-The live service put together: devices, threads, log, status and watchdog.
+"""The live service put together (devices, threads, log, status and watchdog), and what it reports of itself: a snapshot
+for the status file, a line for systemd.
 """
 
 from __future__ import annotations

@@ -1,21 +1,16 @@
 """Drives that the studies stand on, their windows, and the dissertation's way of fitting beside ours.
 
-Drives that the studies stand on: the car of Table 4.2 over one obstacle, simulated.
+The car of Table 4.2 goes over one obstacle. It is stepped through time by ``logger.vehicle.simulate``, which the fits
+know nothing of. The profile that goes with a record is what the driver believes the road to be: the obstacle alone, of
+the size that was taken for its own, while the road that was driven may be rough and its obstacle of another size
+(4.4.1: the roughness is left out of the input, as it would not be known).
 
-The car is stepped through time by ``logger.vehicle.simulate``, which the fits know nothing of. The profile that goes
-with a record is what the driver believes the road to be: the obstacle alone, of the size that was taken for its own,
-while the road that was driven may be rough and its obstacle of another size (4.4.1: the roughness is left out of the
-input, as it would not be known).
+In windows of distance, as 6.3.1 and 6.5 cut theirs, there is roughness in two ways, and comfort. Their way is the
+r.m.s. acceleration of a window times the factor of its speed (Fig 6.6). Ours is what ``ridelog estimate`` gives. The
+exact IRI is that of the road itself.
 
-A simulated drive in windows of distance, as 6.3.1 and 6.5 cut theirs: roughness in two ways, and comfort.
-
-Their way is the r.m.s. acceleration of a window times the factor of its speed (Fig 6.6). Ours is what ``ridelog
-estimate`` gives. The exact IRI is that of the road itself.
-
-The dissertation's way of fitting, and ours, so that a study can compare them.
-
-Theirs is output error: what the model leaves is taken for white noise. Ours is the innovations form: of white noise,
-autoregressive noise and a road that the profile does not contain, the likeliest.
+The dissertation's way of fitting is output error: what the model leaves is taken for white noise. Ours is the
+innovations form: of white noise, autoregressive noise and a road that the profile does not contain, the likeliest.
 """
 
 from __future__ import annotations

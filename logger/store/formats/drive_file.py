@@ -1,11 +1,7 @@
-"""Runs as folders: the drive, the profile it was driven on, and what is known of the recorder.
+"""Runs as folders: ``drive.csv``, the profile it was driven on, and what is known of the recorder, ``run.yaml``.
 
-``run.yaml``: what the record of a run is, beside the run.
-
-Problem: a model is compared with readings that a sensor rounded, at places that a receiver gave; to do so one has to
-know how coarse the one is and how far off the other. Solution: a small file says it; what it does not say is not known.
-
-Drives as files: ``drive.csv``, and the folder (a run) that keeps it with the profile it was driven on.
+A model is compared with readings that a sensor rounded, at places that a receiver gave; to do so one has to know how
+coarse the one is and how far off the other: ``run.yaml`` says it, and what it does not say is not known.
 
 Problem: a drive and its road belong together, and a model is compared with the one on the other; a column that is
 missing, or a clock that skips, would end as a wrong vehicle. Solution: a run is read as one thing, checked line by line

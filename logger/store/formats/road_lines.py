@@ -1,8 +1,5 @@
-"""GeoJSON files of roads and routes.
-
-Roads as lines out of a GeoJSON file, as an extract of OpenStreetMap gives them (RFC 7946).
-
-A route out of a GeoJSON file: a line with measures, as road agencies keep it, or with kilometre posts beside it.
+"""GeoJSON files (RFC 7946): roads as lines, as an extract of OpenStreetMap gives them, and a route: a line with
+measures, as road agencies keep it, or with kilometre posts beside it.
 """
 
 from __future__ import annotations

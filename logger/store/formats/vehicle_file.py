@@ -1,20 +1,15 @@
-"""Vehicle files, and the calibrations kept beside them.
-
-Vehicle files (YAML) to vehicles and back, with complaints that name the line.
+"""Vehicle files (YAML) to vehicles and back, with complaints that name the line, and calibrations kept beside them.
 
 What knows the plain car only must not take a car with effects for one without: ``read_vehicle`` refuses it. Commands
 read a ``Model``: the car, its effects, how certain its numbers are, and how it came to them. A user's own effect is
 Python that reading it runs, which the service on board never does: ``read_on_board`` refuses it unread.
 
-Calibrations kept beside the vehicle they belong to, and found again.
-
-Problem: a calibration takes a moment and never changes while vehicle, recorder and settings stay as they are; but a
-number that belongs to another car, or to a file that lost half its bytes, must never be used.
-
-Solution: ``NAME.calibration.json`` beside ``NAME.yaml`` holds calibrations by a fingerprint of every number they come
-from, and a checksum over all of them. A file that is damaged, of another format or without the fingerprint is as good
-as none. Where the vehicle's folder cannot be written to, and for the vehicles that come with the program, the file lies
-in the user's cache. It is replaced in one step, so that a reader sees the old one or the new one.
+A calibration takes a moment and never changes while vehicle, recorder and settings stay as they are; but a number that
+belongs to another car, or to a file that lost half its bytes, must never be used. ``NAME.calibration.json`` beside
+``NAME.yaml`` holds calibrations by a fingerprint of every number they come from, and a checksum over all of them. A
+file that is damaged, of another format or without the fingerprint is as good as none. Where the vehicle's folder cannot
+be written to, and for the vehicles that come with the program, the file lies in the user's cache. It is replaced in one
+step, so that a reader sees the old one or the new one.
 """
 
 from __future__ import annotations

@@ -1,18 +1,15 @@
 """Files of the logs' folder as a whole: replaced in one step, set aside, and held by one writer.
 
-What a disk will not read or remove is put aside under another name, so that it stops nothing and is not lost.
-
-Problem. One file that cannot be read, or a folder under the name of a file, must not keep a service from its work at
-every start. Solution. It is renamed: ``<name>.aside``, which no reader takes for a log, and somebody is warned. The
-session number in the name counts as before.
+One file that cannot be read, or a folder under the name of a file, must not keep a service from its work at every
+start: it is renamed ``<name>.aside``, which no reader takes for a log, and somebody is warned. The session number in
+the name counts as before.
 
 One writer to a folder of logs. A second service, or a replay into the same folder, would finish the open files of
 the first; so a process that writes holds a lock on the folder for as long as the process lives. The kernel lets go of
 it when the process ends, however it ends.
 
-Files that are there whole or not at all, whenever the power goes.
-
-A new content is written to a temporary file, waited for, and renamed into place.
+A new content is written to a temporary file, waited for, and renamed into place: it is there whole or not at all,
+whenever the power goes.
 """
 
 from __future__ import annotations

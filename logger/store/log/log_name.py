@@ -1,14 +1,12 @@
 """The names of a logger's files, how they are found, and the number of a session.
 
-Finding files in a folder of logs, in which a service may be writing, or on a stick with such folders.
-
-The names of a logger's files, and what they say.
+Files are found in a folder of logs, in which a service may be writing, or on a stick with such folders.
 
 ``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
 ``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way
 of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
 
-The number of a session: never given twice, whatever is lost.
+The number of a session is never given twice, whatever is lost.
 """
 
 from __future__ import annotations

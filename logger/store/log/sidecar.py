@@ -1,13 +1,10 @@
-"""Beside the rows of a log file: which of them are intact, and what a reader needs to know.
-
-The intact rows of a log file, or of two files that hold the same part, and where rows are lost between them.
+"""The intact rows of a log file and where rows are lost between them; and its sidecar, the JSON that a reader needs
+beside them (settings, versions, scales, clock).
 
 Problem. A cut can leave a part beside the finished file that was made of it, and a card can damage either. What is
 intact in one of them is not lost. Solution. Both are read at once and merged by segment. Where damaged lines stand
 before a row that does not follow the one before it, and they are long enough, rows are lost there: a ``Hole``, by which
 a reader can distinguish what was damaged from what was never written.
-
-The sidecar of a log file: what a reader needs beside the rows (settings, versions, scales, clock), as JSON.
 
 Problem. A scale or a clock with one wrong digit makes every row wrong, though each fits its own check value. Solution.
 The content carries a checksum of itself, and nothing is read of a sidecar that does not fit it. Those of older versions
