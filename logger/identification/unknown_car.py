@@ -52,6 +52,7 @@ _STEP = 1e-4  # of differences that derivatives are taken by
 _MOST_ROUNDS, _MOST_HALVINGS, _MOST_INNER, _SMALL_GAIN, _SMALL_MOVE = 60, 8, 12, 1e-3, 1e-4
 _NEIGHBOURS = 10  # blocks: 20 s
 _HOPS_APART = 0.15  # of the logarithm
+_ALIKE = 0.1  # of logarithms of evidence: a search stops where a round gains less than a hundredth of it
 _LONGEST_STEP = 0.3  # of a coordinate in a round
 _PRECISION = np.array([_LEVEL_APART**-2, WAVINESS_WITHIN**-2])
 _AT_ONCE = 4096
@@ -229,15 +230,22 @@ class UnknownCar:
         return Roads(np.log(np.maximum(ratio, 1e-12)), np.zeros(len(self.spectra)), np.zeros(self.stretches))
 
     def fit(self) -> LearnedCar:
-        """The most probable car and stretches, blocks integrated out: the best of searches that begin with equal
-        wheels, and with front or rear ones that hop faster."""
+        """The most probable car and stretches, blocks integrated out: the best of searches that begin with front or
+        rear wheels that hop faster, and with equal ones."""
         turned = np.zeros(len(self.knowledge.mean))
         turned[[NUMBERS.index(f"{end}.hop_hz") for end in ("front", "rear")]] = 0.5 * _HOPS_APART, -0.5 * _HOPS_APART
-        return self.fit_of([self.knowledge.mean + sign * turned for sign in (0, 1, -1)])
+        return self.fit_of([self.knowledge.mean + sign * turned for sign in (1, -1, 0)])
 
     def fit_of(self, starts: Sequence[Array]) -> LearnedCar:
-        """The same, the best of searches from these starts."""
-        return max(map(self.fit_from, starts), key=lambda one: one.log_evidence)
+        """The same, the best of searches from these starts; where the first two end alike, of those."""
+        first, *others = starts
+        best = self.fit_from(first)
+        for start in others:
+            found = self.fit_from(start)
+            if abs(found.log_evidence - best.log_evidence) < _ALIKE:
+                break
+            best = max(best, found, key=lambda one: one.log_evidence)
+        return best
 
     def fit_from(self, start: Array) -> LearnedCar:
         """The same from one start."""
@@ -439,19 +447,17 @@ class _Step:
         return self._x + move, Roads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
 
 
-def log_error(problem: UnknownCar, x: Array) -> float:
-    """Root mean square of the logarithm of the mean power of each band and third of the speeds over what a car lets
-    expect, each block at its most probable level and waviness: how far the shape of the spectra is off."""
+def misfit(problem: UnknownCar, x: Array) -> float:
+    """How far a car with coordinates (p,) is from the spectra, each block at its most probable level and waviness: the
+    deviation of the mean power of each band and third of the speeds from what is expected, in standard deviations of
+    chance (root mean square). A car that is right has 1."""
     roads, _ = problem.with_blocks(x, problem.start(x))
     road, noise = problem.expected_power(x, roads)
     speeds = problem.spectra.speed_mps
     group = np.searchsorted(np.quantile(speeds, (1 / 3, 2 / 3)), speeds)
-    ratio = problem.power / (road + noise)
-    seen = problem.weight > 0
-    means = [np.where(seen, ratio, 0.0)[group == each].sum(axis=0) / np.maximum(seen[group == each].sum(axis=0), 1)
-             for each in range(3)]
-    means = [one[one > 0] for one in means]
-    return float(np.sqrt(np.mean(np.log(np.concatenate(means)) ** 2)))
+    off, weight = (np.array([one[group == each].sum(axis=0) for each in range(3)]) for one in (
+        problem.weight * (problem.power / (road + noise) - 1), problem.weight))
+    return float(np.sqrt(np.mean(off[weight > 0] ** 2 / weight[weight > 0])))
 
 
 def iri_errors(knowledge: CarKnowledge, x: Array, covariance: Array, speeds_mps: Sequence[float], noise: float,

@@ -67,6 +67,7 @@ def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     assert "the drives show axles 2.6" in found.stderr and len(found.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_braking_that_is_read_as_up_and_down_is_refused(runs: list[Path], tmp_path: Path) -> None:
     turned = []
     for number, run in enumerate(runs[1:3]):
@@ -139,7 +140,24 @@ def test_last_year_s_file_says_what_changed(learned: tuple[dict[str, Any], Path,
                    learned[1], "--json")
     changes = json.loads(found.stdout)["changes"][0]
     assert "rear damping ratio -" in changes and "front" not in changes
-    assert np.isfinite(json.loads(found.stdout)["kept_back"]["log_evidence_gain"])
+    kept = json.loads(found.stdout)["kept_back"]
+    assert kept["drives"] == 4 and kept["misfit_after"] < 1.2 < kept["misfit_before"] and kept["log_evidence_gain"] > 50
+    assert "rear damping ratio of 0.1" not in found.stdout  # worn, yet no worse than a tenth of critical
+
+
+@pytest.mark.slow
+def test_a_limp_damper_is_named_and_a_trailer_too(tmp_path: Path) -> None:
+    """The trailer: an axle 4 m behind the rear one shakes the body by a third of what the rear one does."""
+    limp = UnmeasuredCar(rear=(1.42, 0.05, 11.1, 0.14))
+    found = called("learn-car", *written(tmp_path / "limp", mixed(limp, 7, 2 * SECONDS)), "--wheelbase", 2.66)
+    assert found.returncode == 0, found.stderr
+    assert "The rear damping ratio of 0.0" in found.stdout and "worn damper" in found.stdout
+    towing = []
+    for accel, speed in mixed(CAR, 9, 2 * SECONDS):
+        at = np.arange(len(accel))
+        towing.append((accel + 0.35 * np.interp(at - 400 / np.maximum(speed, 1.0), at, accel), speed))
+    found = called("learn-car", *written(tmp_path / "towing", towing), "--wheelbase", 2.66)
+    assert "was there a trailer" in found.stdout + found.stderr
 
 
 def _logged(folder: Path, number: int, run: Path, vehicle: str = "generic") -> None:
