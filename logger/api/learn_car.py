@@ -383,19 +383,15 @@ def _with_unit(number: str) -> str:
 
 def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where a number is as far from those of published cars as no car's; a worn damper is no reason."""
-    from logger.identification.unknown_car import COORDINATES
+    from logger.vehicle.published_cars import NUMBERS
 
-    knowledge = problem.knowledge
-    off = (car.x - knowledge.mean) / knowledge.std
-    off[_place("wheelbase_m")] = 0.0  # it has a check of its own
-    for end in ("front", "rear"):
-        off[_place(f"{end}.damping_ratio")] = max(off[_place(f"{end}.damping_ratio")], 0.0)
-    at = int(abs(off).argmax())
-    if abs(off[at]) > _NO_CAR:
-        raise CheckFailed(f"learn-car: no car answers roads like these drives: {_words_of(COORDINATES[at])} "
-                          f"would be {abs(off[at]):.1f} standard deviations from what is known before. Is "
-                          "vertical_axis the one that points up, is the sensor bolted to the body, were they driven "
-                          "without a trailer?")
+    off = {name: (value - mean) / std for name, value, mean, std in zip(
+        NUMBERS, car.x, problem.knowledge.mean, problem.knowledge.std, strict=False)}
+    most = max(off, key=lambda name: off[name] if name.endswith("damping_ratio") else abs(off[name]))
+    if abs(off[most]) > _NO_CAR:
+        raise CheckFailed(f"learn-car: no car answers roads like these drives: {_words_of(most)} would be "
+                          f"{abs(off[most]):.1f} standard deviations from that of published cars. Is vertical_axis the "
+                          "one that points up, is the sensor bolted to the body, were they driven without a trailer?")
 
 
 def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar,

@@ -2,11 +2,13 @@
 
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
 sent. It goes through recorded buses into the real drivers and the real service. --lab finds what a car has that its
-model lacks; --field does so from recorded bytes, and shows what it does to the IRI.
+model lacks; --field does so from recorded bytes, and shows what it does to the IRI. --car learns a car that nobody
+measured from four drives.
 
   ridelog demo
   ridelog demo --lab
   ridelog demo --field
+  ridelog demo --car
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +26,7 @@ from logger.api.lab.question import CompareQuestion
 from logger.commands.lab import say, take, walk
 from logger.commands.options import on_screen, progress, warned, wipe
 from logger.commands.replay import replay
-from logger.demo import BEYOND, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
+from logger.demo import BEYOND, CAR, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_file, write_text
 from logger.report.quantities import columns, wrapped
@@ -37,32 +40,36 @@ if TYPE_CHECKING:
 
 
 REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
-DRIVE_DIR, LAB_DIR, FIELD_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field"
+DRIVE_DIR, LAB_DIR, FIELD_DIR, CAR_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field", "ridelog-car"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog demo``."""
     parser.add_argument("--out", metavar="DIR", type=Path,
                         help=f"folder for what is written (default: {DRIVE_DIR}, with --lab {LAB_DIR}, with --field "
-                             f"{FIELD_DIR})")
+                             f"{FIELD_DIR}, with --car {CAR_DIR})")
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--lab", action="store_true",
                        help="show the lab instead: two drives of a car that has something its model lacks, found")
     shown.add_argument("--field", action="store_true",
                        help="show the loop from a car's recordings to a better IRI: four drives, two measured lines")
+    shown.add_argument("--car", action="store_true",
+                       help="learn a car that nobody measured: four ordinary drives, its springs and dampers")
     parser.add_argument("--unpack", action="store_true",
-                        help="with --lab or --field: only write the drives, to find it yourself")
+                        help="with --lab, --field or --car: only write the drives, to find it yourself")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog demo``."""
-    if args.unpack and not (args.lab or args.field):
-        raise BadInput("demo: expected --lab or --field with --unpack")
+    if args.unpack and not (args.lab or args.field or args.car):
+        raise BadInput("demo: expected --lab, --field or --car with --unpack")
     if args.lab:
         lab(args.out or Path(LAB_DIR), args.unpack, args.json)
     elif args.field:
         field(args.out or Path(FIELD_DIR), args.unpack, args.json)
+    elif args.car:
+        car(args.out or Path(CAR_DIR), args.unpack, args.json)
     else:
         _drive(args.out or Path(DRIVE_DIR), args.json)
     return EXIT_DONE
@@ -84,6 +91,53 @@ def _drive(out: Path, as_json: bool) -> None:
         print(outcome.text())
         print(f"Recording: {dump} (ridelog replay and ridelog extract read it)")
         print(f"Report: {report} (open it in a browser; it needs no network)")
+
+
+_UNMEASURED = (
+    "A box in an old car recorded four ordinary drives over four roads, at 30 to 100 km/h. Nobody measured the roads, "
+    "and of the car nothing but its wheelbase is known. All of it is simulated. What car is this?"
+)
+_ORDINARY = ((30.0, "C"), (50.0, "C"), (70.0, "B"), (100.0, "B"))
+"""Speed of each drive [km/h] and class of its road; each lasts ``_ORDINARY_S``."""
+_ORDINARY_S = 200.0
+
+
+def car(out: Path, unpack_only: bool, as_json: bool) -> None:
+    """Write drives of a car that nobody measured into ``out``, and learn it as ``ridelog learn-car`` does."""
+    import numpy as np
+
+    from logger.api.drives import simulate, write_run
+    from logger.api.roads import random_road
+    from logger.api.vehicles import read_vehicle
+    from logger.commands.main import command
+    from logger.vehicle.published_cars import NUMBERS, coordinates_of
+
+    given = read_vehicle(CAR.vehicle)
+    true = given.with_numbers({name: given.numbers[name] * factor for name, factor in CAR.off.items()})
+    folders = [out / f"{kmh:g}kmh" for kmh, _ in _ORDINARY]
+    for number, (folder, (kmh, iso_class)) in enumerate(zip(folders, _ORDINARY, strict=True), 1):
+        road = random_road(iso_class=iso_class, length_m=_ORDINARY_S * kmh / 3.6, seed=number)
+        drive = simulate(true, road, kmh / 3.6, noise_mps2=0.147, step_mps2=0.153, seed=number)
+        write_run(folder, replace(drive, profile=None))
+    assert true.vehicle.rear is not None
+    wheelbase_m = true.vehicle.front.cg_distance_m + true.vehicle.rear.cg_distance_m
+    learnt = out / "mycar.yaml"
+    words = [*map(str, folders), "--wheelbase", f"{wheelbase_m:.2f}", "--out", str(learnt), "--out",
+             str(learnt.with_suffix(".html"))]
+    typed = f"ridelog learn-car {' '.join(words)}"
+    if unpack_only:
+        print(json.dumps({"runs": list(map(str, folders)), "wheelbase_m": wheelbase_m}) if as_json else
+              f"Four drives in {out}\nNext: {typed}")
+        return
+    if not as_json:
+        print(f"{wrapped([_UNMEASURED])}\n\n    {typed}\n")
+    parser, run_it = command("learn-car")
+    run_it(parser.parse_args([*words, *(["--json"] if as_json else [])]))
+    if not as_json:
+        was, found = (np.exp(coordinates_of(one.vehicle)) for one in (true, read_vehicle(learnt)))
+        rows = [(name, f"{was[at]:.3f}", f"{found[at]:.3f}") for at, name in enumerate(NUMBERS)
+                if name.endswith(("_hz", "damping_ratio"))]
+        print("\n".join(["", "What the simulated car truly was:", "", *columns([("Number", "True", "Found"), *rows])]))
 
 
 _INTRODUCTION = (

@@ -35,6 +35,13 @@ FIELD = TrueCar("rav4-2009", "dry_friction", {"friction_force_n": 150.0}, {
     "rear.tire_stiffness_n_per_m": 1.015,
 })
 
+CAR = TrueCar("ford-escort", "", {}, {
+    "front.suspension_stiffness_n_per_m": 1.15, "front.suspension_damping_n_s_per_m": 0.9,
+    "front.tire_stiffness_n_per_m": 0.9, "rear.suspension_stiffness_n_per_m": 0.75,
+    "rear.suspension_damping_n_s_per_m": 0.65, "rear.tire_stiffness_n_per_m": 0.85,
+})
+"""A car that nobody measured: its numbers are those of an old Escort no longer. It lacks nothing."""
+
 DRIVES, FOURTH = ("first", "second", "third"), "fourth"
 LINE, BEYOND = "line.csv", "beyond.csv"
 """Of the field: what was measured, the street of the first three drives, and the one beyond of the fourth."""

@@ -160,6 +160,22 @@ def test_a_limp_damper_is_named_and_a_trailer_too(tmp_path: Path) -> None:
     assert "was there a trailer" in found.stdout + found.stderr
 
 
+def test_the_demo_writes_drives_and_says_what_to_type(tmp_path: Path) -> None:
+    found = called("demo", "--car", "--unpack", "--out", tmp_path / "car")
+    assert found.returncode == 0
+    assert re.search(r"Next: ridelog learn-car \S+30kmh .* --wheelbase 2.39 --out \S+mycar.yaml", found.stdout)
+    assert sorted(one.name for one in (tmp_path / "car").rglob("*.csv")) == 4 * ["drive.csv"]
+
+
+@pytest.mark.slow
+def test_the_demo_learns_its_car(tmp_path: Path) -> None:
+    found = called("demo", "--car", "--out", tmp_path)
+    assert found.returncode == 0, found.stderr
+    rows = re.findall(r"^(?:front|rear)\.\w+ +([\d.]+) +([\d.]+)$", found.stdout, re.MULTILINE)
+    assert len(rows) == 6 and all(abs(float(mine) / float(true) - 1) < 0.1 for true, mine in rows)
+    assert (tmp_path / "mycar.html").exists()
+
+
 def _logged(folder: Path, number: int, run: Path, vehicle: str = "generic") -> None:
     """A session's log whose sidecar keeps what the service keeps of a drive, as samples come."""
     drive = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
