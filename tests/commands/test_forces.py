@@ -471,3 +471,20 @@ def test_friction_of_a_part_is_named_through_the_noise_of_its_place(tmp_path: Pa
     friction = found["candidates"][0]
     off_n = friction["parameters"]["friction_force_n"] - 5.0
     assert abs(off_n) < 3 * friction["standard_errors"]["friction_force_n"]
+
+
+def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A rig that rings at 8 Hz, its spring 60 % too stiff in the file; then under a force that was another test's."""
+    true = Bench(0.8, 2000.0, 1.5)
+    (tmp_path / "bench.yaml").write_text(
+        "name: bench\nmodel: single_mass\nmass_kg: 0.8\nstiffness_n_per_m: 3200 +- 60%\ndamping_n_s_per_m: unknown\n")
+    push, other = noise(30.0, 8.0, 4), noise(30.0, 8.0, 5)
+    seen = {"displacement_m": true.moved(NOTHING, push, NOTHING)["displacement_m"]}
+    runs = [str(written(tmp_path / name, seen, {"force_n": force(TIME_S)}, BODY))
+            for name, force in (("right", push), ("wrong", other))]
+    vehicle = str(tmp_path / "bench.yaml")
+    assert main(["compare", "--vehicle", vehicle, runs[0], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["refitted"]["error"] < 0.01
+    with pytest.raises(BadInput, match="is it another run's excitation"):
+        main(["compare", "--vehicle", vehicle, runs[1]])

@@ -62,7 +62,7 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     car = compose(model.vehicle, model.effects)
     followed = _followed(runs, predictions, car)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
-    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed), _other_roads(runs, followed, car),
+    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed, numbers), _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, numbers)), warn, anyway)
     return predictions
 
@@ -171,12 +171,14 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
                    f"go with the model (correlation {around.turned:.2f})")
 
 
-def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
+def _other_units(runs: SimulatedRuns, followed: _Followed, numbers: float) -> Iterator[str]:
     """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be, or on a rig
     the friction of a guide that nearly holds it, is a unit only if it is one, and all runs agree, and below the bounce
     the median of the runs as well: there the body moves with the road whatever is missing, but one run holds few such
-    waves."""
-    if not followed.pairs:
+    waves. A rig of which less is known than usual (``numbers``) may resonate anywhere, with any factor."""
+    from logger.lab.likelihood.priors import Tolerance
+
+    if not followed.pairs or (numbers > Tolerance().numbers and followed.pairs[0][0].timed):
         return
     clear = [(run, around.gain, below.gain) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
@@ -199,9 +201,25 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
+        if run.timed and _is_coherent(run, car):
+            continue
         what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
                f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
+
+
+def _is_coherent(run: Run, car: Car) -> bool:
+    """Whether some linear rig follows what drives this one: its own may be off by more than the width of its mode."""
+    import numpy as np
+
+    from logger.lab.likelihood.whittle import LOWEST_HZ
+    from logger.lab.residuals.breakdown import ModelResiduals
+    from logger.lab.residuals.road_coherence import coherence_with_road
+    from logger.lab.selection.evidence import FALSE_ALARM
+
+    still = ModelResiduals([run], car, [np.zeros((1 + len(run.signals)) * run.count)], [])
+    _, chance = coherence_with_road(still).explained(LOWEST_HZ, still.top_hz)
+    return chance < FALSE_ALARM  # of a run too short to tell it is NaN
 
 
 def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],
