@@ -47,6 +47,7 @@ from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
 from logger.lab.selection.stepwise import Effort, MeasuredRoad, Search, Selection, is_outside_data
 from logger.runs import BY_ROAD
+from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
 
@@ -95,6 +96,7 @@ class Diagnosis:
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
                          farthest first, by their tolerance; of masses and forces, against their mean
+    left_open            numbers of which the vehicle's file says less than is usual: their value and its standard error
     shows_forces         whether a force was measured, so that these are known for themselves
     as_moved             the effect that changes the records as the move of all of these does; None: none does
     effects              of the model that it ends with, with standard errors
@@ -140,6 +142,7 @@ class Diagnosis:
     tolerance: float = Tolerance().share
     no_better: tuple[str, ...] = ()
     moved: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    left_open: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ends: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     contradicted: tuple[str, ...] = ()
     as_moved: Chosen | None = None
@@ -239,6 +242,10 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     if colour is not None:
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
         excess = max(excess_of.values())
+    vehicle = fine.prior.vehicle(fine.vehicle, state.logs)
+    left_open = {name: (value, value * float(error)) for name, error, deviation in zip(
+        fine.prior.names, errors.logs, fine.prior.deviations, strict=True)
+        if deviation > Tolerance().numbers for value in [named_parameters.read(vehicle, name)]}
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
@@ -252,9 +259,10 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
         moved={name: one for name, one in fine.prior.moved(
-            state.logs, errors.covariance, fine.shows_forces).items() if name not in beyond},
+            state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
+        left_open=left_open,
         ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
-        as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names]),
+        as_moved=None if left_open else effect_as_moved(after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,

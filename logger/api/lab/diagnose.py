@@ -64,7 +64,17 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.quantities import chance, columns, enumerated, finite, numbers_of, signal_errors, wrapped
+from logger.report.quantities import (
+    chance,
+    columns,
+    enumerated,
+    finite,
+    measured,
+    numbers_of,
+    signal_errors,
+    unit_of,
+    wrapped,
+)
 from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
@@ -370,16 +380,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     lines += [f"{name} reads {share:+.1%} against what all other signals say, which is more than a sensor is off by: "
               "check its scale and its unit. The effects were found with that taken out."
               for name, share in found.signals_off.items()]
-    if found.beyond:
-        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
-        lines.append(f"Parameters beyond their tolerance: {off}. Measure them: either the vehicle's file is wrong "
-                     "there, or an unknown effect is missing.")
-    if found.moved:
-        lines.append(_moved(found))
-    if found.as_moved is not None:
-        one = found.as_moved
-        lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would move all of them in this way. "
-                     f"To tell: {one.effect.shown_by}.")
+    lines += _car(found)
     errors, *rises = error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
@@ -415,6 +416,26 @@ def untested(found: LabDiagnosis) -> list[str]:
         lines.append(f"Detectability too low as well: {', '.join(rest)}.")
     if found.undetectable:
         lines.append("Detectability: standard deviations by which an effect of usual strength would stand out.")
+    return lines
+
+
+def _car(found: LabDiagnosis) -> list[str]:
+    """What the runs say of the car's own parameters: paragraphs."""
+    lines = []
+    if found.beyond:
+        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
+        lines.append(f"Parameters beyond their tolerance: {off}. Measure them: either the vehicle's file is wrong "
+                     "there, or an unknown effect is missing.")
+    if found.left_open:
+        fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
+                             for name, (value, error) in found.left_open.items()], "and")
+        lines.append(f"Parameters that the vehicle's file leaves open, as fitted: {fitted}.")
+    if found.moved:
+        lines.append(_moved(found))
+    if found.as_moved is not None:
+        one = found.as_moved
+        lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would move all of them in this way. "
+                     f"To tell: {one.effect.shown_by}.")
     return lines
 
 
@@ -505,6 +526,8 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         "residual_over_noise": 1 + found.excess, "beyond_tolerance": dict(found.beyond),
         "parameter_shifts": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},
+        "fitted_parameters": {name: {"value": value, "standard_error": error}
+                              for name, (value, error) in found.left_open.items()},
         "shift_explained_by": None if found.as_moved is None else {
             "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
