@@ -1,9 +1,8 @@
 """YAML as far as settings need it, from anybody.
 
 Problem: a YAML file may hold aliases that unfold without bound, tags that make a loader fail in ways of its own, and
-nesting that fills the stack. Solution: a file is gone through once as events, which costs no memory, and everything
-that no file of settings needs is refused with its line: aliases, tags, deep nesting, characters that no name or path
-can have. What is left can be composed safely.
+nesting that fills the stack. Solution: everything that no file of settings needs is refused with its line as soon as it
+is met, before anything is composed of it: aliases, tags, deep nesting, characters that no name or path can have.
 """
 
 from __future__ import annotations
@@ -28,11 +27,9 @@ class NotPlainError(Exception):
 
 def compose_plain(text: str) -> yaml.Node | None:
     """The nodes of the only document in a text; None when it holds nothing. Raises ``NotPlainError``."""
-    loader = yaml.SafeLoader
     try:
-        reader = loader(text)
-        _go_through(reader)
-        return yaml.compose(text, Loader=loader)
+        reader = _PlainReader(text)
+        return reader.get_single_node()  # type: ignore[no-any-return]  # PyYAML's composer has no types
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise NotPlainError(line, "expected text without control characters") from None
@@ -60,24 +57,26 @@ def lines_of(node: yaml.Node, path: str = "") -> Iterator[tuple[str, int]]:
         yield from lines_of(value, f"{path}{key.value}.")
 
 
-def _go_through(reader: yaml.SafeLoader) -> None:
-    depth = 0
-    while reader.check_event():
-        event = reader.get_event()
+class _PlainReader(yaml.SafeLoader):
+    """Gives events to what composes them; NotPlainError at the first one that is not plain."""
+
+    _depth = 0
+
+    def get_event(self) -> yaml.Event:
+        """The next event."""
+        event: yaml.Event = super().get_event()
         line = event.start_mark.line + 1 if event.start_mark else 1
         if isinstance(event, yaml.AliasEvent):
             raise NotPlainError(line, f"expected values written out, found the alias *{str(event.anchor)[:_SHOWN]}")
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if depth > MAX_DEPTH:
+        self._depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if self._depth > MAX_DEPTH:
             raise NotPlainError(line, f"expected at most {MAX_DEPTH} levels of nesting")
         tag = getattr(event, "tag", None)
         if tag is not None:
             raise NotPlainError(line, f"expected a plain value, found the tag {shortened(tag)}")
         if isinstance(event, yaml.ScalarEvent) and ("\0" in event.value or not _can_be_written(event.value)):
             raise NotPlainError(line, f"expected text that can be written, found {shortened(event.value)}")
+        return event
 
 
 def _can_be_written(text: str) -> bool:
