@@ -29,7 +29,7 @@ def compose_plain(text: str) -> yaml.Node | None:
     """The nodes of the only document in a text; None when it holds nothing. Raises ``NotPlainError``."""
     try:
         reader = _PlainReader(text)
-        return reader.get_single_node()  # type: ignore[no-any-return]  # PyYAML's composer has no types
+        return reader.get_single_node()
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise NotPlainError(line, "expected text without control characters") from None
