@@ -32,6 +32,8 @@ def pytest_configure(config: pytest.Config) -> None:
     few = "not slow" in config.option.markexpr
     hypothesis.settings.register_profile("any_machine", deadline=None, max_examples=30 if few else 100)
     hypothesis.settings.load_profile("any_machine")
+    # No power fails while tests run: to wait for the disk costs 7 ms a file. What starts in a process of its own waits.
+    os.fsync = lambda _descriptor: None
 
 
 @pytest.hookimpl(trylast=True)
