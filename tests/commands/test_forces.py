@@ -475,7 +475,8 @@ def test_friction_of_a_part_is_named_through_the_noise_of_its_place(tmp_path: Pa
 
 def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A rig that rings at 8 Hz (damping ratio 0.8 %), its spring 60 % too stiff in the file; then under a force that was another test's."""
+    """A rig that rings at 8 Hz (damping ratio 0.8 %), its spring 60 % too stiff in the file; then under a force that
+    was another test's."""
     true = Bench(0.8, 2000.0, 0.6)
     (tmp_path / "bench.yaml").write_text(
         "name: bench\nmodel: single_mass\nmass_kg: 0.8\nstiffness_n_per_m: 3200 +- 60%\ndamping_n_s_per_m: unknown\n")
