@@ -489,3 +489,16 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
     assert json.loads(capsys.readouterr().out)["refitted"]["error"] < 0.01
     with pytest.raises(BadInput, match="is it another run's excitation"):
         main(["compare", "--vehicle", vehicle, runs[1]])
+
+
+def test_of_a_record_that_the_model_does_not_explain_units_are_asked_for(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Readings in g under the name of m/s2, of a mass that was weighed."""
+    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
+    record = {"accel_z_mps2": bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"] / 9.80665}
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "2000 +- 30%"))
+    run = written(tmp_path / "run", record, {"force_n": push(TIME_S)}, BODY)
+    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "explains next to nothing of what was measured" in said
+    assert "check the run's columns, signs and units" in said

@@ -30,6 +30,7 @@ from logger.api.question import function, named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Chart, Curves, Line, line
+from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import Comparison as LabComparison
 from logger.lab.compare import Standing
 from logger.lab.residual_tests.tests import ResidualTestResult
@@ -241,6 +242,9 @@ def evidence(found: LabComparison) -> list[str]:
 
 def conclusion(found: LabComparison) -> str:
     """The answer: whether the model lacks something."""
+    if found.refitted.error > POOR_ERROR:
+        return ("The model explains next to nothing of what was measured, even with its parameters refitted. Do both "
+                "files of the run belong together? Are signs and units right? If they are, something large is missing.")
     if found.missing and not any(test.road for test in found.tests_found):
         return ("The model fits, but only with parameters far from those of the vehicle's file. Either the file is "
                 "wrong, or these parameters imitate a missing effect.")
@@ -257,6 +261,8 @@ def conclusion(found: LabComparison) -> str:
 
 def next_step(found: LabComparison) -> str:
     """What to do now."""
+    if found.refitted.error > POOR_ERROR:
+        return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
         return "Next: nothing. Rougher roads or other speeds would test the model harder."
     if any(test.road for test in found.tests_found):
