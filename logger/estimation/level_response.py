@@ -6,9 +6,9 @@ of it is true, for twice the road about a place twice as far from the edge toggl
 step ten times as much, for the probability of leaving it falls as that of a tail does. Newton's steps with the wrong
 curvature run in circles, and standard errors by it are wrong as much.
 
-Solution. Beside each block it is solved once more with the level raised by ``RISE``, from the bounds of the block as
-far as they moved in the blocks before. The difference of both slopes is the curvature; by the difference of both
-solutions bounds and road go along with a level that changes, so that they need not be found anew.
+Solution. Beside every other block it is solved once more with the level raised by ``RISE``, from the bounds of the
+block as far as they moved in the blocks before. The difference of both slopes is the curvature; by the difference of
+both solutions bounds and road go along with a level that changes, so that they need not be found anew.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ComplexArray = npt.NDArray[np.complex128]
 
 RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
-_TAKEN_OVER = 0.2  # of a new curvature: over the 20 s of a block
+_TAKEN_OVER = 0.2  # of a new curvature, every 4 s: over the 20 s of a block
 _LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
 _MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 

@@ -51,7 +51,9 @@ _SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
-_WAY = 0.75  # towards the most probable level, where bounds follow it late
+# Towards the most probable level, where bounds follow it late: until they do, the curvature is the expected one, and more
+# than twice the step that it allows runs in circles.
+_WAY, _MOST_OF_CURVATURE = 0.75, 1.5
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,7 @@ class Roughness:
             old.cells(begin, edge - begin), (now, now + slope / bend, bend), strict=True))
         self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
         pull = self._level.pull(mean)
-        way = 1.0 if self.curvature is None else _WAY
+        way = 1.0 if self.curvature is None else min(_WAY, _MOST_OF_CURVATURE * self.curvature)
         step = np.clip(way * (mean + prior @ pull - now), -_LARGEST_STEP, _LARGEST_STEP)
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))

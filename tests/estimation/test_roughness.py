@@ -356,3 +356,19 @@ def test_a_place_that_jumps_costs_no_memory() -> None:
     tracemalloc.stop()
     assert most < 150e6
     assert np.isfinite(found.at(0, count)).all()
+
+
+@pytest.mark.parametrize("curvature", [0.2, 5.0])
+def test_the_level_comes_to_rest_whatever_the_curvature_that_bounds_lead_to(curvature: float) -> None:
+    """As bounds are found that stay for a while: with the curvature that they come to, steps would be five times too
+    long and run in circles."""
+    block, _, seen = a_block()
+    found, gain = Roughness(SPACING_M), np.full(block.count // 2 + 1, 1.0)
+    found.curvature = curvature
+    noisy = 4 * np.random.default_rng(3).standard_normal(block.count)
+    for _ in range(40):
+        log_variance = found.solved_with(0, block.count)
+        variance = np.exp(log_variance)
+        found.learn(0, noisy * variance / (variance + 1), log_variance, gain, seen.astype(float))
+    assert found.moved < 0.01
+    assert found.at(0, block.count)[seen].mean() == pytest.approx(np.log(15), abs=0.4)
