@@ -51,8 +51,8 @@ _SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
-# Towards the most probable level, where bounds follow it late: until they do, the curvature is the expected one, and more
-# than twice the step that it allows runs in circles.
+# Towards the most probable level, where bounds follow it late: until they do, the curvature is the expected one, and
+# more than twice the step that it allows runs in circles.
 _WAY, _MOST_OF_CURVATURE = 0.75, 1.5
 
 
