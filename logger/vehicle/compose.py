@@ -30,7 +30,7 @@ from logger.vehicle.effect import (
 )
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import Passage
+from logger.vehicle.simulate import Passage, smooth
 from logger.vehicle.stepping import Motion, Stepper, force_input
 from logger.vehicle.structure import (
     Forces,
@@ -234,8 +234,9 @@ def _axles(vehicle: Vehicle) -> list[Axle]:
 def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
     """Outputs at the fine instants (p, M)."""
     structure = passage.driven(car.structure)
-    inputs, _ = passage.under_wheels(structure)
+    inputs, means = passage.under_wheels(structure)
     if structure.held:
+        inputs = smooth(inputs, means)
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
         force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
         force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)

@@ -86,7 +86,7 @@ def drive(
     beyond = distance[-1] + (distance[-1] - distance[-2]) * np.arange(1, _HALF_SAMPLES + 1)
     way = _fine(np.append(distance, beyond), steps)
     response, elevations, means = _respond(structure, outputs, track, 1 / (rate_hz * steps), way)
-    fine = response + _smooth(elevations, means) @ structure.output_matrices(outputs)[1].T
+    fine = response + smooth(elevations, means) @ structure.output_matrices(outputs)[1].T
     before = np.broadcast_to(fine[0], (_HALF_SAMPLES * steps, fine.shape[1]))
     return _thinned(np.concatenate([before, fine]), steps)[: len(time)]
 
@@ -145,15 +145,16 @@ def _respond(
     return response + level * (observe[:, :len(still)] @ still.sum(axis=1)), elevations, means
 
 
-def _smooth(elevations: Array, means: Array) -> Array:
-    """The elevations again (N, w), from the means of two steps before and two after: what is quicker than them is gone.
+def smooth(inputs: Array, means: Array) -> Array:
+    """Elevations, or other inputs, again (N, w), from the means of two steps before and two after: what is quicker than
+    these is gone.
 
-    Right to fourth order. Read at the instants alone, an edge that passes between two of them would come out of the
-    recorder's filter at a frequency that it does not have.
+    Right to fourth order. Read at the instants alone, an edge that passes between two of them, or the noise of a
+    faster recorder, would come out of the recorder's filter at a frequency that it does not have.
     """
-    smooth = elevations.copy()
-    smooth[2:-2] = (7 * (means[1:-2] + means[2:-1]) - means[:-3] - means[3:]) / 12
-    return smooth
+    found = inputs.copy()
+    found[2:-2] = (7 * (means[1:-2] + means[2:-1]) - means[:-3] - means[3:]) / 12
+    return found
 
 
 def _fine(distance: Array, steps: int) -> Array:

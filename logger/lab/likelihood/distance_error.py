@@ -36,6 +36,8 @@ _KNOT_S, _MOST_KNOTS = 1 / 3, 360
 is wrong by 0.1 m/s now more and now less leaves a tenth more than the noise. The most, a run of two minutes: a fit's
 time grows with the square of their number."""
 
+_HELD = 1e-6  # of its deviation, within which a number is held
+
 
 @dataclass(frozen=True)
 class ErrorSize:
@@ -96,6 +98,8 @@ class RecordError:
                    are not 0 at a sample
     knot_s         time between the knots of the spline
     delay_std_s    standard error of the delay of its places; None: they have none
+    scale_std      of the common scale of the car's masses and forces, as a share, where the runs show forces: where the
+                   first signal's gain is known better, both do the same, and it is held; 0: it is free
     """
 
     run: Run
@@ -103,6 +107,7 @@ class RecordError:
     tolerance: Tolerance
     knot_s: float
     delay_std_s: float | None = None
+    scale_std: float = 0.0
 
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
@@ -129,7 +134,7 @@ class RecordError:
         any force as large as those measured is as likely."""
         signals = (self.run.facts.main, *self.run.signals)
         gain, *gains = (self.tolerance.gain_of(one) for one in signals)
-        gain = min(gain, self.tolerance.gain)  # what is measured first sets the scale of all numbers
+        gain = gain if gain >= self.scale_std else _HELD * gain
         zero = [float(np.sqrt(np.mean(self.run.kept_readings_mps2**2))) or 1.0] if self.has_zero else []
         return np.array([gain, self.tolerance.droop, *gains, *zero])
 
@@ -137,6 +142,11 @@ class RecordError:
     def has_zero(self) -> bool:
         """Whether the zero of what was measured is the last of k."""
         return self.run.facts.main.measures == "force"
+
+    def gain_deviations(self) -> dict[str, float]:
+        """Standard deviations of the signals' gains, by name."""
+        first, _, *more = self._recorder_deviations
+        return dict(zip([self.run.facts.main.name, *(one.name for one in self.run.signals)], [first, *more]))
 
     def signal_gains(self, k: Array) -> Array:
         """By what share each further signal reads too much (s,)."""
@@ -288,11 +298,11 @@ class RigRecordError(RecordError):
         return np.zeros(self.count)
 
 
-def record_error(run: Run, tolerance: Tolerance) -> RecordError:
-    """The record error of a run, on a road or on a rig."""
+def record_error(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> RecordError:
+    """The record error of a run, on a road or on a rig; ``scale_std`` as of ``RecordError``."""
     from scipy.sparse import csr_array
 
-    return RigRecordError(run, csr_array((0, run.count)), tolerance, 1.0) if run.timed else (
+    return RigRecordError(run, csr_array((0, run.count)), tolerance, 1.0, None, scale_std) if run.timed else (
         RecordError.of(run, tolerance))
 
 
@@ -331,7 +341,7 @@ def signals_off(errors: Sequence[RecordError], record: Sequence[Array]) -> dict[
         for signal, gain in zip(signals, [k[one.places], *one.signal_gains(k)], strict=True):
             if signal.name != SENSOR:
                 found.setdefault(signal.name, []).append(float(gain))
-                known[signal.name] = one.tolerance.gain_of(signal)
+        known |= one.gain_deviations()
     shares = {name: float(np.mean(gains)) for name, gains in found.items()}
     return {name: share for name, share in shares.items() if abs(share) > CONFLICT_SIGMA * known[name]}
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +66,8 @@ class Posterior:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.start_vehicle = start_vehicle or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)
-        self.record_errors = [record_error(run, tolerance) for run in runs.runs]
+        scale_std = self.prior.scale_deviation if self.shows_forces else 0.0
+        self.record_errors = [record_error(run, tolerance, scale_std) for run in runs.runs]
         self.bands = [bands_of(run) for run in runs.runs]
         self.readings = list(map(Readings.of, runs.runs)) if readings is None else list(readings)
         counted = np.concatenate([run.kept_mps2[run.read[run.first:]] for run in runs.runs])
@@ -83,6 +85,14 @@ class Posterior:
         """The posterior with runs simulated as finely as what is reported."""
         return Posterior(SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)), self.vehicle, self.tolerance,
                          self.start_vehicle, self.prior, self.readings)
+
+    def with_free_gains(self) -> Posterior:
+        """The posterior with the gains free that fits hold; itself where none is held."""
+        if not any(one.scale_std for one in self.record_errors):
+            return self
+        found = copy(self)
+        found.record_errors = [replace(one, scale_std=0.0) for one in self.record_errors]
+        return found
 
     def with_rounding_at(self, state: State) -> Posterior:
         """The posterior with rounded readings taken for bounds, given the predictions of a state; itself where rounding

@@ -106,6 +106,12 @@ class VehiclePrior:
         return bool(self._not_measured.any())
 
     @property
+    def scale_deviation(self) -> float:
+        """Standard deviation of a common scale of all masses and forces, as a share: of the best known of them."""
+        return min((float(one) for name, one in zip(self.names, self.deviations, strict=True) if grows_with_mass(name)),
+                   default=0.0)
+
+    @property
     def _not_measured(self) -> npt.NDArray[np.bool_]:
         return np.asarray(UNUSUAL_SIGMA * self.deviations > WEAKEST, bool)
 

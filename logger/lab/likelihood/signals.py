@@ -49,7 +49,7 @@ class JointBands:
         return np.concatenate([one.power(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
     def levels(self, residual: Array) -> Array:
-        return np.maximum(self.power(residual), self.floor)
+        return np.concatenate([one.levels(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
     def deviance(self, residual: Array) -> float:
         return sum(one.deviance(part) for one, part in zip(self.each, self.parts(residual), strict=True))

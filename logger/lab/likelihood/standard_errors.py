@@ -91,6 +91,9 @@ def _number_errors(linear: LinearModel, covariance: Array) -> NumberErrors:
 def _covariance(linear: LinearModel) -> Array:
     """Covariance of the logarithms of the car's numbers, then of the effects' numbers on their scales; infinite where
     nothing is known."""
+    free = linear.posterior.with_free_gains()
+    if free is not linear.posterior:  # what a sensor may be off by, all that it scales is
+        linear = LinearModel(free, linear.state, linear.numbers, linear.whiteners)
     linear, slopes = without_common_scale(linear, linear.state.effects, own_slopes(linear))
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
