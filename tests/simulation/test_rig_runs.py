@@ -74,3 +74,21 @@ def test_a_quicker_vehicle_is_stepped_more_finely_and_a_car_as_ever() -> None:
     assert steps_hz(replace(BENCH, front=replace(BENCH.front, tire_stiffness_n_per_m=60.0 * KT))) == 8000.0
     car = Vehicle("car", "quarter_car", 400.0, None, Axle(0.0, 40.0, 2e4, 1500.0, 2e5), None, 0.2)
     assert steps_hz(car) == 1000.0
+
+
+def test_a_force_of_a_moved_mass_holds_no_vibration_that_is_faster_than_its_steps() -> None:
+    """The bench hums at 990 Hz, by micrometres: as a mass times an acceleration that is as much as it moves on purpose.
+    A recorder of 100 samples a second sees nothing of that, nor does it come back at 10 Hz where 500 steps a second
+    are simulated."""
+    rate_hz, count = 8000.0, 8 * 8000
+    time_s = np.arange(count) / rate_hz
+    slow, hum = 0.01 * np.sin(2 * np.pi * 3 * time_s), 9e-8 * np.sin(2 * np.pi * 990 * time_s + 0.7)
+    at = 2.0 + np.arange(300) / 100
+    facts = RecordFacts(main=Signal("force_n", "force", "front_suspension"))
+    run = Run("part", 100.0, np.zeros(300), np.zeros(300), np.zeros(300), Excitation(
+        rate_hz, slow + hum, -2.0, moves_part=True), facts=facts)
+    vehicle = Vehicle("part", "component", 50.0, None, Axle(0.0, 0.0, 0.0, 30.0, 0.0), None, 0.0)
+    (force_n,) = SimulatedRuns([run], 500.0).predict(compose(vehicle))
+    phase = 2 * np.pi * 3
+    expected = 0.01 * (30.0 * phase * np.cos(phase * at) - 50.0 * phase**2 * np.sin(phase * at))
+    assert np.abs(force_n - expected).max() < 0.01 * np.abs(expected).max()

@@ -118,6 +118,23 @@ def test_the_levels_are_the_most_likely_ones() -> None:
         assert minus_twice_log(factor * level) > bands.deviance(residual) + 1.0
 
 
+def test_a_fit_to_a_rig_is_one_by_least_squares() -> None:
+    """A right model leaves white noise. Of what a wrong one leaves besides, loud at the bottom as the motion is, each
+    band counts with its power: the likeliest size of a part of the motion is that of a regression."""
+    run = replace(run_of(6000), track=Excitation(100.0, np.zeros(6000)))
+    bands, motion = Bands(run), coloured(6000)
+    left = motion + coloured(6000, 7) + white(6000, 3)
+    assert len(set(bands.levels(left))) == 1
+    whitener = bands.whitener(left)
+    inside = bands.flat_whitener(np.ones(6000))
+    one, other = ((white(motion) @ white(left)) / (white(motion) @ white(motion)) for white in (whitener, inside))
+    assert one == pytest.approx(other, rel=1e-9)
+    shares = other + np.array([-0.2, 0.0, 0.2])
+    low, best, high = (bands.deviance(left - share * motion) for share in shares)
+    assert best < min(low, high)
+    assert abs(low - high) < 0.05 * (low + high - 2 * best)
+
+
 def test_no_level_is_below_the_discrepancy_which_is_a_share_of_the_signal_in_its_band() -> None:
     signal = 20 * coloured(6000)
     bands = Bands(run_of(6000, measured=signal))
