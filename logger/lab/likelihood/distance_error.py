@@ -146,7 +146,8 @@ class RecordError:
     def gain_deviations(self) -> dict[str, float]:
         """Standard deviations of the signals' gains, by name."""
         first, _, *more = self._recorder_deviations
-        return dict(zip([self.run.facts.main.name, *(one.name for one in self.run.signals)], [first, *more]))
+        names = [self.run.facts.main.name, *(one.name for one in self.run.signals)]
+        return dict(zip(names, [first, *more[: len(names) - 1]], strict=True))
 
     def signal_gains(self, k: Array) -> Array:
         """By what share each further signal reads too much (s,)."""

@@ -7,8 +7,8 @@ freedom of bandwidth B in the time T. No level is below the discrepancy between 
 a share of what was measured in the same band. A rig is moved in few bands, and what no model of it explains is most
 where it moves most: levels of its own for each would give up the bands that say most, and numbers would follow from
 what is left (measured: a friction axis came out with 7 % too much damping, a beam with twice the error). So a signal of
-a rig has one level, and a fit is one by least squares (L. Ljung, System Identification, 1999: output error). Bands end where the run's pass band does: what somebody
-filtered away, or what shall not be compared, holds no information.
+a rig has one level, and a fit is one by least squares (L. Ljung, System Identification, 1999: output error). Bands end
+where the run's pass band does: what somebody filtered away, or what shall not be compared, holds no information.
 """
 
 from __future__ import annotations

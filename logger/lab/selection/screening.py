@@ -19,8 +19,10 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align
-from logger.lab.likelihood.noise_floor import gain_of_full_explanation
+from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.whittle import UNEXPLAINED
+from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
@@ -110,6 +112,16 @@ class Baseline:
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
         return cross_validate(self.linear)
+
+    @property
+    def on_rig(self) -> bool:
+        """Whether all runs are driven by time."""
+        return all(run.timed for run in self.posterior.runs.runs)
+
+    @cached_property
+    def is_within_calibration(self) -> bool:
+        """Whether what is left of a rig's records is no more than noise and what calibrated sensors may be off by."""
+        return self.on_rig and excess_over_noise(self.posterior, self.state, FALSE_ALARM) <= UNEXPLAINED
 
 
 def without_distance_trend(base: Baseline) -> Baseline:

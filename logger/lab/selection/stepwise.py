@@ -158,6 +158,9 @@ class Likelihood(Protocol[M, P, F]):
     def explains_most(self, without: M, there: M | F) -> bool:
         """Whether more than half of the power of what was left is explained, on data that no fit saw."""
 
+    def is_within_calibration(self, without: M) -> bool:
+        """Whether what a model leaves is within what calibrated sensors may be off by."""
+
 
 class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
@@ -209,8 +212,10 @@ class MeasuredRoad:
         return chance_of([one], gain, base.posterior.freedom, candidates)
 
     def is_doubtful(self, base: Baseline, one: CandidateFit) -> bool:
-        """Whether a fit is at an end of its range, or beyond what the records show."""
-        return is_outside_data(base.posterior, one.chosen)
+        """Whether a fit is at an end of its range, or beyond what the records show, or of a rig predicts what no fit
+        saw worse. (On a road the distance errors, which are fitted to all of a run, do the same as many an effect.)"""
+        return is_outside_data(base.posterior, one.chosen) or (
+            base.on_rig and one.hold_out.is_worse_than(base.hold_out))
 
     def leaves_noise(self, there: Baseline | CandidateFit) -> bool:
         """Whether what is left is noise of a colour."""
@@ -220,6 +225,10 @@ class MeasuredRoad:
     def explains_most(self, without: Baseline, there: Baseline | CandidateFit) -> bool:
         """By the errors on held-out stretches."""
         return there.hold_out.error**2 < 0.5 * without.hold_out.error**2
+
+    def is_within_calibration(self, without: Baseline) -> bool:
+        """Of rigs."""
+        return without.is_within_calibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -412,11 +421,14 @@ class Search(Generic[M, P, F]):
     def _is_evident(self, without: M, one: Chosen, gain: float, there: M | F) -> bool:
         """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
         explain, or what is left with it (``there``) is noise, nothing is imitated; nor by what explains most of the
-        power, be it in so few lines of a spectrum that a likelihood, which counts lines, has hardly gained."""
+        power, be it in so few lines of a spectrum that a likelihood, which counts lines, has hardly gained. Of what a
+        sensor may be off by, whose form nobody knows, an effect may imitate a larger part."""
         if not self._chance_of(without, one, gain) < FALSE_ALARM:
             return False
-        return (gain > IMITATION * without.explanation or without.explanation == 0
-                or self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there))
+        if without.explanation == 0 or (gain > IMITATION * without.explanation
+                                        and not self.likelihood.is_within_calibration(without)):
+            return True
+        return self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there)
 
     def _chance_of(self, without: M, one: Chosen, gain: float) -> float:
         """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are

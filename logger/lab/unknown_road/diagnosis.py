@@ -265,6 +265,10 @@ class UnmeasuredRoad:
         """Never: most of the power is the road's."""
         return False
 
+    def is_within_calibration(self, without: RoadModel) -> bool:
+        """Never: it is asked of rigs."""
+        return False
+
     def _state(self, base: RoadModel, effects: tuple[Chosen, ...]) -> RoadFitState:
         """The state of a model with other effects."""
         return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))

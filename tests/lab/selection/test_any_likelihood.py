@@ -98,6 +98,9 @@ class MadeUp:
     def explains_most(self, without: Made, there: Made | Tried) -> bool:
         return False
 
+    def is_within_calibration(self, without: Made) -> bool:
+        return False
+
 
 def search(*doubtful: str, effects: int = 4) -> Search[Made, Tried, Tried]:
     return Search([EFFECTS[name] for name in WORTH], 0, Misalignment(1.0, 0.0), workers=1,

@@ -142,6 +142,8 @@ def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Ba
     monkeypatch.setattr(MeasuredRoad, "explains_most", lambda road, without, there: False)
     assert not sought.is_accepted(more_is_left, replace(one, gain=enough + 0.1))
     assert sought.is_accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
+    monkeypatch.setattr(MeasuredRoad, "is_within_calibration", lambda road, without: True)
+    assert not sought.is_accepted(more_is_left, replace(one, gain=2 * enough + 0.1))
 
 
 def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> None:
