@@ -311,7 +311,11 @@ class Search(Generic[M, P, F]):
                     now = under
                     steps.append((names_of(now)[-1], now.hold_out))
             if best is None:
-                break
+                other = self._reconsidered(now, tried)
+                if other is now:
+                    break
+                now = other
+                continue
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
             now = self._swap_for_related(now, self.likelihood.with_effect(best))
@@ -324,6 +328,16 @@ class Search(Generic[M, P, F]):
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps), last)
+
+    def _reconsidered(self, now: M, tried: Round[P, F]) -> M:
+        """The model with others in the place of its effects, where what is left is within sensors' calibration and an
+        effect explains a part of it: it may be the right one, and what it would be added to its imitation."""
+        if not self.likelihood.is_within_calibration(now) or not any(self.may_imitate(now, one) for one in tried.fits):
+            return now
+        other = now
+        for name in names_of(now)[self.present:]:
+            other = self._reconsider(other, name)
+        return other if other.score < now.score - INDISTINGUISHABLE else now
 
     def _underlaid(self, now: M, tried: Round[P, F]) -> M | None:
         """The model with an effect that is nearly always there and may hide others; None where there is no such effect,
