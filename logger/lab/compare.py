@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.by_squares import fit_rig_model
+from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_with_rounding
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
@@ -124,7 +124,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle)
     names = posterior.prior.names
-    linear = fit_rig_model(posterior, posterior.start(effects))
+    linear = fit_model(posterior, posterior.start(effects))
     state = linear.state
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))

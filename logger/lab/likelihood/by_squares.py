@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, fit_model, optimise_numbers
+from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.repeats import repeat_each_other
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -21,27 +21,6 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
 
 Array = npt.NDArray[np.float64]
-
-
-_ROUNDS = 10  # of least squares; they end earlier where no round gains
-
-
-def fit_rig_model(posterior: Posterior, start: State) -> LinearModel:
-    """``fit_model`` from a start and, where all runs are of rigs, from where squares are least as well; the likelier.
-    Where that has a larger error than the start, as a likelihood with a free level in each band gives up the loud ones,
-    it is the model with the least squares."""
-    found = fit_model(posterior, start)
-    if not all(run.timed for run in posterior.runs.runs):
-        return found
-    by_squares = BySquares(posterior)
-    if (begun := by_squares.at(start.effects, start.logs, start)) is None:
-        return found
-    _, least = by_squares.improved(begun[1], _ROUNDS)
-    squared = by_squares.of_all(least, start)
-    best = min(found, fit_model(posterior, squared), key=lambda one: one.score)
-    if posterior.error(best.state) <= posterior.error(start):
-        return best
-    return LinearModel(posterior, squared, posterior.number_slopes(squared, posterior.prior.steps))
 
 
 class BySquares:
