@@ -48,8 +48,9 @@ class Effort:
     fitted                     how many effects are fitted at most
     fit_share, refine_share    least gain for that, and for a fit with derivatives of its own, as a share of the largest
                                gain or of the required one (with a tenth for fitting, a sensor's bandwidth was missed)
-    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained: fits gain
-                               up to seven times what their screening did (measured on the examination's cases)
+    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained, or of
+                               what chance may gain: fits gain up to seven times what their screening did (measured on
+                               cases of the examination)
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
@@ -318,7 +319,7 @@ class Search(Generic[M, P, F]):
                 continue
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
-            now = self._swap_for_related(now, self.likelihood.with_effect(best))
+            now = self._reconsider(self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]
             last = Round((), ())
             steps.append((added, now.hold_out))
@@ -364,7 +365,9 @@ class Search(Generic[M, P, F]):
         """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
-            base, near, least = now, dict[str, float](), effort.fit_share * required_gain
+            base, near = now, dict[str, float]()
+            least = min(required_gain, max(effort.fit_share * required_gain,
+                                           effort.win_share * min_gain(len(self.effects))))
             if instead is not None:
                 near = dict(instead.one.values)
                 base = self.likelihood.stripped(instead.now, instead.one.effect.name) or now
@@ -386,7 +389,7 @@ class Search(Generic[M, P, F]):
             best = {one.effect.name: one.gain for one in rough if one.gain > enough}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
                     if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
-            if len(good) == 1 and self.is_accepted(now, good[0]):
+            if len(good) == 1 and instead is None and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
             refine = partial(self.likelihood.refined, now, least=effort.round_share * now.explanation)
@@ -475,46 +478,39 @@ class Search(Generic[M, P, F]):
             kept[name] = self.likelihood.without(now, name)
         return kept[name]
 
-    def _swap_for_related(self, without: M, now: M) -> M:
-        """The model, or one with an effect of the same parameters in the place of the one that was added last, if that
-        is preferred: a sharp resonance gains nothing at another frequency, and screening tries few frequencies."""
-        here, gain = now.effects[-1], without.score - now.score
-        related = [one for one in self.effects
-                   if one.name not in names_of(now) and shared_parameters(one, here.values)]
-        if not related:
-            return now
-        self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in related)}?")
-        with ThreadPoolExecutor(self.workers) as pool:
-            worth = self._promising_of(self._screen_all(pool, without, related, here.values),
-                                       self.effort.win_share * gain)
-            rough = _best_of_each(self._fit_all_roughly(pool, without.score, [(without, one) for one in worth], 0.0))
-            fine = _best_of_each(list(pool.map(lambda one: self.likelihood.refined(without, one, 0.0), rough)))
-        best = self._simplest(without, Round(tuple(fine), ()))
-        if best is None or not self._is_preferred(best, here, gain):
-            return now
-        self._rivals[best.effect.name] = (here.effect.name,) if abs(best.gain - gain) < INDISTINGUISHABLE else ()
-        return self.likelihood.with_effect(best)
-
     def _is_preferred(self, other: F, one: Chosen, gain: float) -> bool:
         """Whether an effect in the place of one that gains so much explains more, or as much and is simpler."""
         simpler = self._complexity(other.chosen) < self._complexity(one)
         return other.gain > gain + (-INDISTINGUISHABLE if simpler else INDISTINGUISHABLE)
 
-    def _reconsider(self, now: M, name: str) -> M:
+    def _reconsider(self, now: M, name: str, added_to: M | None = None) -> M:
         """The model, or one with another effect in the place of this one, if that is preferred: of all that any round
-        fitted, and all with the same parameters."""
-        self.progress(f"is {name} still what it was?")
-        without, here = self.without(now, name), next(one for one in now.effects if one.effect.name == name)
+        fitted, and all with the same parameters. A sharp resonance gains nothing at another frequency, and screening
+        tries few frequencies.
+
+        added_to    the model that it was just added to, on which the others were tried; None: it was added before
+        """
+        here = next(one for one in now.effects if one.effect.name == name)
+        may_be = [one for one in self.effects if one.name not in names_of(now) and (
+            shared_parameters(one, here.values) or (added_to is None and one.name in self._promising))]
+        if not may_be and added_to is not None:
+            return now
+        self.progress(f"is {name} still what it was?" if added_to is None else
+                      f"is it {name}, or {' or '.join(one.name for one in may_be)}?")
+        without = added_to or self.without(now, name)
         gain = without.score - now.score
-        may_be = [one for one in self.effects if one.name == name or (one.name not in names_of(now) and (
-            one.name in self._promising or shared_parameters(one, here.values)))]
-        tried = self.round(without, may_be, gain, Replaced(now, here))
+        tried = self.round(without, may_be if added_to is not None else [*may_be, here.effect], gain,
+                           Replaced(now, here))
         best = self._simplest(without, tried)
+        alike: tuple[str, ...] = ()
         if best is not None and self._is_preferred(best, here, gain):
+            alike = (name,) if abs(best.gain - gain) < INDISTINGUISHABLE else ()
             now, gain = self.likelihood.with_effect(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
-        self._rivals[name] = self._rivals_of(without, gain, name, tried)
+        elif added_to is not None:
+            return now
+        self._rivals[name] = (*alike, *self._rivals_of(without, gain, name, tried))
         return now
 
     def _rivals_of(self, without: M, gain: float, name: str, tried: Round[P, F]) -> tuple[str, ...]:
