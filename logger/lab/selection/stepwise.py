@@ -374,7 +374,6 @@ class Search(Generic[M, P, F]):
                 least = effort.win_share * (base.score - instead.now.score)
             unfitted = self._screen_all(pool, base, effects, near)
             worth = [(base, one) for one in self._promising_of(unfitted, least)]
-            self._promising |= {one.effect.name for _, one in worth}
             if instead is not None:
                 worth = [(base, one) for base, one in worth if not one.begins_at(instead.one)]
             aligning = [one for one in effects if one.realigns]
@@ -383,7 +382,9 @@ class Search(Generic[M, P, F]):
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], least)
             least = max(least, effort.win_share * self._reached(now, tries))
-            tries += self._fit_all_roughly(pool, now.score, [pair for pair in worth[1:] if pair[1].gain > least], least)
+            worth = [*worth[:1], *(pair for pair in worth[1:] if pair[1].gain > least)]
+            self._promising |= {one.effect.name for _, one in worth}
+            tries += self._fit_all_roughly(pool, now.score, worth[1:], least)
             rough = _best_of_each(tries)
             enough = effort.refine_share * max(rough[0].gain, required_gain) if rough else np.inf
             best = {one.effect.name: one.gain for one in rough if one.gain > enough}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import pytest
 
@@ -60,9 +60,11 @@ class Tried:
 
 @dataclass(frozen=True)
 class MadeUp:
-    """The likelihood; some effects are doubtful."""
+    """The likelihood; some effects are doubtful. ``fitted`` names those that were fitted, and how many there were before.
+    """
 
     doubtful: tuple[str, ...] = ()
+    fitted: list[tuple[str, int]] = field(default_factory=list)
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
@@ -78,6 +80,7 @@ class MadeUp:
         return replace(now, effects=tuple(one for one in now.effects if one.effect.name != name))
 
     def fitted_roughly(self, score: float, base: Made, one: Tried, least: float) -> list[Tried]:
+        self.fitted.append((one.effect.name, len(base.effects)))
         return [replace(one, gain=score - one.model.score)]
 
     def refined(self, base: Made, one: Tried, least: float) -> Tried:
@@ -124,6 +127,17 @@ def test_no_more_are_found_than_were_sought_until_it_goes_on() -> None:
 
 def test_what_is_doubtful_is_not_found() -> None:
     assert list(search("sensor_gain").run(Made()).gains) == ["tire_damping", "sensor_offset"]
+
+
+@pytest.mark.parametrize(("doubtful", "fitted"), [((), ["sensor_gain", "tire_damping"]),
+                                                  (("sensor_gain",), ["sensor_gain", "tire_damping", "sensor_offset"])])
+def test_what_promises_too_little_beside_a_fit_that_may_be_taken_is_not_fitted(doubtful: tuple[str, ...],
+                                                                               fitted: list[str]) -> None:
+    sought = search(*doubtful)
+    sought.effort = replace(sought.effort, win_share=0.3)
+    found = sought.run(Made())
+    assert [name for name, before in sought.likelihood.fitted if before == 0][: len(fitted) + 1] == fitted
+    assert len(found.gains) == 3 - len(doubtful)
 
 
 @pytest.mark.parametrize(("to_explain", "named"), [(590.0, True), (610.0, False)])
