@@ -60,7 +60,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class MadeUp:
-    """The likelihood; some effects are doubtful. ``fitted`` names those that were fitted, and how many there were before.
+    """The likelihood; some effects are doubtful. ``fitted``: names of what was fitted, and how many effects there were.
     """
 
     doubtful: tuple[str, ...] = ()
