@@ -382,9 +382,10 @@ class Search(Generic[M, P, F]):
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], least)
             least = max(least, effort.win_share * self._reached(now, tries))
-            worth = [*worth[:1], *(pair for pair in worth[1:] if pair[1].gain > least)]
-            self._promising |= {one.effect.name for _, one in worth}
-            tries += self._fit_all_roughly(pool, now.score, worth[1:], least)
+            may_win = [pair for pair in worth[1:] if pair[1].gain > least]
+            self._promising |= {one.effect.name for _, one in (*worth[:1], *may_win)}
+            # The first round is shown as a table: there what cannot win is fitted, too, from its best trial.
+            tries += self._fit_all_roughly(pool, now.score, may_win if required_gain else worth[1:], least)
             rough = _best_of_each(tries)
             enough = effort.refine_share * max(rough[0].gain, required_gain) if rough else np.inf
             best = {one.effect.name: one.gain for one in rough if one.gain > enough}
