@@ -365,15 +365,14 @@ class Search(Generic[M, P, F]):
         """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
-            base, near = now, dict[str, float]()
-            least = min(required_gain, max(effort.fit_share * required_gain,
-                                           effort.win_share * min_gain(len(self.effects))))
+            base, near, least = now, dict[str, float](), effort.fit_share * required_gain
             if instead is not None:
                 near = dict(instead.one.values)
                 base = self.likelihood.stripped(instead.now, instead.one.effect.name) or now
                 least = effort.win_share * (base.score - instead.now.score)
             unfitted = self._screen_all(pool, base, effects, near)
             worth = [(base, one) for one in self._promising_of(unfitted, least)]
+            self._promising |= {one.effect.name for _, one in worth}
             if instead is not None:
                 worth = [(base, one) for base, one in worth if not one.begins_at(instead.one)]
             aligning = [one for one in effects if one.realigns]
@@ -381,9 +380,10 @@ class Search(Generic[M, P, F]):
                 worth += [(there, one) for one in self._promising_of(self._screen_all(pool, there, aligning), least)]
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], least)
-            least = max(least, effort.win_share * self._reached(now, tries))
-            may_win = [pair for pair in worth[1:] if pair[1].gain > least]
-            self._promising |= {one.effect.name for _, one in (*worth[:1], *may_win)}
+            by_chance = min(required_gain, min_gain(len(self.effects)))
+            least = max(least, effort.win_share * max(self._reached(now, tries), by_chance))
+            # What only shifts a run gains nothing to first order where the distance errors have taken it.
+            may_win = [pair for pair in worth[1:] if pair[1].gain > least or not pair[1].effect.reshapes]
             # The first round is shown as a table: there what cannot win is fitted, too, from its best trial.
             tries += self._fit_all_roughly(pool, now.score, may_win if required_gain else worth[1:], least)
             rough = _best_of_each(tries)
