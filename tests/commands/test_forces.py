@@ -502,3 +502,20 @@ def test_of_a_record_that_the_model_does_not_explain_units_are_asked_for(
     said = " ".join(capsys.readouterr().out.split())
     assert "explains next to nothing of what was measured" in said
     assert "check the run's columns, signs and units" in said
+
+
+@pytest.mark.parametrize(("spoilt", "words"), [
+    (lambda force_n: -force_n, "found it the other way round"),
+    (lambda force_n: np.clip(force_n, -0.6, 0.4), "of them at the largest and the smallest one exactly"),
+    (lambda force_n: np.where(abs(TIME_S - 5.0) < 0.5, 0.3, force_n), "found 0.3 from 4.504 to"),
+], ids=["sign", "clipped", "stuck"])
+def test_a_force_that_was_not_measured_rightly_is_refused_in_one_line(
+        tmp_path: Path, spoilt: Callable[[Array], Array], words: str) -> None:
+    way = noise(8.0, 0.004, 6)
+    force_n = 90.0 * way(TIME_S) + 4.0 * way(TIME_S, 1) + np.random.default_rng(1).normal(0.0, 0.002, len(TIME_S))
+    run = written(tmp_path / "run", {"force_n": spoilt(force_n)}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    (tmp_path / "part.yaml").write_text(
+        "name: part\nmodel: component\ndamping_n_s_per_m: 5\npreload_n: 0\nstiffness_n_per_m: 100\n")
+    for verb, more in (("compare", []), ("identify", ["--free", "damping_n_s_per_m"])):
+        with pytest.raises(BadInput, match=f"run/drive.csv: force_n: expected .*{words}"):
+            main([verb, "--vehicle", str(tmp_path / "part.yaml"), str(run), *more])

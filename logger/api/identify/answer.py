@@ -17,7 +17,7 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_decay, check_roads, moves_freely, of_rates
+from logger.api.lab.checks import check_channels, check_decay, check_roads, moves_freely, of_rates
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
@@ -173,6 +173,7 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
     for drive, record in zip(drives, records, strict=True):
         check_forces(vehicle, record.track, str(drive.path / RUN))
         check_decay(drive, drive.path / DRIVE)
+        check_channels(drive, drive.path / DRIVE, vehicle)
     return [of_rates(record) for record in records] if moves_freely(vehicle) else records
 
 

@@ -275,6 +275,7 @@ _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a
 _RATE_HZ, _NEARLY = 100.0, 0.25
 LEAST_S = 5.0
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
+_CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
 _LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
@@ -309,6 +310,7 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
             check_distances(drive, file)
         if vehicle is not None:
             check_forces(vehicle, drive.track, str(drive.path / RUN))
+            check_channels(drive, file, vehicle)
     runs = [run for one in drives for run in driven_stretches(one)]
     if vehicle is not None and moves_freely(vehicle):
         runs = [of_rates(run) for run in runs]
@@ -425,6 +427,46 @@ def check_decay(drive: Drive, file: Path) -> None:
             raise BadInput(f"{file}: expected an excitation that moves the car, or a record that dies down, as of what "
                            f"is let go: nothing drives it, and its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
+
+
+_ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
+
+
+def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
+    """Raise BadInput for a channel of a rig that was at its end or out for a time, which no column ``usable`` says, and
+    for a force of the wrong sign."""
+    import numpy as np
+
+    from logger.lab.record_faults import goes_against, longest_still, share_at_ends
+    from logger.profiles.excitation import Excitation
+
+    track, main = getattr(drive, "track", None), drive.facts.main
+    if not isinstance(track, Excitation):
+        return
+    read = [(main, drive.accel_z_mps2), *((one, drive.more[one.name]) for one in drive.facts.signals)]
+    for signal, samples in read if drive.usable is None else []:
+        if (share := share_at_ends(samples)) > _CLIPPED_SHARE:
+            raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
+                           "the smallest one exactly, as of an amplifier at its end: set its range wider, or add a "
+                           "column usable, 2 there and 1 elsewhere")
+        if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
+            from_s, to_s = (float(drive.time_s[min(one, len(samples) - 1)]) for one in still)
+            raise BadInput(f"{file}: {signal.name}: expected readings, found {samples[still[0]]:g} from {from_s:.4g} "
+                           f"to {to_s:.4g} s, as of a cable that is out: add a column usable, 0 there and 1 elsewhere")
+    times_s = track.start_s + np.arange(len(track.elevation_m)) / track.rate_hz
+
+    def then(samples: Array) -> Array:
+        return np.interp(drive.time_s - drive.time_s[0], times_s, samples)
+
+    part = track.moves_part and main.measures == "force"
+    alone = vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
+    if part and goes_against(drive.accel_z_mps2, then(track.elevation_m), 0, range(2), drive.rate_hz):
+        raise BadInput(f"{file}: {main.name}: expected what the part pulls back with, positive where it is longer, "
+                       "found it the other way round: turn the sign of the force or of displacement_m")
+    if alone and track.force_n is not None and goes_against(
+            then(track.force_n[:, 0]), drive.accel_z_mps2, _ORDERS[main.measures], range(3), drive.rate_hz):
+        raise BadInput(f"{file}: {main.name}: expected it to go with {track.forces[0].name}, found it against that "
+                       "force: turn the sign of one of them (both are positive up)")
 
 
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:

@@ -1,0 +1,76 @@
+"""What is wrong with a channel of a rig: an amplifier that was at its end, a cable that was out, a sign.
+
+Problem: such records fit no car, and whatever effect imitates the fault best is named. Solution: an amplifier at its
+end and a cable that is out give one number again and again, and come to it in a leap, where what turns round comes
+slowly, be it rounded or not. And masses, dampers and springs are positive: a force that has the wrong sign follows the
+motion as if all of them were negative, whatever else acts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.dsp.repeated_samples import stretches_of
+from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
+
+Array = npt.NDArray[np.float64]
+
+# So many equal samples are none by chance; the leap to them is so many of the steps that readings are written in: of a
+# curve that turns round within five samples and is rounded it is one.
+_EQUAL, _LEAP_STEPS = 5, 2.5
+_STILL_S = 0.1
+# Of a force's power, what mass, damper and spring explain, and of that, what negative ones do. Measured on 40 rigs with
+# effects of all kinds, also with masses that no spring holds: 0.1 to 1, and 0 to 0.45; of forces turned round 1.
+_FOLLOWS, _AGAINST = 0.3, 0.9
+_SLOWEST_HZ = 0.3  # the zeros of sensors wander below
+
+
+def share_at_ends(samples: Array) -> float:
+    """Of samples (n,) the share that stands at the largest or the smallest value, come to in a leap."""
+    ends = [(samples == end) for end in (samples.max(), samples.min())]
+    return sum(float(end.mean()) for end in ends if _is_leapt_to(samples, end))
+
+
+def longest_still(samples: Array, rate_hz: float) -> tuple[int, int] | None:
+    """Where samples (n,) stand still longest, come to in a leap; None where they do not for a tenth of a second."""
+    same = np.diff(samples) == 0
+    found = [(int(first), int(last) + 1) for first, last in zip(*stretches_of(same), strict=True)
+             if last + 1 - first >= max(_EQUAL, _STILL_S * rate_hz)]
+    usual = float(np.sqrt(np.mean(np.diff(samples) ** 2)))
+    moves = usual > _LEAP_STEPS * _step(samples)
+    return max(found, key=lambda one: one[1] - one[0]) if found and moves else None
+
+
+def goes_against(force_n: Array, motion: Array, measured: int, orders: range, rate_hz: float) -> bool:
+    """Whether a force (n,) is what a negative mass, damper and spring would need for a motion (n,).
+
+    measured    derivative of the place that the motion is
+    orders      derivatives of the place that the force may follow
+    """
+    f_hz = np.fft.rfftfreq(len(motion), 1 / rate_hz)
+    inside = (f_hz > _SLOWEST_HZ) & (f_hz < HIGHEST_OF_RATE * rate_hz)
+    taper = np.hanning(len(motion))
+    force, moved = (np.fft.rfft((one - one.mean()) * taper)[inside] for one in (force_n, motion))
+    columns = np.stack([moved * (2j * np.pi * f_hz[inside]) ** (order - measured) for order in orders], axis=1)
+    columns, force = (np.concatenate([one.real, one.imag]) for one in (columns, force))
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    by = np.linalg.lstsq(columns, force)[0]
+    parts = columns * by
+    follows = 1 - np.sum((force - parts.sum(axis=1)) ** 2) / max(np.sum(force**2), 1e-300)
+    return bool(follows > _FOLLOWS and np.sum(parts[:, by < 0] ** 2) > _AGAINST * np.sum(parts**2))
+
+
+def _is_leapt_to(samples: Array, at: npt.NDArray[np.bool_]) -> bool:
+    """Whether a quarter of the long stretches in which a mask (n,) holds, or more, are come to, or left, in a leap."""
+    leap = _LEAP_STEPS * _step(samples)
+    change = np.abs(np.diff(samples, prepend=samples[:1], append=samples[-1:]))
+    leaps = [max(change[first], change[last]) > leap for first, last in zip(*stretches_of(at), strict=True)
+             if last - first >= _EQUAL]
+    return bool(leaps) and 4 * sum(leaps) >= len(leaps)
+
+
+def _step(samples: Array) -> float:
+    """The least change of samples (n,) that is one."""
+    change = np.abs(np.diff(samples))
+    return float(change[change > 1e-9 * np.ptp(samples)].min(initial=np.inf)) if np.ptp(samples) else 0.0

@@ -1,0 +1,40 @@
+"""Channels of a rig that were at their end or out, and forces of the wrong sign."""
+
+import numpy as np
+import pytest
+from scipy.signal import StateSpace, lsim
+
+from logger.lab.record_faults import goes_against, longest_still, share_at_ends
+
+RATE_HZ = 200.0
+TIME_S = np.arange(4000) / RATE_HZ
+SWING = np.sin(9 * TIME_S) + 0.3 * np.sin(31 * TIME_S + 1)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.02, 0.2])
+def test_an_amplifier_at_its_end_is_found_and_steps_are_none(step: float) -> None:
+    noisy = SWING + np.random.default_rng(1).normal(0, 1e-4, len(SWING))
+    read = step * np.round(noisy / step) if step else noisy
+    assert share_at_ends(read) == 0
+    if step < 0.1:
+        at_ends = np.mean((read <= -0.8) | (read >= 0.4))
+        assert share_at_ends(np.clip(read, -0.8, 0.4)) == pytest.approx(at_ends, abs=0.02)
+
+
+def test_a_cable_that_is_out_is_found_and_what_rests_is_not() -> None:
+    noisy = SWING + np.random.default_rng(1).normal(0, 1e-3, len(SWING))
+    assert longest_still(noisy, RATE_HZ) is None
+    out = noisy.copy()
+    out[1000:1100] = out[1000]
+    assert longest_still(out, RATE_HZ) == (1000, 1100)
+    assert longest_still(0.2 * np.round(np.exp(-TIME_S) * SWING / 0.2), RATE_HZ) is None
+
+
+@pytest.mark.parametrize("measured", [0, 1, 2])
+def test_a_force_of_the_wrong_sign_is_found_whatever_is_measured(measured: int) -> None:
+    push = np.random.default_rng(2).normal(0, 1.0, len(TIME_S)).cumsum() * 0.1
+    mass = StateSpace([[0.0, 1.0], [-400.0, -2.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    _, place, states = lsim(mass, push, TIME_S)
+    motion = [place, states[:, 1], push - 400 * place - 2 * states[:, 1]][measured]
+    assert not goes_against(push, motion, measured, range(3), RATE_HZ)
+    assert goes_against(-push, motion, measured, range(3), RATE_HZ)
