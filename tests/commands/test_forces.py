@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 
 import ridelog
 from logger.commands.main import main
-from logger.errors import BadInput
+from logger.errors import BadInput, CheckFailed
 
 from ..support.drives.course import Course, integrated
 from ..support.slow import slow
@@ -341,6 +341,25 @@ def test_a_clock_that_loses_several_samples_in_a_row_is_refused_with_its_line(tm
         ridelog.compare(tmp_path / "part.yaml", [run])
 
 
+def test_play_of_a_part_that_moves_by_some_gaps_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    way = noise(3.0, 0.003, 6)
+    x_m = way(TIME_S)
+    force_n = 4000.0 * np.sign(x_m) * np.maximum(np.abs(x_m) - 0.00083, 0.0) + 90.0 * way(TIME_S, 1)
+    force_n += np.random.default_rng(1).normal(0.0, 0.05, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": x_m}, "source: me\n")
+    text = "name: bush\nmodel: component\ndamping_n_s_per_m: 90\npreload_n: 0\nstiffness_n_per_m: "
+    (tmp_path / "part.yaml").write_text(f"{text}3500\n")
+    assert main(["add-effect", "play", "--vehicle", str(tmp_path / "part.yaml"), "--out", str(tmp_path / "with.yaml"),
+                 str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["half_gap_m"] == pytest.approx(0.00083, rel=0.01)
+    assert found["error_after"] < 0.01
+    (tmp_path / "part.yaml").write_text(f"{text}0\n")
+    with pytest.raises(BadInput, match="play: it needs a spring"):
+        main(["add-effect", "play", "--vehicle", str(tmp_path / "part.yaml"), "--out", str(tmp_path / "o.yaml"),
+              str(run)])
+
+
 def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = bench_of_a_part(tmp_path)
     text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")
@@ -519,3 +538,23 @@ def test_a_force_that_was_not_measured_rightly_is_refused_in_one_line(
     for verb, more in (("compare", []), ("identify", ["--free", "damping_n_s_per_m"])):
         with pytest.raises(BadInput, match=f"run/drive.csv: force_n: expected .*{words}"):
             main([verb, "--vehicle", str(tmp_path / "part.yaml"), str(run), *more])
+
+
+def test_what_a_file_calls_unknown_is_found_where_a_force_is_measured_and_said_to_be_held_elsewhere(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    way = noise(8.0, 0.004, 6)
+    force_n = 2e4 * way(TIME_S) + 800.0 * way(TIME_S, 1) + np.random.default_rng(1).normal(0.0, 0.5, len(TIME_S))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    (tmp_path / "part.yaml").write_text(
+        "name: part\nmodel: component\ndamping_n_s_per_m: 600\nstiffness_n_per_m: unknown\n")
+    assert main(["identify", "--vehicle", str(tmp_path / "part.yaml"), "--free", "damping_n_s_per_m", str(run),
+                 "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    assert found == pytest.approx({"damping_n_s_per_m": 800.0, "stiffness_n_per_m": 2e4}, rel=0.01)
+    shaken = written(tmp_path / "shaken", {"accel_z_mps2": way(TIME_S, 2)}, {"elevation_m": way(TIME_S)},
+                     "source: me\n")
+    (tmp_path / "mass.yaml").write_text(
+        "name: mass\nmodel: single_mass\nmass_kg: 1\nstiffness_n_per_m: 3000\ndamping_n_s_per_m: unknown\n")
+    with pytest.raises(CheckFailed):  # this record is of no mass
+        main(["identify", "--vehicle", str(tmp_path / "mass.yaml"), "--free", "stiffness_n_per_m", str(shaken)])
+    assert "held, although the file calls them unknown: damping_n_s_per_m" in capsys.readouterr().err

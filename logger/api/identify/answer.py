@@ -36,7 +36,8 @@ from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
-from logger.vehicle.named_parameters import Coordinates, Free
+from logger.vehicle.named_parameters import Coordinates, Free, read
+from logger.vehicle.uncertain import UNKNOWN
 
 if TYPE_CHECKING:
     from logger.identification.prediction_error_fit import FitOptions
@@ -188,6 +189,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     from logger.simulation.virtual_drive import SimulatedRuns
 
     word = word_of(question.vehicle, given)
+    question = _with_unknown_numbers(given, word, records, question)
     _check_effects(given, word, records, question)
     _check_rigs(records, question)
     if not question.obstacles:
@@ -214,6 +216,20 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
         "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
         tuple(doubts(fit, *checks)))
+
+
+def _with_unknown_numbers(given: vehicle_file.Model, word: str, records: Sequence[Record],
+                          question: IdentifyQuestion) -> IdentifyQuestion:
+    """The question with those numbers free as well that the vehicle's file calls unknown, where a force was measured;
+    without one they may not be found together, and it is said that they are held."""
+    named = {one.replace("both.", f"{axle}.") for one in question.free for axle in ("front", "rear")}
+    if not (unknown := [name for name, one in given.known.items() if one.words == UNKNOWN and name not in named]):
+        return question
+    if all(record.pushed or record.facts.main.measures == "force" for record in records):
+        return replace(question, free=(*question.free, *unknown))
+    held = ", ".join(f"{name} {read(given.vehicle, name):.4g}" for name in unknown)
+    question.warn(f"{word}: held, although the file calls them unknown: {held}; with --free they are found too")
+    return question
 
 
 def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
