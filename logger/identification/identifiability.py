@@ -124,7 +124,7 @@ def unexplained(error: float) -> list[Finding]:
     if error < _EXPLAINS_NOTHING:
         return []
     return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (error "
-                    f"{error:.2f}): this is not the road that was driven, or not where it was driven.")]
+                    f"{error:.2f}): was it another road, or place on it, another excitation or another vehicle?")]
 
 
 def upside_down(error: float, turned_error: float) -> list[Finding]:

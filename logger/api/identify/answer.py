@@ -210,7 +210,8 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     model, checks = found.model, tests(found.model, found.fit)
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
-    text = [_head(given, len(fit.free), records, low), *measured_lines(fit, *checks), *common_words(model, common),
+    lines = [_in_words_of(records, one) for one in measured_lines(fit, *checks)]
+    text = [_head(given, len(fit.free), records, low), *lines, *common_words(model, common),
             *record_words(found), *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
         "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
@@ -230,6 +231,18 @@ def _with_unknown_numbers(given: vehicle_file.Model, word: str, records: Sequenc
     held = ", ".join(f"{name} {read(given.vehicle, name):.4g}" for name in unknown)
     question.warn(f"{word}: held, although the file calls them unknown: {held}; with --free they are found too")
     return question
+
+
+_RIG_WORDS = {"follow the road": "follow the excitation", "of the car or of the road": "of the rig",
+              "something of the car": "something of the rig"}
+
+
+def _in_words_of(records: Sequence[Record], line: str) -> str:
+    """A line for a person, with the unit that was measured, and of rigs without roads."""
+    words = {"m/s2": records[0].facts.main.unit, **(_RIG_WORDS if records[0].timed else {})}
+    for one, other in words.items():
+        line = line.replace(one, other)
+    return line
 
 
 def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
