@@ -437,7 +437,7 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     for a force of the wrong sign."""
     import numpy as np
 
-    from logger.lab.record_faults import goes_against, longest_still, share_at_ends
+    from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
     from logger.profiles.excitation import Excitation
 
     track, main = getattr(drive, "track", None), drive.facts.main

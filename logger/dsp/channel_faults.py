@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.repeated_samples import stretches_of
-from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
 
 Array = npt.NDArray[np.float64]
 
@@ -23,7 +22,8 @@ _STILL_S = 0.1
 # Of a force's power, what mass, damper and spring explain, and of that, what negative ones do. Measured on 40 rigs with
 # effects of all kinds, also with masses that no spring holds: 0.1 to 1, and 0 to 0.45; of forces turned round 1.
 _FOLLOWS, _AGAINST = 0.3, 0.9
-_SLOWEST_HZ = 0.3  # the zeros of sensors wander below
+# Zeros of sensors wander below; recorders' filters begin above.
+_SLOWEST_HZ, _HIGHEST_OF_RATE = 0.3, 0.37
 
 
 def share_at_ends(samples: Array) -> float:
@@ -49,7 +49,7 @@ def goes_against(force_n: Array, motion: Array, measured: int, orders: range, ra
     orders      derivatives of the place that the force may follow
     """
     f_hz = np.fft.rfftfreq(len(motion), 1 / rate_hz)
-    inside = (f_hz > _SLOWEST_HZ) & (f_hz < HIGHEST_OF_RATE * rate_hz)
+    inside = (f_hz > _SLOWEST_HZ) & (f_hz < _HIGHEST_OF_RATE * rate_hz)
     taper = np.hanning(len(motion))
     force, moved = (np.fft.rfft((one - one.mean()) * taper)[inside] for one in (force_n, motion))
     columns = np.stack([moved * (2j * np.pi * f_hz[inside]) ** (order - measured) for order in orders], axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from logger.lab.record_faults import goes_against, longest_still, share_at_ends
+from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
 
 RATE_HZ = 200.0
 TIME_S = np.arange(4000) / RATE_HZ
