@@ -40,8 +40,9 @@ from logger.vehicle.vehicle import SensorPlace, Vehicle
 Array = npt.NDArray[np.float64]
 
 WAVINESS, WAVINESS_APART, WAVINESS_WITHIN = 2.0, 0.3, 0.2
-"""Of roads: mean, deviation from stretch to stretch, and from block to block within one. ISO 8608 has 2 for all;
-measured ones lie from 1.5 to 2.6, mostly (P. Mucka, Shock and Vibration 2017, 7279014, reviews them)."""
+"""Of roads: mean, deviation from stretch to stretch, and from block to block within one. ISO 8608 has 2 for all; the
+deviations are a judgement (O. Kropac and P. Mucka, International Journal of Vehicle Design 46, 2008, have the waviness
+of 25,800 American profiles)."""
 # Of the logarithm of Gd(0.2 cycle/m) [m3]: as good as flat, for hundreds of blocks would make of it a car's gain.
 _LEVEL, _LEVEL_APART = np.log(8e-7), 30.0
 _NOISE_APART = 1.0  # of the logarithm of what the readings hold besides: half to four times the power that is known

@@ -68,7 +68,9 @@ HALF_CARS = {
     "VW Vanagon (the same)":
         (658.3, 1102.15, 1.1508, 1.3211, (40.572, 33577, 2405.6, 212640), (40.572, 39125, 2769.7, 212640)),
 }
-# As they are quoted from the works that are named; all but the first were not compared with the originals.
+# The RAV4 was compared with its source, the three cars of Althoff and Wuersching with the parameter files of
+# CommonRoad. The rest is as other works quote it. Of the sedan's rear damper some have 1620 N s/m where this has 1690:
+# that moves the mean damping ratio of the prior by 0.2 %.
 QUARTER_CARS = {
     "Golden Car, a median of American cars of 1980 (Sayers, Transportation Research Record 1501, 1995)":
         PublishedAxle(1.0, 0.15, 63.3, 6.0, 653.0),
