@@ -447,16 +447,9 @@ def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra,
 
     from logger.identification.unknown_car import UnknownCar, misfit
 
-    found, gain = [], 0.0
-    for spectra, rest in unseen:
-        problem = UnknownCar(spectra, knowledge)
-        found.append([misfit(problem, x) for x in (knowledge.mean, rest.x)])
-        off = rest.x - knowledge.mean
-        gain += problem.with_blocks(rest.x, problem.start(rest.x))[1] - problem.with_blocks(
-            knowledge.mean, problem.start(knowledge.mean))[1] + 0.5 * float(off @ knowledge.precision @ off)
+    found = [[misfit(UnknownCar(spectra, knowledge), x) for x in (knowledge.mean, rest.x)] for spectra, rest in unseen]
     before, after = np.sqrt(np.mean(np.square(found), axis=0)).tolist() if found else (None, None)
-    return {"drives": len(found), "misfit_before": before, "misfit_after": after,
-            "log_evidence_gain": gain if found else None}
+    return {"drives": len(found), "misfit_before": before, "misfit_after": after}
 
 
 def _shown(name: str, coordinate: float) -> float:
