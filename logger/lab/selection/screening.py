@@ -121,7 +121,7 @@ class Baseline:
     @cached_property
     def is_within_calibration(self) -> bool:
         """Whether what is left of a rig's records is no more than noise and what calibrated sensors may be off by."""
-        return self.on_rig and excess_over_noise(self.posterior, self.state, FALSE_ALARM) <= UNEXPLAINED
+        return self.on_rig and excess_over_noise(self.posterior, self.state, FALSE_ALARM) < UNEXPLAINED
 
 
 def without_distance_trend(base: Baseline) -> Baseline:
