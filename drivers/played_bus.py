@@ -17,7 +17,7 @@ from drivers.errors import DumpError
 from drivers.readings import Event
 
 
-class Recording:
+class PlayedRecording:
     """Events in order of time against a clock that starts now, at the recording's time ``first_us`` (its first
     event when None). Holds one event at a time."""
 
@@ -66,7 +66,7 @@ class PlayedBus:
     the present. With nothing to give, a burst is not acknowledged: a sample is never invented. A sample of the wrong
     length is a DumpError when it is its turn."""
 
-    def __init__(self, chip: RecordedChip, recording: Recording | None, address: int = 0x0A) -> None:
+    def __init__(self, chip: RecordedChip, recording: PlayedRecording | None, address: int = 0x0A) -> None:
         self.chip = chip
         self.chip.sample = self._sample
         self._address, self._recording = address, recording

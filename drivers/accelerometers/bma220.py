@@ -477,11 +477,11 @@ def _bus_opener(bus: int | Path, machine: Machine) -> Callable[[], I2cBus]:
 
     def play() -> I2cBus:
         from drivers.dump import open_dump
-        from drivers.played_bus import PlayedBus, Recording
+        from drivers.played_bus import PlayedBus, PlayedRecording
 
         with open_dump(bus) as reader:
             events = [event for event in reader if event.source == "bma220"]
-        return PlayedBus(Bma220Chip(), Recording(events, machine.now_us, None))
+        return PlayedBus(Bma220Chip(), PlayedRecording(events, machine.now_us, None))
 
     return play
 

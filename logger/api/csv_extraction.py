@@ -61,7 +61,7 @@ from logger.store.formats.record_checks import still_doubts
 from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
-    from logger.estimation.receiver_delay import Belief
+    from logger.estimation.receiver_delay import CarriedDelay
     from logger.extraction.recorded_columns import EvenSamples
 
 
@@ -539,7 +539,7 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
                        "speed alone, to go without the places")
 
 
-def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> Belief:
+def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> CarriedDelay:
     """How late fixes are: by the settings, else what is usual and what braking shows."""
     from logger.estimation.drive_alignment import DriveAlignment
     from logger.estimation.receiver_delay import combined

@@ -53,7 +53,7 @@ from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
-    from logger.store.formats.profile_file import Profile
+    from logger.store.formats.profile_file import Wheelpaths
     from logger.store.formats.record_checks import ChannelRecord
     from logger.store.formats.record_file import AccelerationRecord
 
@@ -327,7 +327,8 @@ class SimulateQuestion(Question):
     """
 
     vehicle: VehicleName
-    profile: Annotated[Union["Profile", Path, str], "the road [m]; of two tracks a full car uses both, others the left"]
+    profile: Annotated[Union["Wheelpaths", Path, str], "the road [m]; of two tracks a full car uses both, others the "
+                                                         "left"]
     speed_mps: Annotated[float | tuple[Any, Any], "the same all the way, 0.1 to 100 m/s; or times (k,) [s], growing, "
                                                   "and speeds (k,) [m/s] with straight lines between them"]
     _: KW_ONLY
@@ -403,7 +404,7 @@ SIMULATE = Verb(SimulateCommand, "", (
         is_drawn=False)))
 
 
-ProfileFile = Annotated[Union["Profile", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
+ProfileFile = Annotated[Union["Wheelpaths", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
 
 
 @dataclass(frozen=True)

@@ -220,7 +220,7 @@ def simulated(question: SimulateQuestion) -> Run:
     obstacles = ([Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
                  if isinstance(given, Mapping) else
                  [Obstacle(*named_numbers(text, "obstacle"), f"obstacle {text}") for text in given])
-    road = question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile)
+    road = question.profile if isinstance(question.profile, profile_file.Wheelpaths) else read_profile(question.profile)
     try:
         track = with_obstacles(drive_file.track_of(road), obstacles)
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
@@ -352,7 +352,7 @@ def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float 
     return Sensor(float(known_mps2), step_mps2), False
 
 
-def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, learns_noise: bool, window_m: float,
+def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_noise: bool, window_m: float,
              warn: Notify = silent, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
@@ -375,7 +375,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, learns_noise: 
         raise BadInput(f"{model.vehicle.name}: {error}") from None
 
 
-def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Notify,
+def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.CarModel, warn: Notify,
                 anyway: bool) -> None:
     """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
     left out: whether it is the road can be decided without them, and some take long."""

@@ -26,11 +26,11 @@ from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, Reco
 from logger.service.config import Config
 from logger.store.formats import drive_file
 from logger.store.formats.drive_file import RUN, read_run_facts, write_run_facts
-from logger.store.formats.profile_file import Profile, read_places, read_profile
+from logger.store.formats.profile_file import Wheelpaths, read_places, read_profile
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 if TYPE_CHECKING:
-    from logger.estimation.receiver_delay import Belief
+    from logger.estimation.receiver_delay import CarriedDelay
     from logger.extraction.along_track import (
         MeasuredLine,
         Observations,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     )
     from logger.service.drive_readings import GridReadings
     from logger.service.wiring import Instrument
-    from logger.store.formats.vehicle_file import Model
+    from logger.store.formats.vehicle_file import CarModel
 
 
 def name_of(dump: Path) -> str:
@@ -215,7 +215,7 @@ class MeasuredProfile:
     """A profile that lies somewhere on the ground."""
 
     path: Path
-    profile: Profile
+    profile: Wheelpaths
     line: MeasuredLine
 
 
@@ -265,9 +265,9 @@ class Recorded:
     readings: GridReadings
     fixes: Fixes
     config: Config
-    model: Model
+    model: CarModel
     facts: RecordFacts
-    receiver: Belief
+    receiver: CarriedDelay
     torn_tail: bool = False
     notes: tuple[str, ...] = ()
     hint: str = ""
@@ -520,13 +520,13 @@ def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: Measured
                         by_road, receiver.delay_s, receiver.std_s, scale, gaps)
 
 
-def _place_std_m(found: Registered, drive: _Drive, receiver: Belief) -> float:
+def _place_std_m(found: Registered, drive: _Drive, receiver: CarriedDelay) -> float:
     """By the receiver alone, what it is late by is a length as well."""
     late_m = 0.0 if found.by_road else receiver.std_s * float(np.sqrt(np.mean(drive.speed_mps**2)))
     return float(np.hypot(found.place_std_m, late_m))
 
 
-def _around(profile: Profile, distance_m: Array) -> Any:
+def _around(profile: Wheelpaths, distance_m: Array) -> Any:
     """The part of a profile that a drive needs."""
     track = drive_file.track_of(profile)
     first, last = np.clip(np.round([

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from logger.estimation.drive_spectra import DriveSpectra
     from logger.identification.unknown_car import Array, CarKnowledge, LearnedCar, UnknownCar
     from logger.store.formats.drive_file import Drive
-    from logger.store.formats.vehicle_file import Model
+    from logger.store.formats.vehicle_file import CarModel
 
 _GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
 """Standard error of where the sensor sits before the middle between the axles; and where nothing is said, within the
@@ -67,7 +67,7 @@ class LearnedVehicle(CommandResult):
                        wheelbase
     """
 
-    model: Model
+    model: CarModel
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float]
     iri_std: Mapping[float, float]
@@ -630,7 +630,7 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
                f"{3.6 * speeds_mps[at]:.0f} km/h.")
 
 
-def _coordinate_errors(model: Model) -> Array:
+def _coordinate_errors(model: CarModel) -> Array:
     """Standard errors of a model's coordinates, out of those of its numbers; 0 where it says none."""
     import numpy as np
 

@@ -44,7 +44,7 @@ from logger.units import INCH_PER_MILE_M_PER_KM
 
 if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
-    from logger.store.formats.vehicle_file import Model
+    from logger.store.formats.vehicle_file import CarModel
 
 
 class Range(NamedTuple):
@@ -541,7 +541,7 @@ class Verbs:
     below: Mapping[str, tuple[Verb, str]]
 
 
-Vehicle = Union["Model", Path, str]
+Vehicle = Union["CarModel", Path, str]
 """A model, or the name or file of one."""
 Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
 """One run or several: records (``ridelog.Run``), or their folders."""
@@ -636,9 +636,9 @@ def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
 def files_of(vehicle: object) -> list[Path]:
     """The file of a vehicle and those of its own effects; of a model only these. BadInput as ``read_model``."""
     from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import Model, read_model
+    from logger.store.formats.vehicle_file import CarModel, read_model
 
-    if isinstance(vehicle, Model):
+    if isinstance(vehicle, CarModel):
         return []
     path = vehicle_path(str(vehicle))
     return [path, *(Path(one.file) for one in read_model(path).effects if one.file is not None)]

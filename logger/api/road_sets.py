@@ -33,7 +33,7 @@ from logger.roads.repeated_drives import Agreement, agreement, factor_to
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.logger_csv import named_columns
-from logger.store.formats.vehicle_file import Model, read_model
+from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.studies.study import Cell, Column, Result, Table, Workload
 
 NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and claim nothing of them."
@@ -182,7 +182,7 @@ def _write(path: Path, header: str, *columns: Array) -> None:
     write_table(path, header.split(","), rows[np.isfinite(rows).all(axis=1)], "%.12g")
 
 
-def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
+def windows_of(run: Run, model: CarModel, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
     """The windows of a drive, for each length; noise is learnt once. Raises BadInput."""
     sensor, learns = sensor_of(run)
     found = []

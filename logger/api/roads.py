@@ -36,7 +36,7 @@ from logger.units import INCH_PER_MILE_M_PER_KM, WINDOW_M
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Profile(profile_file.Profile, Shown):
+class Profile(profile_file.Wheelpaths, Shown):
     """The elevations of a road under one or two wheelpaths.
 
     start_m              distance of the first sample [m]
@@ -227,11 +227,11 @@ def road_class_of(question: ClassifyQuestion) -> RoadClass:
 classify = function("classify", ClassifyQuestion, road_class_of)
 
 
-def _named(profile: profile_file.Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
+def _named(profile: profile_file.Wheelpaths | Path | str, resample_m: float | None) -> tuple[str, Profile]:
     """A profile and what to call it, not judged."""
     if isinstance(profile, Profile):
         return "profile", profile
-    read = profile if isinstance(profile, profile_file.Profile) else profile_file.read_profile(profile, resample_m)
+    read = profile if isinstance(profile, profile_file.Wheelpaths) else profile_file.read_profile(profile, resample_m)
     return "profile" if read is profile else str(profile), Profile(**vars(read))
 
 

@@ -40,8 +40,7 @@ from logger.report.summary import counts, expected_square
 from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
 from logger.roads.road_matching import ALONG, RoadNetwork, measures, on_route, route_network
-from logger.roads.sections import FEDERAL_WORDS, Windows, even_edges, federal_condition
-from logger.roads.sections import Sections as RoadSections
+from logger.roads.sections import FEDERAL_WORDS, RoadSections, SectionWindows, even_edges, federal_condition
 from logger.roads.sections import sections as in_sections
 from logger.store.formats.road_lines import read_route
 from logger.store.log.log_reader import LoggedFile, find_logs_in, iso_utc, read_found, split_drives
@@ -217,10 +216,10 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
                         "along" if direction == ALONG else "against")
 
 
-def windows_of(records: Sequence[WindowRecord]) -> Windows:
+def windows_of(records: Sequence[WindowRecord]) -> SectionWindows:
     """Rows with a distance as arrays, from the first one's beginning on."""
     origin_m = records[0].distance_start_m or 0.0
-    return Windows(
+    return SectionWindows(
         column(records, lambda one: one.distance_start_m) - origin_m,
         column(records, lambda one: one.distance_end_m) - origin_m, column(records, lambda one: one.duration_s),
         column(records, lambda one: one.iri_m_per_km if counts(one) else None), iri_errors(records),

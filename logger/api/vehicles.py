@@ -37,7 +37,7 @@ from logger.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(vehicle_file.Model, Shown):
+class Model(vehicle_file.CarModel, Shown):
     """A vehicle with its effects, as in a vehicle's file.
 
     vehicle    the plain car: masses, springs, dampers and places
@@ -128,9 +128,9 @@ def write_vehicle(path: Path | str, model: Model) -> None:
     vehicle_file.write_model(path, model)
 
 
-def model_of(vehicle: vehicle_file.Model | Path | str) -> Model:
+def model_of(vehicle: vehicle_file.CarModel | Path | str) -> Model:
     """The model, or that of a name or a file."""
-    if isinstance(vehicle, vehicle_file.Model):
+    if isinstance(vehicle, vehicle_file.CarModel):
         return vehicle if isinstance(vehicle, Model) else Model(**vars(vehicle))
     return read_vehicle(vehicle)
 
@@ -296,7 +296,7 @@ def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
     return Slopes(*(np.array([getattr(line, one.name) for line in lines]) for one in fields(Slopes)))
 
 
-def calibrated(model: vehicle_file.Model, path: Path | None, question: CalibrateQuestion) -> Calibrated:
+def calibrated(model: vehicle_file.CarModel, path: Path | None, question: CalibrateQuestion) -> Calibrated:
     """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has, and for a
     vehicle that lacks what its model or an effect needs.
 

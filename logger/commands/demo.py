@@ -381,16 +381,16 @@ def _essential(lines: list[str]) -> Iterator[str]:
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
     from logger.api.extraction import RATE_HZ
     from logger.api.lab.loop import field_page
-    from logger.report.maps import MapWay
+    from logger.report.maps import MapLine
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
 
-    measured = [MapWay(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
+    measured = [MapLine(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
     driven = []
     for name in (*DRIVES, FOURTH):
         _, columns = read_columns(out / RUNS / name / DRIVE)
         lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
-        driven.append(MapWay(name, lat_deg, lon_deg))
+        driven.append(MapLine(name, lat_deg, lon_deg))
     write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, measured, driven, story,
                                 before,
                           after, [sentence.partition(" Its numbers")[0]]))

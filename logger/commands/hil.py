@@ -30,7 +30,7 @@ from drivers.dump import DumpReader, open_dump
 from drivers.hardware import open_serial
 from drivers.readings import GPS
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.estimation.receiver_delay import Belief
+from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
 from logger.service.config import Config, find_config, load_config
 from logger.service.hil.log_comparison import Difference, LogAgreement, compare, newest_sidecar, read_sessions
@@ -137,7 +137,7 @@ def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
     return expected
 
 
-def _known_at_start(folder: Path) -> tuple[Belief | None, KnownNoise | None]:
+def _known_at_start(folder: Path) -> tuple[CarriedDelay | None, KnownNoise | None]:
     """What the newest session in a folder knew of the receiver's delay and of the sensor's noise when it began, by its
     sidecar."""
     said = newest_sidecar(folder)

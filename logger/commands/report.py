@@ -17,7 +17,7 @@ from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.report.charts import ENDINGS
-from logger.report.maps import MapWay
+from logger.report.maps import MapLine
 from logger.report.page import notices, page
 from logger.report.placed import of_files
 from logger.report.summary import summarise, summary_json
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     _check_tiles(args.tiles)
     if args.out.suffix.lower() in ENDINGS:
         raise BadInput(f"--out {args.out}: expected the name of a web page, such as {args.out.stem}.html")
-    base = [] if args.base is None else [MapWay("", *line) for line in read_road_lines(args.base)]
+    base = [] if args.base is None else [MapLine("", *line) for line in read_road_lines(args.base)]
     files = write_report(find_logs_in(args.logs), args.out, base=base,
                          base_name="" if args.base is None else args.base.name, tiles_from=args.tiles)
     records = [record for file in files for record in file.records]
@@ -66,7 +66,7 @@ def _check_tiles(address: str) -> None:
         raise BadInput(f"--tiles: expected an address such as {STREETS}, found {address!r}")
 
 
-def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: Sequence[MapWay] = (),
+def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: Sequence[MapLine] = (),
                  base_name: str = "",
                  tiles_from: str = "") -> list[LoggedFile]:
     """Write the page of log files, whole or not at all; give what was read, each named from the folder beside it on.

@@ -14,7 +14,7 @@ from logger.estimation.receiver_delay import (
     BLOCK_S,
     DELAYS_S,
     DelayEstimate,
-    Information,
+    DelayInformation,
     Stretch,
     block_information,
     estimate,
@@ -46,8 +46,8 @@ class DriveAlignment:
         self._readings: list[tuple[Array, Array]] = []
         self._kept = 0
         self._fixes: list[tuple[float, float]] = []
-        self._known = Information.none()
-        self._part = Information.none()
+        self._known = DelayInformation.none()
+        self._part = DelayInformation.none()
         self._means: list[Array] = []
         self._before: Sitting | None = None
         self._first_s: float | None = None
@@ -124,11 +124,11 @@ class DriveAlignment:
         """Compare a part with what was before; after a sensor has moved, start over."""
         forward, std_rad = forward_of(self._part, self._known)
         now = sitting(np.array(self._means), forward, std_rad)
-        self._means, self._part = [], Information.none()
+        self._means, self._part = [], DelayInformation.none()
         words = has_moved(self._before, now) if self._before is not None else ""
         if words and self._first_s is not None:
             self.moved = f"{words} {(end_s - self._first_s) / 60:.0f} min after the drive began: fasten it"
-            self._known, self._before = Information.none(), None
+            self._known, self._before = DelayInformation.none(), None
             return
         self._before = now if self._before is None else self._joined(self._before, now)
 

@@ -92,7 +92,7 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Information:
+class DelayInformation:
     """What blocks tell: ``a`` (g, d, 3, 3), ``b`` (g, d, 3) and ``c`` (g,) by group and delay; ``gravity`` (3,) sum of
     the blocks' mean readings; their number; ``log_likelihood`` (s,) of each of ``STRENGTHS``; the first blocks."""
 
@@ -105,7 +105,7 @@ class Information:
     early: tuple[BlockInformation, ...] = ()
 
     @classmethod
-    def none(cls) -> Information:
+    def none(cls) -> DelayInformation:
         """Before the first block."""
         d = len(DELAYS_S)
         return cls(np.zeros((GROUPS, d, 3, 3)), np.zeros((GROUPS, d, 3)), np.zeros(GROUPS), np.zeros(3), 0,
@@ -129,7 +129,7 @@ class DelayEstimate:
 
 
 @dataclass(frozen=True)
-class Belief:
+class CarriedDelay:
     """A delay as a normal distribution [s], from this many drives; what one drive leaves to the next."""
 
     delay_s: float
@@ -150,14 +150,14 @@ class BlockInformation:
     rows: Rows
 
 
-def block_information(known: Information, stretch: Stretch) -> BlockInformation | None:
+def block_information(known: DelayInformation, stretch: Stretch) -> BlockInformation | None:
     """Information of a stretch, its fixes weighed by what is known. None: the car hardly moves, or the readings have a
     hole."""
     rows = _rows(stretch)
     return _weighed(known, rows, stretch.accel.mean(axis=0)) if len(rows[1]) >= FEWEST_FIXES else None
 
 
-def _weighed(known: Information, rows: Rows, mean: Array) -> BlockInformation:
+def _weighed(known: DelayInformation, rows: Rows, mean: Array) -> BlockInformation:
     x, z, t_s = rows
     strength = STRENGTHS[int(np.argmax(known.log_likelihood))] if known.blocks else _USUAL
     weight, residual = np.ones(len(z)), z
@@ -171,26 +171,26 @@ def _weighed(known: Information, rows: Rows, mean: Array) -> BlockInformation:
     return BlockInformation(*_sums(x, z, t_s, strength, weight), mean, likelihood, rows)
 
 
-def with_block(known: Information, block: BlockInformation) -> Information:
+def with_block(known: DelayInformation, block: BlockInformation) -> DelayInformation:
     """Add the information of a block."""
     known = replace(_added(known, block), early=(*known.early, block) if known.blocks < EARLY_BLOCKS else ())
     if known.blocks != EARLY_BLOCKS:
         return known
-    again = Information.none()
+    again = DelayInformation.none()
     for early in known.early:
         again = _added(again, _weighed(known, early.rows, early.mean))
     return again
 
 
-def _added(known: Information, block: BlockInformation) -> Information:
+def _added(known: DelayInformation, block: BlockInformation) -> DelayInformation:
     sums = known.a.copy(), known.b.copy(), known.c.copy()
     for total, part in zip(sums, (block.a, block.b, block.c), strict=True):
         total[known.blocks % GROUPS] += part
-    return Information(*sums, known.gravity + block.mean, known.blocks + 1,
-                       known.log_likelihood + block.log_likelihood)
+    return DelayInformation(*sums, known.gravity + block.mean, known.blocks + 1,
+                            known.log_likelihood + block.log_likelihood)
 
 
-def estimate(known: Information) -> DelayEstimate:
+def estimate(known: DelayInformation) -> DelayEstimate:
     """The delay that fits best, or why there is none."""
     if known.blocks < FEWEST_BLOCKS:
         return DelayEstimate(reason="too little has been driven")
@@ -217,7 +217,7 @@ def estimate(known: Information) -> DelayEstimate:
     return DelayEstimate(delay_s, std_s, forward, forward_std, 1 / size)
 
 
-def forward_of(part: Information, known: Information) -> tuple[Array | None, float | None]:
+def forward_of(part: DelayInformation, known: DelayInformation) -> tuple[Array | None, float | None]:
     """Forward (3,) by some blocks alone, with the delay of all, and its error about the vertical [rad]; or None."""
     index, _ = _best(known.a.sum(axis=0), known.b.sum(axis=0), known.gravity, known.blocks >= FEWEST_BLOCKS)
     a, b = part.a.sum(axis=0), part.b.sum(axis=0)
@@ -227,17 +227,17 @@ def forward_of(part: Information, known: Information) -> tuple[Array | None, flo
     return w[index] / float(np.linalg.norm(w[index])), _curved_forward_std(a[index], part.gravity, w[index])
 
 
-def combined(before: Belief, found: DelayEstimate, drift_s: float = 0.01) -> Belief:
+def combined(before: CarriedDelay, found: DelayEstimate, drift_s: float = 0.01) -> CarriedDelay:
     """What is known after a drive: both weighed by their errors. ``drift_s``: so much may the delay have changed since;
     what differs by more than four errors is another receiver, or other settings of it, and counts alone."""
     if found.delay_s is None or found.std_s is None:
         return before
     before_std_s = hypot(before.std_s, drift_s) if before.drives else before.std_s
     if before.drives and abs(found.delay_s - before.delay_s) > 4 * hypot(before_std_s, found.std_s):
-        return Belief(found.delay_s, found.std_s, 1)
+        return CarriedDelay(found.delay_s, found.std_s, 1)
     weight = before_std_s**2 / (before_std_s**2 + found.std_s**2)
     std_s = max(found.std_s * sqrt(weight), FLOOR_S)
-    return Belief(before.delay_s + weight * (found.delay_s - before.delay_s), std_s, before.drives + 1)
+    return CarriedDelay(before.delay_s + weight * (found.delay_s - before.delay_s), std_s, before.drives + 1)
 
 
 # --- one block ---

@@ -31,7 +31,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learnt
-from logger.estimation.roughness import Roughness, mean_resolved
+from logger.estimation.roughness import RoadLevels, mean_resolved
 from logger.estimation.sensor_noise import (
     NoiseBelief,
     NoiseLearner,
@@ -42,7 +42,7 @@ from logger.estimation.sensor_noise import (
     residual_evidence,
     with_noise,
 )
-from logger.estimation.time_grid import RATE_HZ, Samples, between
+from logger.estimation.time_grid import RATE_HZ, RoadSamples, between
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -128,7 +128,7 @@ class FollowedRoad:
         self._like_noise = 0.0
         self._other.restart()
         self._solved_last: tuple[Block, ComplexArray] | None = None
-        self._roughness = Roughness(self._spacing_m)
+        self._roughness = RoadLevels(self._spacing_m)
         self._response = LevelResponse()
         if self._is_coarse:
             self._roughness.curvature = self._response.curvature
@@ -188,7 +188,7 @@ class FollowedRoad:
         """A block of this drive has been solved."""
         return self._begun
 
-    def move_on(self, fresh: Samples) -> None:
+    def move_on(self, fresh: RoadSamples) -> None:
         """The next block is without its oldest samples, and has these behind."""
         self._unscored += len(fresh)
         self._other.move_on(fresh.reading_mps2.size)
@@ -202,7 +202,7 @@ class FollowedRoad:
             np.concatenate([self._gaussian.variance[count:], guess.variance]),
         )
 
-    def _expected_of(self, fresh: Samples) -> GaussianReadings:
+    def _expected_of(self, fresh: RoadSamples) -> GaussianReadings:
         """What readings say of accelerations of which no other tells yet: they go on as they were."""
         low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self._sensor.step_mps2)
         centre = np.full(len(low), self._centre_mps2)
@@ -236,7 +236,7 @@ class FollowedRoad:
             change_mps2 = between(change_mps2, len(self._gaussian.value_mps2) // len(change_mps2))
             self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
 
-    def solved(self, block: Block, samples: Samples, read: Bools, beyond_mps2: Array | float = 0.0,
+    def solved(self, block: Block, samples: RoadSamples, read: Bools, beyond_mps2: Array | float = 0.0,
                beyond_variance: float = 0.0, turns: int = 1, is_last: bool = True) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_mps2`` (t,)
         or one for all what was taken off the readings, ``beyond_variance`` how uncertain that is [(m/s2)2], ``turns``
@@ -274,7 +274,7 @@ class FollowedRoad:
         return raised
 
     def _round(
-        self, block: Block, samples: Samples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
+        self, block: Block, samples: RoadSamples, read: Bools, seen: Array, steps: int, before: RoadSpectrum | None,
         learns: bool, is_last: bool, beyond_mps2: Array | float, beyond_variance: float,
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``, of how
@@ -367,14 +367,14 @@ class FollowedRoad:
         self._other.find(residual, weight)
         return replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
 
-    def _as_gaussian(self, samples: Samples) -> GaussianReadings:
+    def _as_gaussian(self, samples: RoadSamples) -> GaussianReadings:
         if not self._is_coarse:
             noise = self._sensor.variance_mps2_2 * exp(self._log_noise)
             return GaussianReadings(samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, noise))
         return first_guess(samples.reading_mps2.ravel(), self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
-        self, readings: GaussianReadings, samples: Samples, read: Bools, solution: Solution, others: Array,
+        self, readings: GaussianReadings, samples: RoadSamples, read: Bools, solution: Solution, others: Array,
         usable: Bools | None
     ) -> GaussianReadings:
         """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration; the

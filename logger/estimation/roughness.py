@@ -99,7 +99,7 @@ class _Level:
         return self.log_level[near], self.shown[near] * known, self.information[near] * known
 
 
-class Roughness:
+class RoadLevels:
     """Log variance of innovations by number of the point on an endless grid of ``spacing_m``, over that of a common
     road, for a spectrum of any level.
 
@@ -127,7 +127,7 @@ class Roughness:
         """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
         return np.exp(self._log_variances)
 
-    def held_at(self, log_variance: Array) -> Roughness:
+    def held_at(self, log_variance: Array) -> RoadLevels:
         """The same road with this log variance (n,), point by point of one block, which stays."""
         held = copy(self)
         held._held = log_variance
@@ -303,7 +303,7 @@ def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> 
 def evidence_slope(innovations: Array, log_before: Array, gain: Array, seen: Array, sharper: Array,
                    free: float | None, counted: Array) -> tuple[float, float]:
     """Slope of the log evidence in a level that all points ``counted`` (n,) share, and its expected curvature; the
-    rest as ``Roughness.learn``."""
+    rest as ``RoadLevels.learn``."""
     resolved, freedom = _resolved(log_before + np.log(sharper), gain, seen, free)
     return (0.5 * float(counted @ (innovations**2 * np.exp(-log_before) - resolved)),
             0.5 * float(counted @ freedom))

@@ -33,7 +33,7 @@ from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
-from logger.estimation.time_grid import RATE_HZ, Samples, between
+from logger.estimation.time_grid import RATE_HZ, RoadSamples, between
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar, MovedCar
 
@@ -222,9 +222,9 @@ class RoadEstimator:
         self._road.next_drive()
 
     def _restart(self) -> None:
-        self._waiting = Samples.unread(0, 0.0, 0.0, self._reads)
+        self._waiting = RoadSamples.unread(0, 0.0, 0.0, self._reads)
         self._heard = 0
-        self._samples: Samples | None = None
+        self._samples: RoadSamples | None = None
         self._road.restart()
         self._next = 0
         self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
@@ -243,7 +243,7 @@ class RoadEstimator:
         """
         return self._pushed(self._readable(reading_mps2, usable, at_end, self._driven_share * distance_m))
 
-    def _pushed(self, more: Samples) -> list[WindowEstimate]:
+    def _pushed(self, more: RoadSamples) -> list[WindowEstimate]:
         waiting = self._waiting.then(more)
         estimates: list[WindowEstimate] = []
         taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
@@ -252,14 +252,14 @@ class RoadEstimator:
         self._waiting = waiting.part(taken, len(waiting))
         return estimates
 
-    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> Samples:
+    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> RoadSamples:
         """What is not usable may be any number, NaN too; it has no weight. Nor has what stands at an end of the range,
         unless readings are taken as bounds."""
         if not self._takes_bounds:
             usable = usable & (at_end == 0)
         shape = (len(distance_m), self._reads)
-        return Samples(np.where(usable, reading_mps2, 0.0).reshape(shape), usable.reshape(shape),
-                       at_end.reshape(shape), distance_m)
+        return RoadSamples(np.where(usable, reading_mps2, 0.0).reshape(shape), usable.reshape(shape),
+                           at_end.reshape(shape), distance_m)
 
     def finish(self) -> list[WindowEstimate]:
         """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
@@ -267,16 +267,17 @@ class RoadEstimator:
         estimates: list[WindowEstimate] = []
         if last is not None:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
-            after = Samples.unread(count, float(last.distance_m[-1]), 0.0, self._reads)
+            after = RoadSamples.unread(count, float(last.distance_m[-1]), 0.0, self._reads)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
         self._road.driven_off()
         self._restart()
         return estimates
 
-    def _hop(self, fresh: Samples) -> list[WindowEstimate]:
+    def _hop(self, fresh: RoadSamples) -> list[WindowEstimate]:
         if self._samples is None:
-            self._samples = Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m, self._reads)
+            self._samples = RoadSamples.unread(
+                BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m, self._reads)
             windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
@@ -289,7 +290,7 @@ class RoadEstimator:
         due = list(self._due(self._samples))
         return self._estimates(self._samples, due) if due else []
 
-    def _look_whether_parked(self, fresh: Samples) -> None:
+    def _look_whether_parked(self, fresh: RoadSamples) -> None:
         """From the second hop of a stand on: in the first the car may still swing."""
         assert self._samples is not None
         both = self._samples.part(BLOCK_SAMPLES - 2 * len(fresh), BLOCK_SAMPLES)
@@ -298,14 +299,14 @@ class RoadEstimator:
         elif both.read.all() and not both.at_end.any():
             self._road.parked(fresh.reading_mps2[fresh.usable])
 
-    def _due(self, samples: Samples) -> Iterator[int]:
+    def _due(self, samples: RoadSamples) -> Iterator[int]:
         """Numbers of the pieces that the car is far enough past."""
         passed_m = samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
         while (self._next + 1) * self._piece_m <= passed_m:
             yield self._next
             self._next += 1
 
-    def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
+    def _estimates(self, samples: RoadSamples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
         block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
         read = samples.read & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
@@ -353,7 +354,7 @@ class RoadEstimator:
         self._answers = self._answers_on(there, block.mean_speed_mps)
         return block.on(self._answers.grid)
 
-    def _solved_in_turns(self, block: Block, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
+    def _solved_in_turns(self, block: Block, samples: RoadSamples, read: Bools) -> tuple[Block, SolvedBlock]:
         """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
         turns = _TURNS if self._road.begun else _FIRST_TURNS
         for turn in range(turns):
@@ -375,7 +376,7 @@ class RoadEstimator:
         return block, solved
 
     def _ride_sums(
-        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: RidePlace
+        self, weighted: Array, samples: RoadSamples, moving: Bools, number: int, place: RidePlace
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
         assert self._answers.ride is not None
@@ -384,10 +385,10 @@ class RoadEstimator:
         inside[:round(ENTRY_S * RATE_HZ)] = False
         return self._answers.ride.sums(weighted, inside, ~samples.read, place) if inside.any() else None
 
-    def _speed_mps(self, samples: Samples, number: int) -> float | None:
+    def _speed_mps(self, samples: RoadSamples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
 
-    def _why_none(self, samples: Samples, number: int) -> str:
+    def _why_none(self, samples: RoadSamples, number: int) -> str:
         """The flag of a piece without an estimate: driven before the block began, or too slowly, or not read."""
         gone = (number + 1) * self._piece_m <= samples.distance_m[0]
         return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"

@@ -21,7 +21,7 @@ SLOWEST_MPS = 1.0
 
 
 @dataclass(frozen=True)
-class Samples:
+class RoadSamples:
     """Arrays as ``RoadEstimator.push`` takes them: the first three (n, k) for k readings per sample, the first of them
     at the sample and the others at even steps up to the next; ``distance_m`` (n,)."""
 
@@ -38,17 +38,17 @@ class Samples:
         """(n,) samples with a reading."""
         return np.asarray(self.usable.any(axis=1))
 
-    def part(self, low: int, high: int) -> Samples:
+    def part(self, low: int, high: int) -> RoadSamples:
         """Samples ``low`` ... ``high - 1``."""
-        return Samples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
+        return RoadSamples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
 
-    def then(self, later: Samples) -> Samples:
+    def then(self, later: RoadSamples) -> RoadSamples:
         """These and the ones after them."""
         both = ((getattr(self, name), getattr(later, name)) for name in self.__dataclass_fields__)
-        return Samples(*(np.concatenate(pair) for pair in both))
+        return RoadSamples(*(np.concatenate(pair) for pair in both))
 
     @classmethod
-    def unread(cls, count: int, until_m: float, step_m: float, reads: int) -> Samples:
+    def unread(cls, count: int, until_m: float, step_m: float, reads: int) -> RoadSamples:
         """None of the ``reads`` per sample came while the car came up to ``until_m``, ``step_m`` further with each
         sample."""
         distance_m = until_m - step_m * np.arange(count, 0, -1.0)

@@ -74,7 +74,7 @@ class Whitening:
         return self.deviance + self.parameters * float(np.log(count))
 
 
-class Noise(Protocol):
+class NoiseModel(Protocol):
     """A kind of noise."""
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
@@ -88,7 +88,7 @@ class White:
     """Every sample by itself."""
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
-        """As ``Noise``."""
+        """As ``NoiseModel``."""
         shape = PredictionWhitener(np.zeros((0, 0)), np.ones(1))
         if low_pass.cutoff_hz is not None:
             memory = min(int(_FILTER_MEMORY_S * low_pass.kept_hz), min(map(len, residuals)) - 1)
@@ -106,7 +106,7 @@ class Autoregressive:
     order: int | None = None
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
-        """As ``Noise``. The order is at most 60, and a twentieth of the samples."""
+        """As ``NoiseModel``. The order is at most 60, and a twentieth of the samples."""
         count = sum(map(len, residuals))
         most = min(_MOST_ORDER, count // _SAMPLES_PER_ORDER) if self.order is None else self.order
         reflections = burg(residuals, min(most, min(map(len, residuals)) - 1), floor)
@@ -133,7 +133,7 @@ class RoadNoise:
     spectra: Callable[[Array, Array], list[Array]]
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: DecimatingLowPass, floor: float) -> Whitening:
-        """As ``Noise``. The two levels are those of Whittle's likelihood of the residuals' tapered transforms."""
+        """As ``NoiseModel``. The two levels are those of Whittle's likelihood of the residuals' tapered transforms."""
         rate_hz = low_pass.kept_hz
         f_hz = _grid(rate_hz)
         roads = _behind(low_pass, lambda f: self.spectra(values, f))

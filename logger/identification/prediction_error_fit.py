@@ -37,7 +37,7 @@ from logger.identification.noise_models import (
     LEAST_SHARE,
     LEAST_SHARE_SIMULATED,
     Autoregressive,
-    Noise,
+    NoiseModel,
     White,
     Whitening,
 )
@@ -97,7 +97,7 @@ class FitOptions:
 
     rate_hz: float = 100.0
     low_pass_hz: float | None = None
-    noise: Sequence[Noise] = (White(), Autoregressive())
+    noise: Sequence[NoiseModel] = (White(), Autoregressive())
     starts: Sequence[Mapping[str, float]] = ()
     most_steps: int = 100
     refuse: bool = True

@@ -21,10 +21,10 @@ from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel, SimulatedModel, VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down
-from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
-from logger.identification.unknown_road.road_operator import Drive
+from logger.identification.unknown_road.road_operator import RoadDrive
 from logger.profiles.track import Pushing
 from logger.runs import READING, SENSOR, Run, normalised_rms
 from logger.vehicle.effect import Chosen
@@ -110,11 +110,11 @@ def off_rate(rates_hz: Sequence[float]) -> int | None:
     return next((run for run, rate_hz in enumerate(rates_hz) if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE), None)
 
 
-def drives_of(records: Sequence[Run]) -> list[Drive]:
+def drives_of(records: Sequence[Run]) -> list[RoadDrive]:
     """The records without their roads. ``UnusableRun`` for a way that is too short or too long."""
     drives = []
     for run, record in enumerate(records):
-        drives.append(Drive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
+        drives.append(RoadDrive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
         length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
         if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
             raise UnusableRun(run, f"expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of way, found {length_m:g} m")
@@ -158,7 +158,7 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries:
         if len(measured) <= reach:
             raise UnusableRun(run, f"expected more than {reach} samples for a low pass of {low_pass_hz:g} Hz, found "
                                    f"{len(measured)} after the first {model.records[run].skip_s:g} s")
-    kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
+    kinds: dict[str, NoiseModel] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     if any(record.timed for record in model.records):
         del kinds["road"]
     trials = model.trials()

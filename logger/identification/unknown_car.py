@@ -136,7 +136,7 @@ def band_gains(knowledge: CarKnowledge, x: Array, speed_mps: Array, spread: Arra
 
 
 @dataclass(eq=False)
-class Roads:
+class BlockRoads:
     """What the drives' roads are: logarithm of the level and the waviness's difference of each block (b,), and of each
     stretch (t,)."""
 
@@ -153,7 +153,7 @@ class LearnedCar:
     knowledge: CarKnowledge
     x: Array
     covariance: Array
-    roads: Roads
+    roads: BlockRoads
     log_evidence: float
     is_converged: bool
 
@@ -186,14 +186,14 @@ class UnknownCar:
         """As ``band_gains`` at the speeds of the drives (s, k)."""
         return band_gains(self.knowledge, x, self.speed_mps, self.spread)
 
-    def expected_power(self, x: Array, roads: Roads, gains: Array | None = None) -> tuple[Array, Array]:
+    def expected_power(self, x: Array, roads: BlockRoads, gains: Array | None = None) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
         gains = self.gains(x) if gains is None else gains
         waviness = roads.own + roads.stretch[self.spectra.stretch]
         road = gains[self.speed] * np.exp(roads.level[:, None] + waviness[:, None] * self.slope)
         return road, self.noise[:, None] * np.exp(x[-1])
 
-    def with_blocks(self, x: Array, roads: Roads) -> tuple[Roads, float]:
+    def with_blocks(self, x: Array, roads: BlockRoads) -> tuple[BlockRoads, float]:
         """The same stretches with the most probable level and waviness of each block; and the logarithm of the
         posterior density there, the blocks integrated out (Laplace), up to a constant."""
         gains = self.gains(x)[self.speed]
@@ -213,7 +213,7 @@ class UnknownCar:
             level, own = level + move[:, 0], own + move[:, 1]
             if np.abs(move).max(initial=0.0) < _SMALL_MOVE:
                 break
-        found = Roads(level, own, roads.stretch)
+        found = BlockRoads(level, own, roads.stretch)
         road = gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
         whole = road + noise
         ratio = self.power / whole
@@ -224,11 +224,11 @@ class UnknownCar:
             + _PRECISION[1] * (own**2).sum() + (roads.stretch**2).sum() / WAVINESS_APART**2))
         return found, float(value)
 
-    def start(self, x: Array) -> Roads:
+    def start(self, x: Array) -> BlockRoads:
         """Roads that are about right for a car: their levels by the mean power."""
         gains = self.gains(x)[self.speed]
         ratio = (self.weight * self.power / gains).sum(axis=1) / self.weight.sum(axis=1)
-        return Roads(np.log(np.maximum(ratio, 1e-12)), np.zeros(len(self.spectra)), np.zeros(self.stretches))
+        return BlockRoads(np.log(np.maximum(ratio, 1e-12)), np.zeros(len(self.spectra)), np.zeros(self.stretches))
 
     def fit(self) -> LearnedCar:
         """The most probable car and stretches, blocks integrated out: the best of searches that begin with front or
@@ -338,7 +338,7 @@ def _solved(moments: Array, right: Array) -> Array:
 class _Step:
     """Score and information of car and stretches where the blocks are at their most probable."""
 
-    def __init__(self, problem: UnknownCar, x: Array, roads: Roads) -> None:
+    def __init__(self, problem: UnknownCar, x: Array, roads: BlockRoads) -> None:
         self._x, self._roads, self._problem = x, roads, problem
         gains = problem.gains(x)
         slopes = np.zeros((*gains.shape, len(x)))
@@ -433,7 +433,7 @@ class _Step:
         """Half the logarithm of the determinant of the covariance of stretches and car."""
         return float(-0.5 * (np.log(self._of_stretches[0]).sum() + np.linalg.slogdet(self.system[0])[1]))
 
-    def taken(self, damping: float) -> tuple[Array, Roads]:
+    def taken(self, damping: float) -> tuple[Array, BlockRoads]:
         """Car and roads after a step."""
         information, score = self.system
         move = np.linalg.solve(information + damping * np.diag(np.diag(information)), score)
@@ -445,7 +445,7 @@ class _Step:
         both = np.concatenate([stretch[self._problem.spectra.stretch][:, None],
                                np.broadcast_to(move, (len(roads.level), len(move)))], axis=1)
         blocks = -np.einsum("bij,bj->bi", self._eliminated, both)
-        return self._x + move, Roads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
+        return self._x + move, BlockRoads(roads.level + blocks[:, 0], roads.own + blocks[:, 1], roads.stretch + stretch)
 
 
 def misfit(problem: UnknownCar, x: Array) -> float:

@@ -27,7 +27,7 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep
 from logger.lab.selection.holdout import cross_validate
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -58,7 +58,7 @@ class Standing:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LabComparison:
     """The result of a comparison.
 
     plain       the model as it stands
@@ -77,7 +77,7 @@ class Comparison:
     refitted: Standing
     moves: Mapping[str, float]
     far: tuple[str, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[ErrorStep, ...]
     floor: float
     removed: Removed
     tests: ResidualTestResults
@@ -112,7 +112,7 @@ class Comparison:
 
 
 def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
-            tolerance: Tolerance | None = None) -> Comparison:
+            tolerance: Tolerance | None = None) -> LabComparison:
     """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
 
     given        the vehicle before any fit, if it has been refitted: the mean of the prior
@@ -133,11 +133,11 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
-    return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
-                      tuple(posterior.prior.beyond_tolerance(state.logs, errors.covariance)),
-                      (Step(AS_FILED, plain.error), Step(REFITTED, cross_validate(linear).error)),
-                      floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-                      removed, _tests(refitted, removed, plain))
+    return LabComparison(vehicle.name, tuple(effects), plain, refitted, moves,
+                         tuple(posterior.prior.beyond_tolerance(state.logs, errors.covariance)),
+                         (ErrorStep(AS_FILED, plain.error), ErrorStep(REFITTED, cross_validate(linear).error)),
+                         floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
+                         removed, _tests(refitted, removed, plain))
 
 
 def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTestResults:

@@ -19,7 +19,7 @@ from logger.lab.likelihood.distance_error import signals_off
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import (
-    Noise,
+    NoiseLevel,
     SignalErrors,
     excess_by_signal,
     floor_error,
@@ -39,13 +39,13 @@ from logger.lab.residuals.road_coherence import best_linear_share
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
-from logger.lab.selection.stepwise import Effort, MeasuredRoad, Search, Selection, is_outside_data
+from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
@@ -59,7 +59,7 @@ LAID_BY_THE_ROAD = ("it only shifts the record, and these runs were laid where t
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class CandidateEffect:
     """An effect that was tried.
 
     error                  on stretches that no fit saw, of the refitted model with it alone
@@ -78,7 +78,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class LabDiagnosis:
     """The result of a diagnosis.
 
     runs                 their names
@@ -120,15 +120,15 @@ class Diagnosis:
     catalogue: Mapping[str, Effect]
     baseline_error: float
     final_error: float
-    noise: Noise
+    noise: NoiseLevel
     noise_floor_error: float
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateEffect, ...]
     obstacles: Mapping[str, str]
     verdict: tuple[str, ...]
     excess: float
     beyond: Mapping[str, float]
     in_conflict: bool
-    steps: tuple[Step, ...]
+    steps: tuple[ErrorStep, ...]
     effects: tuple[Chosen, ...]
     undetectable: tuple[Undetectable, ...]
     shape: Shape | None
@@ -183,13 +183,13 @@ class Diagnosis:
         """Effects that could not be tried, and why."""
         return {name: why for name, why in self.obstacles.items() if why != ALREADY_PRESENT}
 
-    def candidate(self, name: str) -> Candidate:
+    def candidate(self, name: str) -> CandidateEffect:
         """The candidate of that name."""
         return next(one for one in self.candidates if one.effect.name == name)
 
 
 def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, workers: int = 2) -> Diagnosis:
+             progress: Progress = lambda words: None, workers: int = 2) -> LabDiagnosis:
     """Find the effects of ``effects`` that the model, with those that are ``present``, lacks, in so many threads.
 
     ValueError where the vehicle lacks what an effect needs.
@@ -207,7 +207,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                   progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
+                   progress: Progress = lambda words: None, workers: int = 2, effort: SearchEffort | None = None
              ) -> tuple[Search, Selection]:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
@@ -218,12 +218,12 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress, workers,
-        effort or (Effort() if unknown is None else Effort(fitted=3)), unknown or MeasuredRoad())
+        effort or (SearchEffort() if unknown is None else SearchEffort(fitted=3)), unknown or MeasuredRoad())
     return search, search.run(before)
 
 
 def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
-           selection: Selection) -> Diagnosis:
+           selection: Selection) -> LabDiagnosis:
     """The diagnosis by the result of a search, which is fitted again by a fine simulation."""
     selection, after = _fit_finely(search, selection)
     progress, tried = search.progress, search.effects
@@ -247,7 +247,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         fine.prior.names, errors.logs, fine.prior.deviations, strict=True)
         if deviation > Tolerance().numbers for value in [named_parameters.read(vehicle, name)]}
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
-    return Diagnosis(
+    return LabDiagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
         baseline_error=fine.error(baseline), final_error=fine.error(state),
         noise=noise,
@@ -336,17 +336,17 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         selection = search.without_effect(selection, ended[0])
 
 
-def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
+def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
     """The models of the search in order."""
-    steps = [Step(AS_FILED, nominal_error), Step(REFITTED, selection.before.hold_out.error)]
-    steps += [Step(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
+    steps = [ErrorStep(AS_FILED, nominal_error), ErrorStep(REFITTED, selection.before.hold_out.error)]
+    steps += [ErrorStep(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
     if selection.now.hold_out is not last:
-        steps.append(Step("as it ends", selection.now.hold_out.error))
+        steps.append(ErrorStep("as it ends", selection.now.hold_out.error))
     return tuple(steps)
 
 
-def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[CandidateEffect, ...], tuple[str, ...]]:
     """The missing effects, then the others that are better than the refitted model, the least likely by chance first,
     each with its error on top of that model; and the names of those that are no better."""
     values = {one.effect.name: one.values for one in after.effects}
@@ -358,8 +358,8 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[C
     for name, gain in selection.gains.items():
         there = alone.get(name) or stages.get(name) or selection.now.hold_out
         by_chance = chance_of([Chosen(effects[name], values[name])], gain, freedom, count)
-        found.append(Candidate(effects[name], values[name], there.error, by_chance, gain,
-                               before.deviance - there.deviance, selection.rivals.get(name, ())))
+        found.append(CandidateEffect(effects[name], values[name], there.error, by_chance, gain,
+                                     before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
     others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
     others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
@@ -369,21 +369,21 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[C
             tuple(one.effect.name for one in others if one not in better))
 
 
-def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:
+def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> CandidateEffect:
     """A candidate that was fitted, of so many."""
     there = one.hold_out
     p_value = chance_of([one.chosen], one.gain, one.found.posterior.freedom, count)
     rivals = tuple(other.effect.name for other in fits
                    if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
-    return Candidate(one.effect, one.chosen.values, there.error, p_value, one.gain, before.deviance - there.deviance,
-                     rivals)
+    return CandidateEffect(one.effect, one.chosen.values, there.error, p_value, one.gain,
+                           before.deviance - there.deviance, rivals)
 
 
-def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> Candidate:
+def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> CandidateEffect:
     """A candidate that was screened only, at the best strength of its trial."""
     trial = one.trials[0]
     there = cross_validate(base.linear, [change[None] for change in trial.change])
     gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
     by_chance = chance_of([trial.one], gain, base.posterior.freedom, count)
-    return Candidate(one.effect, trial.one.values, there.error, by_chance, gain,
-                     before.deviance - there.deviance, ())
+    return CandidateEffect(one.effect, trial.one.values, there.error, by_chance, gain,
+                           before.deviance - there.deviance, ())

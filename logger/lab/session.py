@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from logger.chart_data import Curves
-from logger.lab.compare import Comparison
-from logger.lab.diagnosis import Diagnosis
+from logger.lab.compare import LabComparison
+from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.laws.learn import Learning
 from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
 
@@ -16,7 +16,7 @@ class Round:
     """Effects that were added, the result, the comparison with them, and the vehicle file that was written."""
 
     addition: AddedEffects
-    comparison: Comparison
+    comparison: LabComparison
     file: str
 
 
@@ -44,14 +44,14 @@ class Story:
     law         None: none was looked for
     """
 
-    first: Comparison
-    diagnoses: tuple[Diagnosis, ...]
+    first: LabComparison
+    diagnoses: tuple[LabDiagnosis, ...]
     rounds: tuple[Round, ...]
     refused: tuple[str, ...]
     law: LawSearch | None = None
 
     @property
-    def last(self) -> Comparison:
+    def last(self) -> LabComparison:
         """Comparison of the vehicle that the session ends with."""
         return self.rounds[-1].comparison if self.rounds else self.first
 

@@ -28,7 +28,7 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class MapWay:
+class MapLine:
     """A line on the ground: latitudes and longitudes (n,) [degrees]."""
 
     name: str
@@ -36,7 +36,7 @@ class MapWay:
     lon_deg: Array
 
 
-def ways_map(measured: Sequence[MapWay], driven: Sequence[MapWay]) -> Html:
+def ways_map(measured: Sequence[MapLine], driven: Sequence[MapLine]) -> Html:
     """The figure of lines that were measured, wide, under the places at which drives were seen, as dots; with a key."""
     projection = _Projection.around([place for one in measured for place in _places(one)])
     parts = [html('<path class="casing" d="{}"/>', _path([projection.xy(place) for place in _places(one)]))
@@ -61,7 +61,7 @@ def _begins(at: Point, name: str) -> Html:
                 'text-anchor="{}">{}</text></g>', x, y, x, y - 14, "start" if x < WIDTH / 2 else "end", name)
 
 
-def _places(way: MapWay) -> list[_Spot]:
+def _places(way: MapLine) -> list[_Spot]:
     return [_Spot(float(lat), float(lon)) for lat, lon in zip(way.lat_deg, way.lon_deg, strict=True)]
 
 

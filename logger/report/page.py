@@ -46,7 +46,7 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.maps import MapWay
+from logger.report.maps import MapLine
 from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
 from logger.report.summary import (
     COMFORT_NAMES,
@@ -96,7 +96,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
 }
 
 
-def page(files: Sequence[LoggedFile], base: Sequence[MapWay] = (), base_name: str = "", tiles_from: str = "",
+def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: str = "", tiles_from: str = "",
          first: Sequence[str] = (), title: tuple[str, str] | None = None, marked: Sequence[int] | None = None) -> Html:
     """The page of some log files, in order of their writing, as one HTML document.
 
@@ -436,8 +436,8 @@ _PLAIN: Sequence[tuple[str, float, int, Callable[[WindowRecord], float | None]]]
 )
 
 
-def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[MapWay] = (), passed: PlacesPassed | None = None
-               ) -> dict[str, Any]:
+def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[MapLine] = (),
+               passed: PlacesPassed | None = None) -> dict[str, Any]:
     """All that the script draws, as JSON can hold it.
 
     base      roads that are drawn beneath
@@ -542,7 +542,7 @@ def _begins(drives: Sequence[Sequence[WindowRecord]]) -> Array:
     return _floats(begins)
 
 
-def _base_columns(base: Sequence[MapWay], origin_deg: float, lat_deg: Array, lon_deg: Array) -> list[Column]:
+def _base_columns(base: Sequence[MapLine], origin_deg: float, lat_deg: Array, lon_deg: Array) -> list[Column]:
     """The roads beneath, those that come near to the way: as far around it as it is wide, 1 km at least."""
     near = _near(lat_deg, lon_deg)
     kept = [(way.lat_deg, lon) for way in base

@@ -183,7 +183,7 @@ _ROUNDING = 1e-9  # of a measure, in windows
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class SectionWindows:
     """Windows of one way (n,), in order, none over another; NaN: not known, or to stand in no mean.
 
     start_m, end_m           [m]
@@ -199,14 +199,14 @@ class Windows:
     iri_errors: WindowErrors
     mean_square: Array
 
-    def of(self, rows: npt.NDArray[np.intp]) -> Windows:
+    def of(self, rows: npt.NDArray[np.intp]) -> SectionWindows:
         """Some of them."""
-        return Windows(self.start_m[rows], self.end_m[rows], self.duration_s[rows], self.iri_m_per_km[rows],
-                       self.iri_errors.of(rows), self.mean_square[rows])
+        return SectionWindows(self.start_m[rows], self.end_m[rows], self.duration_s[rows], self.iri_m_per_km[rows],
+                              self.iri_errors.of(rows), self.mean_square[rows])
 
 
 @dataclass(frozen=True, eq=False)
-class Sections:
+class RoadSections:
     """Sections (k,) between limits (k + 1,) on the same way; NaN: not known.
 
     edges_m          limits [m]
@@ -238,7 +238,7 @@ def even_edges(end_m: float, length_m: float) -> Array:
     return np.asarray(length_m * np.arange(int(np.ceil(end_m / length_m - 1e-9)) + 1), dtype=np.float64)
 
 
-def sections(windows: Windows, edges_m: Array) -> Sections:
+def sections(windows: SectionWindows, edges_m: Array) -> RoadSections:
     """The windows in sections between growing limits (k + 1,) [m]; what lies outside is left out."""
     count = len(edges_m) - 1
     piece_m, window, section = _pieces(windows, edges_m)
@@ -257,13 +257,13 @@ def sections(windows: Windows, edges_m: Array) -> Sections:
     felt_s = total(np.where(np.isfinite(square), time_s, 0.0))
     driven_m = total(piece_m)
     worst, worst_at_m = _worst(windows, window, section, count)
-    return Sections(
+    return RoadSections(
         edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
         errors, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
         worst, worst_at_m)
 
 
-def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Parts of windows inside one section each: lengths [m], windows, sections."""
     cuts = np.unique(np.concatenate([windows.start_m, windows.end_m, edges_m]))
     middle_m = (cuts[1:] + cuts[:-1]) / 2
@@ -275,7 +275,7 @@ def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.int
     return piece_m[inside], window[inside], section[inside]
 
 
-def _worst(windows: Windows, window: npt.NDArray[np.intp], section: npt.NDArray[np.intp], count: int
+def _worst(windows: SectionWindows, window: npt.NDArray[np.intp], section: npt.NDArray[np.intp], count: int
            ) -> tuple[Array, Array]:
     iri = np.nan_to_num(windows.iri_m_per_km[window], nan=-np.inf)
     order = np.lexsort((iri, section))

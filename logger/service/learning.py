@@ -23,7 +23,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import heading_deg
-from logger.estimation.receiver_delay import Belief, combined
+from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
@@ -33,7 +33,7 @@ from logger.units import US_PER_S
 SAVE_EVERY_US = 120 * US_PER_S
 LEAST_STD_SHARE = 1e-3
 """No drive tells the noise better; a smaller standard error is no logger's, and its density has no logarithm."""
-UNKNOWN = Belief(0.14, 0.07)
+UNKNOWN = CarriedDelay(0.14, 0.07)
 """Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
 value to twice that."""
 MOST_DELAY_S = 2.0
@@ -54,7 +54,7 @@ class KnownNoise:
 
 
 @dataclass(frozen=True)
-class Quantity(Generic[Known]):
+class LearntQuantity(Generic[Known]):
     """One thing that is learnt.
 
     what          it is, for messages: "the receiver's delay"
@@ -109,24 +109,24 @@ class Quantity(Generic[Known]):
             return None
 
 
-NOISE = Quantity(
+NOISE = LearntQuantity(
     "sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"), "noise_std_mps2",
     LEAST_NOISE_MPS2, MOST_NOISE_MPS2, LEAST_STD_SHARE,
     lambda known: (known.belief.noise_rms_mps2, known.belief.std_mps2, known.drives),
     lambda noise, std, drives: KnownNoise(NoiseBelief(log(noise), std / noise), drives))
-DELAY = Quantity(
+DELAY = LearntQuantity(
     "receiver-delay", "the receiver's delay", ("latency_s", "latency_std_s", "latency_drives"), "latency_s",
-    0.0, MOST_DELAY_S, 0.0, lambda known: (known.delay_s, known.std_s, known.drives), Belief)
+    0.0, MOST_DELAY_S, 0.0, lambda known: (known.delay_s, known.std_s, known.drives), CarriedDelay)
 
 
-class Learning(Generic[Known]):
+class CarriedLearning(Generic[Known]):
     """Carries a session's learning of a quantity on, and keeps it in its file in the folder of the logs.
 
     known    what the session began with; None: nothing was known
     saved    what is in the file already
     """
 
-    def __init__(self, quantity: Quantity[Known], folder: Path, known: Known | None, files: FileSystem | None,
+    def __init__(self, quantity: LearntQuantity[Known], folder: Path, known: Known | None, files: FileSystem | None,
                  saved: Mapping[str, Any] | None = None) -> None:
         self._quantity, self._path, self._known = quantity, folder / quantity.file_name, known
         self._files = files or FileSystem()
@@ -201,7 +201,7 @@ def _identity(config: AccelerometerConfig) -> dict[str, Any]:
             **({"reads": readings.oversample} if is_of_each else {})}
 
 
-class NoiseLearning(Learning[KnownNoise]):
+class NoiseLearning(CarriedLearning[KnownNoise]):
     """Of the accelerometer's noise, by a ``pipeline`` that learns it; ``config`` of the accelerometer."""
 
     def __init__(self, folder: Path, pipeline: LearnsNoise, config: AccelerometerConfig, known: KnownNoise | None,
@@ -235,10 +235,10 @@ class NoiseLearning(Learning[KnownNoise]):
         return f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, {_drives_words(now.drives)}"
 
 
-def delay_at_start(gps: GpsConfig, learnt: Belief | None) -> Belief:
+def delay_at_start(gps: GpsConfig, learnt: CarriedDelay | None) -> CarriedDelay:
     """What a session goes by: the number in the settings, else what was learnt, else what is usual."""
     if gps.latency_s is not None:
-        return Belief(gps.latency_s, 0.0)
+        return CarriedDelay(gps.latency_s, 0.0)
     return learnt or UNKNOWN
 
 
@@ -247,20 +247,20 @@ def is_loggers(fields: Mapping[str, Any]) -> bool:
     return DELAY.key in fields
 
 
-def read_delay(folder: Path) -> Belief | None:
+def read_delay(folder: Path) -> CarriedDelay | None:
     """What earlier drives left; None where there is nothing that can be read."""
     learnt = DELAY.read(folder)
     return learnt if learnt is not None and learnt.std_s > 0 else None
 
 
-class ReceiverLearning(Learning[Belief]):
+class ReceiverLearning(CarriedLearning[CarriedDelay]):
     """Of the receiver's delay.
 
     known     what the session goes by
     learnt    what earlier drives left, also where the settings say a number
     """
 
-    def __init__(self, folder: Path, alignment: DriveAlignment, known: Belief, learnt: Belief | None,
+    def __init__(self, folder: Path, alignment: DriveAlignment, known: CarriedDelay, learnt: CarriedDelay | None,
                  files: FileSystem | None = None) -> None:
         super().__init__(DELAY, folder, known, files, DELAY.fields(learnt) if learnt else None)
         self._alignment = alignment
@@ -268,14 +268,14 @@ class ReceiverLearning(Learning[Belief]):
         self.known = known
 
     @property
-    def now(self) -> Belief | None:
+    def now(self) -> CarriedDelay | None:
         """What is learnt by now, with this session; None: nothing yet."""
         now = combined(self._learnt or UNKNOWN, self._alignment.estimate())
         # An accelerometer behind a low-pass may be the later of the two, by an error or so.
         return replace(now, delay_s=max(0.0, now.delay_s)) if now.drives else None
 
     @property
-    def shown(self) -> Belief:
+    def shown(self) -> CarriedDelay:
         """The best that is known: a number in the settings, what is learnt by now, or what is usual."""
         return self.known if self.known.std_s == 0.0 else self.now or self.known
 
@@ -300,7 +300,7 @@ class ReceiverLearning(Learning[Belief]):
         return tuple(notices)
 
 
-def _belief_words(belief: Belief) -> str:
+def _belief_words(belief: CarriedDelay) -> str:
     return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, {_drives_words(belief.drives)}"
 
 
@@ -319,7 +319,7 @@ def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict
     }
 
 
-def drive_words(fields: Mapping[str, Any], known: Belief) -> list[str]:
+def drive_words(fields: Mapping[str, Any], known: CarriedDelay) -> list[str]:
     """The same for a person, in lines; ``known``: what the rows were made with."""
     used = f"the rows were made with {known.delay_s:.2f} s" + (f" ± {known.std_s:.2f} s" if known.std_s else "")
     if fields["delay_s"] is None:

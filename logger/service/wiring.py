@@ -31,7 +31,7 @@ from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarRespo
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import SpectraKeeper
 from logger.estimation.iri_posterior import SlopeErrors
-from logger.estimation.receiver_delay import Belief
+from logger.estimation.receiver_delay import CarriedDelay
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
@@ -58,7 +58,7 @@ from logger.service.signal_chain import (
     weighted_response,
 )
 from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
-from logger.store.formats.vehicle_file import Model, read_on_board
+from logger.store.formats.vehicle_file import CarModel, read_on_board
 from logger.units import WINDOW_M
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.linearise import known_car, known_vehicle
@@ -148,7 +148,7 @@ def gps_decoder(config: Config) -> NmeaDecoder:
     return NmeaDecoder(week_rollovers=config.gps.week_rollovers, earliest_utc_us=earliest_us, baud=config.gps.baud)
 
 
-def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None) -> Pipeline:
+def pipeline(config: Config, sensor: Instrument, model: CarModel, receiver: CarriedDelay | None = None) -> Pipeline:
     """The pipeline as the settings want it. ``receiver``: what is known of its delay; None: as before any drive.
 
     Raises BadInput for a vehicle that lacks what its model or an effect needs.
@@ -193,7 +193,7 @@ def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief 
                     RangeUse(config.accelerometer.kind.others(config.accelerometer.settings)), spectra)
 
 
-def car_of(config: Config, read: Callable[[Path], Model] = read_on_board) -> Model:
+def car_of(config: Config, read: Callable[[Path], CarModel] = read_on_board) -> CarModel:
     """The car of the settings: its file, as ``read`` reads it; of a car that is not known what its wheelbase and mass
     tell besides. Raises BadInput as ``read``."""
     model = read(config.vehicle)
@@ -225,7 +225,7 @@ def _noise_floor(sensor: Instrument, low_pass_hz: float | None) -> NoiseFloor:
     return NoiseFloor(gain, GRID_RATE_HZ, sensor.sensor.step_mps2, sensor.reads)
 
 
-def notices(config: Config, model: Model, sensor: Instrument) -> tuple[str, ...]:
+def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, ...]:
     """What the settings allow and somebody should know all the same."""
     vehicle, found = model.vehicle, []
     if vehicle.sensor.left_m:
@@ -244,7 +244,7 @@ def notices(config: Config, model: Model, sensor: Instrument) -> tuple[str, ...]
     return tuple(found)
 
 
-def iri_share_std(model: Model, sensor: Instrument) -> float:
+def iri_share_std(model: CarModel, sensor: Instrument) -> float:
     """Share by which the IRI may be off because nobody knows the car: the largest of some speeds."""
     psd = COMMON_ROAD.psd_of(LOG_WAVES)
     car, off = known_vehicle(model.vehicle, model.effects), cars_off(model.vehicle, model.effects, model.errors)
@@ -257,7 +257,7 @@ def iri_share_std(model: Model, sensor: Instrument) -> float:
     return max(shares)
 
 
-def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None,
+def sidecar(config: Config, sensor: Instrument, model: CarModel, receiver: CarriedDelay | None = None,
             noise: KnownNoise | None = None) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {
@@ -273,7 +273,7 @@ def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief |
     }
 
 
-def _more_of(model: Model) -> dict[str, Any]:
+def _more_of(model: CarModel) -> dict[str, Any]:
     """What a vehicle has beside its plain numbers."""
     effects = [{"name": one.effect.name, **one.values} for one in model.effects]
     errors = asdict(model.errors) if model.errors is not None else {}
@@ -288,7 +288,7 @@ def _noise_said(config: AccelerometerConfig, known: KnownNoise | None) -> dict[s
     return {"noise": {"noise_mps2": config.noise_mps2, **(NOISE.fields(known) if known else {}), **of}}
 
 
-def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNoise | None = None) -> DumpHeader:
+def dump_header(config: Config, receiver: CarriedDelay | None = None, noise: KnownNoise | None = None) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
     gps = {"baud": config.gps.baud, **DELAY.fields(receiver or delay_at_start(config.gps, None))}
     sensor = config.accelerometer
@@ -330,7 +330,7 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
                    vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
 
 
-def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> Belief:
+def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> CarriedDelay:
     """What was known of the receiver's delay when the recording began, unless the settings say a number. Raises
     BadInput, beginning with ``place``, where the recording says what cannot be."""
     try:

@@ -29,7 +29,7 @@ from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.drive_model import VehicleModel
-from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import SPEED_SCALE, Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
@@ -259,7 +259,7 @@ def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput 
     numbers = [free_input(road, name, value) if is_input(name) else free(car, name, value)
                for name, value in start.items()]
     model = VehicleModel(car, numbers, [record], road)
-    noise: list[Noise] = [White()]
+    noise: list[NoiseModel] = [White()]
     if ours:
         noise += [Autoregressive(), RoadNoise(model.road_spectra)]
     return fit(model, model.measured, FitOptions(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))

@@ -42,7 +42,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.report.placed import column, iri_errors, placed
-from logger.roads.sections import WindowErrors, Windows, even_edges, sections
+from logger.roads.sections import SectionWindows, WindowErrors, even_edges, sections
 from logger.service.signal_chain import GRID_STEP_US
 from logger.units import FOOT_M, MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle.linear_car import LinearCar
@@ -268,7 +268,7 @@ class Cell:
         """Errors of sections that are known from end to end, and their standard errors [m/km]."""
         count, end_m = len(self.begin_m), self.begin_m + WINDOW_M
         end_m[:-1] = np.minimum(end_m[:-1], self.begin_m[1:])  # by the receiver, windows lie a little over each other
-        windows = Windows(self.begin_m, end_m, np.ones(count), self.estimate, self.errors, np.ones(count))
+        windows = SectionWindows(self.begin_m, end_m, np.ones(count), self.estimate, self.errors, np.ones(count))
         edges_m = self.begin_m[0] + even_edges(float(self.begin_m[-1] + WINDOW_M - self.begin_m[0]), length_m)
         found = sections(windows, edges_m)
         whole = found.known_m > 0.95 * length_m

@@ -17,12 +17,12 @@ from scipy.linalg import cho_factor, cho_solve, toeplitz
 
 from logger.identification.drive_model import SimulatedModel, VehicleModel
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.unknown_inputs import Bump, RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.road_fit import fit_roads
-from logger.identification.unknown_road.road_operator import Drive
+from logger.identification.unknown_road.road_operator import RoadDrive
 from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.runs import Run
@@ -72,7 +72,7 @@ def main() -> int:
 
 def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
     model = VehicleModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
-    kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
+    kinds: dict[str, NoiseModel] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return fit(model, model.measured, FitOptions(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
 
 
@@ -235,7 +235,7 @@ def rubbing(figures: Figures) -> None:
     for seed in range(RUBBING_DRAWS):
         model = SimulatedModel(CAR, [free(CAR, MASS, 800.0), free_number(there, move)],
                                [rubbing_run(seed, road_seed=seed % RUBBING_ROADS)], effects=there)
-        noise: list[Noise] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
+        noise: list[NoiseModel] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
         began = time.process_time()
         found = fit(model, model.measured, FitOptions(noise=noise, starts=model.trials()))
         times.append(time.process_time() - began)
@@ -306,7 +306,7 @@ def judged(figures: Figures, title: str, errors: Array, expected: Array, bound: 
     print(f"   {len(errors)} draws; each {over.round(2)} times the bound")
 
 
-def gaussian_drives(speeds: tuple[float, ...], seed: int) -> list[Drive]:
+def gaussian_drives(speeds: tuple[float, ...], seed: int) -> list[RoadDrive]:
     """Drives over a road whose waves have chance in their heights too, as those of a real road have."""
     generator = np.random.default_rng(1000 + seed)
     count = int(4 * (ROAD_M + 200) / SPACING_M)
@@ -317,7 +317,7 @@ def gaussian_drives(speeds: tuple[float, ...], seed: int) -> list[Drive]:
     drives = []
     for number, speed in enumerate(speeds):
         distance_m = speed / RATE_HZ * np.arange(int(ROAD_M / speed * RATE_HZ))
-        drives.append(Drive(RATE_HZ, recorded(CAR, track, distance_m, NOISE_MPS2, 10 * seed + number), distance_m))
+        drives.append(RoadDrive(RATE_HZ, recorded(CAR, track, distance_m, NOISE_MPS2, 10 * seed + number), distance_m))
     return drives
 
 

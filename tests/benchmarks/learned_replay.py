@@ -22,7 +22,7 @@ import numpy as np
 
 from logger.api.learn_car import learn_car
 from logger.identification.unknown_car import CarKnowledge
-from logger.store.formats.vehicle_file import Model, write_model
+from logger.store.formats.vehicle_file import CarModel, write_model
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2
 
 from ..support.drives.measured import GRID_HZ, steady_drive
@@ -53,7 +53,7 @@ def main() -> int:
             folder = Path(name)
             runs = written(folder / "drives", mixed(car, 50_000 + seed, 300.0, BMA220))
             learn_car(runs, wheelbase_m, sensor=ahead_of_middle_m(car)).write(folder / "learnt.yaml")
-            write_model(folder / "true.yaml", Model(true), "")
+            write_model(folder / "true.yaml", CarModel(true), "")
             settings = {"true": f"vehicle: {folder / 'true.yaml'}\n", "learnt": f"vehicle: {folder / 'learnt.yaml'}\n",
                         "generic": f"vehicle: generic\nwheelbase_m: {wheelbase_m:.3f}\n"}
             for mph in map(float, asked.mph.split(",")):

@@ -28,7 +28,7 @@ from drivers.wire_profiles import LineLayout, load_profile
 from logger.commands import hil as command
 from logger.commands import main
 from logger.errors import BadInput
-from logger.estimation.receiver_delay import Belief
+from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
 from logger.service.config import AccelerometerConfig, Config, load_config
 from logger.service.hil.log_comparison import LoggedSession, compare, read_sessions
@@ -307,13 +307,13 @@ def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_si
         short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("ridelog.yaml").write_text("accelerometer: {driver: pasco}\n")
-    knew = Belief(0.40, 0.02, 3)
+    knew = CarriedDelay(0.40, 0.02, 3)
     with open_dump(short_dump) as reader:
         rows = expected_rows(wired(reader.header, reader, None, "x"), load_config(Path("ridelog.yaml")), "x", knew)
     log = tmp_path / "00004-001.csv"
     log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *map(row_format.format_row, rows)]))
     learnt = tmp_path / DELAY.file_name
-    learnt.write_text(json.dumps(DELAY.fields(Belief(0.05, 0.02, 9))))
+    learnt.write_text(json.dumps(DELAY.fields(CarriedDelay(0.05, 0.02, 9))))
     compared = ["hil", str(short_dump), "--log", ".", "--config", "ridelog.yaml"]
     store_sidecar(FileSystem(), log, {"receiver": DELAY.fields(knew)}, "finished", Tally(len(rows)), None)
     assert main.main(compared) == 0

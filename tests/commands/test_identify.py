@@ -18,7 +18,7 @@ from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import write_drive, write_profile
 from logger.store.formats.effect_file import shipped_effects
-from logger.store.formats.vehicle_file import Model, read_model, read_vehicle, write_model
+from logger.store.formats.vehicle_file import CarModel, read_model, read_vehicle, write_model
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
@@ -194,7 +194,7 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
 def rubbing_vehicle(folder: Path, friction_n: float) -> str:
     """The car with dry friction, as a file."""
     file = folder / "rubbing.yaml"
-    write_model(file, Model(CAR, (chosen(shipped_effects()["dry_friction"], {"friction_force_n": friction_n}),)))
+    write_model(file, CarModel(CAR, (chosen(shipped_effects()["dry_friction"], {"friction_force_n": friction_n}),)))
     return str(file)
 
 

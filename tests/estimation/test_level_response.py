@@ -9,7 +9,7 @@ from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.time_grid import RATE_HZ, Samples
+from logger.estimation.time_grid import RATE_HZ, RoadSamples
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
@@ -39,7 +39,7 @@ def levels(iri: float, in_a_step: float, seed: int) -> np.ndarray:
     for last in [*range(COUNT, len(time_s) + 1, HOP), *[len(time_s)] * 10]:
         part = slice(last - COUNT, last)
         column = reading[part, None]
-        samples = Samples(column, np.ones(column.shape, bool), np.zeros(column.shape), SPEED_MPS * time_s[part])
+        samples = RoadSamples(column, np.ones(column.shape, bool), np.zeros(column.shape), SPEED_MPS * time_s[part])
         if last > COUNT and not found:
             road.move_on(samples.part(COUNT - HOP, COUNT))
         block = Block(grid, samples.distance_m, SPACING_M, 50 * SPACING_M)

@@ -13,7 +13,7 @@ from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.estimation.time_grid import Samples
+from logger.estimation.time_grid import RoadSamples
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
@@ -68,7 +68,7 @@ def scaled(step_mps2: float, reading: np.ndarray, beyond_mps2: np.ndarray | floa
     usable, way = np.ones(COUNT, dtype=bool), felt()[1][:COUNT]
     block = Block(TimeGrid(CarResponse(CAR), COUNT, 100.0), way, SPACING_M, 7.62)
     column = (reading[:COUNT] - beyond_mps2)[:, None]
-    road.solved(block, Samples(column, usable[:, None], np.zeros((COUNT, 1)), way), usable, beyond_mps2)
+    road.solved(block, RoadSamples(column, usable[:, None], np.zeros((COUNT, 1)), way), usable, beyond_mps2)
     assert road.noise is not None
     return road.scale_log_std / road.noise.log_std
 

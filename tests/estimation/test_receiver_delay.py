@@ -8,7 +8,7 @@ import pytest
 
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import angle_rad
-from logger.estimation.receiver_delay import STRENGTHS, Belief, DelayEstimate, _log_likelihoods, combined
+from logger.estimation.receiver_delay import STRENGTHS, CarriedDelay, DelayEstimate, _log_likelihoods, combined
 
 from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive, fed
 
@@ -124,9 +124,9 @@ def test_memory_is_bounded() -> None:
 
 
 def test_drives_are_weighed_by_their_errors() -> None:
-    first = combined(Belief(0.10, 0.10), DelayEstimate(0.16, 0.02), drift_s=0.0)
+    first = combined(CarriedDelay(0.10, 0.10), DelayEstimate(0.16, 0.02), drift_s=0.0)
     assert first.delay_s == pytest.approx(0.10 + 0.06 * 0.01 / 0.0104)
     assert first.std_s == pytest.approx((1 / (1 / 0.01 + 1 / 0.0004)) ** 0.5)
     assert first.drives == 1
     assert combined(first, DelayEstimate(reason="an even drive")) == first
-    assert combined(first, DelayEstimate(0.5, 0.02)) == Belief(0.5, 0.02, 1)  # another receiver
+    assert combined(first, DelayEstimate(0.5, 0.02)) == CarriedDelay(0.5, 0.02, 1)  # another receiver

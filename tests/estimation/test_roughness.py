@@ -10,7 +10,7 @@ import pytest
 from logger.estimation.car_response import CarResponse
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.roughness import LENGTHS_M, Roughness, mean_resolved
+from logger.estimation.roughness import LENGTHS_M, RoadLevels, mean_resolved
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
@@ -50,10 +50,10 @@ def read(variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return matrix @ (np.sqrt(variance) * rng.standard_normal(block.count)) + rng.normal(0, NOISE_MPS2, COUNT)
 
 
-def settled(reading: np.ndarray, rounds: int = 16) -> Roughness:
+def settled(reading: np.ndarray, rounds: int = 16) -> RoadLevels:
     """What is learnt of a block from nothing, round by round."""
     block, _, seen = a_block()
-    found, start = Roughness(SPACING_M), None
+    found, start = RoadLevels(SPACING_M), None
     for _ in range(rounds):
         log_variance = found.solved_with(0, block.count)
         solution = block.solve(reading, weights(), ROAD, np.exp(log_variance), 12, start)
@@ -86,7 +86,7 @@ def pothole() -> np.ndarray:
 
 
 def test_nothing_known_is_a_common_road() -> None:
-    found = Roughness(SPACING_M)
+    found = RoadLevels(SPACING_M)
     assert found.at(-500, 40).tolist() == [0.0] * 40 and found.solved_with(7, 3).tolist() == [0.0] * 3
 
 
@@ -128,7 +128,7 @@ def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[],
     scale = (4 + power[inside] * np.exp(-level[cells[inside]])) / (4 + taken[inside])
     expected = level[cells[inside]] + 0.6 * np.log(scale) + 0.4 * (np.log(before[inside]) - level[cells[inside]])
 
-    found, gain = Roughness(SPACING_M), block.solve(reading, weights(), ROAD, before, 1).gain
+    found, gain = RoadLevels(SPACING_M), block.solve(reading, weights(), ROAD, before, 1).gain
     found.learn(0, innovations, np.log(before), gain, seen.astype(float))
     chosen = np.flatnonzero(seen)[40:-40]
     expected = expected[chosen - np.flatnonzero(inside)[0]]
@@ -174,7 +174,7 @@ def test_the_error_of_a_road_whose_processes_are_as_believed() -> None:
     count, scores = a_block()[0].count, []
     apart_m = SPACING_M * np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     by_length = np.exp(-apart_m / LENGTHS_M[:, None, None])
-    root = np.linalg.cholesky(np.tensordot(Roughness(SPACING_M).variances, by_length, 1))
+    root = np.linalg.cholesky(np.tensordot(RoadLevels(SPACING_M).variances, by_length, 1))
     for seed in range(16):
         rng = np.random.default_rng(200 + seed)
         scale = np.repeat(np.log(4 / rng.chisquare(4, count // 16 + 1)), 16)[:count]
@@ -188,7 +188,7 @@ def test_the_error_of_a_road_whose_processes_are_as_believed() -> None:
 def test_the_mean_variance_of_a_gaussian_road_is_right_however_little_is_resolved(longest_lost_m: float) -> None:
     """By an exact Wiener filter for the waves that are longer: as steps hide the short ones of a slow drive."""
     count, true, gain_there = 4096, 0.5, 20.0
-    rng, found = np.random.default_rng(4), Roughness(SPACING_M)
+    rng, found = np.random.default_rng(4), RoadLevels(SPACING_M)
     gain = gain_there * (np.fft.rfftfreq(count, SPACING_M) * longest_lost_m < 1)
     means = []
     for _ in range(12):
@@ -226,7 +226,7 @@ def test_a_pothole_raises_no_level() -> None:
     assert with_hole == pytest.approx(without, abs=0.15)
 
 
-def learnt_from(first: int, innovations: np.ndarray, found: Roughness) -> None:
+def learnt_from(first: int, innovations: np.ndarray, found: RoadLevels) -> None:
     """A block that shows its innovations exactly, until it settles."""
     count = len(innovations)
     for _ in range(16):
@@ -237,14 +237,14 @@ def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None
     """The filter that carries it is exact: the same levels and errors as from one long block."""
     size = round(8.0 / SPACING_M)
     innovations = np.random.default_rng(3).standard_normal(60 * size) * np.repeat([1.0, 3.0, 0.5], 20 * size)
-    whole, parts = Roughness(SPACING_M), Roughness(SPACING_M)
+    whole, parts = RoadLevels(SPACING_M), RoadLevels(SPACING_M)
     learnt_from(0, innovations, whole)
     learnt_from(0, innovations[:40 * size], parts)
     learnt_from(24 * size, innovations[24 * size:], parts)
     inner = 42 * size, 16 * size
     assert parts.at(*inner) == pytest.approx(whole.at(*inner), abs=0.02)
     assert parts.log_std(*inner) == pytest.approx(whole.log_std(*inner), rel=0.02)
-    alone = Roughness(SPACING_M)
+    alone = RoadLevels(SPACING_M)
     learnt_from(24 * size, innovations[24 * size:], alone)
     assert abs(alone.at(24 * size, size) - whole.at(24 * size, size)).max() > 0.02  # it has no road behind it
 
@@ -252,7 +252,7 @@ def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None
 def test_what_is_learnt_is_kept_by_place() -> None:
     """Points have their numbers whatever block they lie in; what no block has seen yet goes on as the last one."""
     rng = np.random.default_rng(3)
-    found = Roughness(SPACING_M)
+    found = RoadLevels(SPACING_M)
     learnt_from(-40, rng.standard_normal(512) * np.repeat([1.0, 5.0], 256), found)
     whole = found.solved_with(-40, 512)
     assert whole[300:480].mean() > whole[40:220].mean() + 2.5
@@ -261,7 +261,7 @@ def test_what_is_learnt_is_kept_by_place() -> None:
 
 
 def test_readings_that_tell_nothing_teach_nothing() -> None:
-    found = Roughness(SPACING_M)
+    found = RoadLevels(SPACING_M)
     found.learn(0, np.zeros(256), np.zeros(256), np.full(129, 1e-9), np.ones(256))
     assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
     assert found.log_std(0, 100) == pytest.approx(np.sqrt(1.8**2 + 0.2 + 0.5), rel=0.05)
@@ -274,7 +274,7 @@ def test_less_power_than_expected_makes_a_road_as_much_smoother_as_more_makes_it
     rng = np.random.default_rng(4)
     gain, share, found = np.full(513, 0.15), 0.15 / 1.15, []
     for _ in range(300):
-        one = Roughness(SPACING_M)
+        one = RoadLevels(SPACING_M)
         one.learn(0, np.sqrt(share) * rng.standard_normal(1024), np.zeros(1024), gain, np.ones(1024))
         found.append(one.solved_with(0, 1024).mean())
     assert np.mean(found) == pytest.approx(0.0, abs=0.1)
@@ -291,10 +291,10 @@ def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
     assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
 
 
-def learnt_over_drives(variance: np.ndarray) -> tuple[float, Roughness]:
+def learnt_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
     """Scatter of the log variance over the road that was read, over the last of twelve drives; and what is believed."""
     block, _, seen = a_block()
-    rng, scatter, found = np.random.default_rng(5), [], Roughness(SPACING_M)
+    rng, scatter, found = np.random.default_rng(5), [], RoadLevels(SPACING_M)
     for drive in range(12):
         reading, start = read(variance, rng), None
         for left in reversed(range(4)):
@@ -336,7 +336,7 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
     slow = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * (gain > 1), count)
     patchy = slow * np.where(np.arange(count) // 100 % 3 == 0, 3.0, 0.3)
     even = np.full(count, float(slow.std()))
-    found, fresh = Roughness(SPACING_M), Roughness(SPACING_M)
+    found, fresh = RoadLevels(SPACING_M), RoadLevels(SPACING_M)
     for innovations in [even, patchy] * 30:
         found.learn(0, innovations, np.zeros(count), gain, np.ones(count), learns=True)
     fresh.learn(0, patchy, np.zeros(count), gain, np.ones(count))
@@ -348,7 +348,7 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
 def test_a_place_that_jumps_costs_no_memory() -> None:
     """By 60 km within a block: what is far behind is carried, and matrices stay as small as of the longest block."""
     count = 400_000
-    found, gain = Roughness(SPACING_M), np.full(count // 2 + 1, 1.0)
+    found, gain = RoadLevels(SPACING_M), np.full(count // 2 + 1, 1.0)
     innovations = np.random.default_rng(5).standard_normal(count)
     tracemalloc.start()
     found.learn(0, innovations, np.zeros(count), gain, np.ones(count))
@@ -363,7 +363,7 @@ def test_the_level_comes_to_rest_whatever_the_curvature_that_bounds_lead_to(curv
     """As bounds are found that stay for a while: with the curvature that they come to, steps would be five times too
     long and run in circles."""
     block, _, seen = a_block()
-    found, gain = Roughness(SPACING_M), np.full(block.count // 2 + 1, 1.0)
+    found, gain = RoadLevels(SPACING_M), np.full(block.count // 2 + 1, 1.0)
     found.curvature = curvature
     noisy = 4 * np.random.default_rng(3).standard_normal(block.count)
     for _ in range(40):

@@ -12,7 +12,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
 from logger.roads.obstacles import speed_bump
-from logger.roads.sections import WindowErrors, Windows, even_edges, sections
+from logger.roads.sections import SectionWindows, WindowErrors, even_edges, sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
@@ -209,7 +209,7 @@ def test_sections_of_roads_that_change_have_right_standard_errors() -> None:
         exact = exact_iri(road)[[one.number for one in found]]
         for chosen, into in ((errors, whole), (WindowErrors(errors.std, *np.zeros((3, len(iri)))), alone)):
             nothing = np.zeros(len(iri))
-            off = sections(Windows(start_m, start_m + WINDOW_M, nothing + 1, iri - exact, chosen, nothing),
+            off = sections(SectionWindows(start_m, start_m + WINDOW_M, nothing + 1, iri - exact, chosen, nothing),
                            start_m[0] + even_edges(float(start_m[-1] - start_m[0]), 21 * WINDOW_M))
             known = off.known_m > 20 * WINDOW_M
             into.append((off.iri_m_per_km / off.iri_std_m_per_km)[known])

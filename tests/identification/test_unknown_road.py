@@ -11,7 +11,7 @@ import pytest
 from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
 from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, Options
 from logger.identification.unknown_road.road_fit import RoadFit, RoadProblem, fit_roads
-from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
+from logger.identification.unknown_road.road_operator import Crossing, RoadDrive, grid_under
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
@@ -33,17 +33,17 @@ def track(length_m: float, seed: int) -> Track:
     return Track(SPACING_M, generate(GD, length_m + 150, SPACING_M, seed), -100.0)
 
 
-def driven(car: Vehicle, road: Track, speed_mps: float, length_m: float, seed: int, off_m: float = 0.0) -> Drive:
+def driven(car: Vehicle, road: Track, speed_mps: float, length_m: float, seed: int, off_m: float = 0.0) -> RoadDrive:
     time_s = np.arange(round(100 * length_m / speed_mps)) / 100
     distance_m = speed_mps * time_s + 1.5 * (1 - np.cos(time_s / 2))
-    return Drive(100.0, recorded(car, road, distance_m, NOISE_MPS2, seed), distance_m + off_m)
+    return RoadDrive(100.0, recorded(car, road, distance_m, NOISE_MPS2, seed), distance_m + off_m)
 
 
 def response(car: Vehicle, *names: str, start: float = 1.0) -> AxleResponse:
     return AxleResponse(car, [free(car, name, start * free(car, name).start) for name in names], 100.0)
 
 
-def found(car: Vehicle, roads: list[list[Drive]], *names: str, start: float = 1.1, **options: float) -> RoadFit:
+def found(car: Vehicle, roads: list[list[RoadDrive]], *names: str, start: float = 1.1, **options: float) -> RoadFit:
     return fit_roads(response(car, *names, start=start), roads, Options(**{"probes": 6, "last_probes": 6, **options}))
 
 

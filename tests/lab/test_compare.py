@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.api.lab.compare import comparison_json, conclusion, evidence, headline, next_step
-from logger.lab.compare import Comparison, compare
+from logger.lab.compare import LabComparison, compare
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -21,7 +21,7 @@ NOISE_MPS2 = 0.015
 FRICTION = ("dry_friction", {"friction_force_n": 80.0})
 
 
-def compared(nominal: Vehicle, effects: list[tuple[str, dict[str, float]]], seed: int = 5) -> Comparison:
+def compared(nominal: Vehicle, effects: list[tuple[str, dict[str, float]]], seed: int = 5) -> LabComparison:
     return compare(runs_of(beside_with(recorded_by(effects, NOISE_MPS2), seed, lasts_s=24.0)), nominal)
 
 
@@ -32,17 +32,17 @@ def off_by(share: float) -> Vehicle:
 
 
 @pytest.fixture(scope="module")
-def mistaken() -> Comparison:
+def mistaken() -> LabComparison:
     return compared(off_by(0.04), [])
 
 
 @pytest.fixture(scope="module")
-def lacking() -> Comparison:
+def lacking() -> LabComparison:
     return compared(CAR, [FRICTION])
 
 
 @pytest.mark.slow
-def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
+def test_small_mistakes_are_not_physics(mistaken: LabComparison) -> None:
     """Everything that is left after the refit is the noise, and nothing is said to be missing."""
     measured = np.concatenate(mistaken.plain.residuals.measured)
     floor = NOISE_MPS2 / float(np.sqrt(np.mean(measured**2)))
@@ -55,7 +55,7 @@ def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     assert "The model lacks nothing" in conclusion(mistaken) and next_step(mistaken).startswith("Next: nothing.")
 
 
-def test_missing_friction_is_physics(lacking: Comparison) -> None:
+def test_missing_friction_is_physics(lacking: LabComparison) -> None:
     assert lacking.missing
     names = [test.name for test in lacking.tests.found]
     assert "force by rate" in names and "direction" not in names
@@ -72,7 +72,7 @@ def test_the_effect_in_the_model_leaves_noise() -> None:
     assert found.moves["dry_friction.friction_force_n"] == pytest.approx(0.0, abs=0.1)
 
 
-def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Comparison) -> None:
+def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: LabComparison) -> None:
     residuals = lacking.plain.residuals
     residual = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
                            zip(residuals.runs, residuals.predictions, strict=True)])
@@ -82,7 +82,7 @@ def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Compar
     assert sum(run["samples"] for run in reported["runs"]) == len(residual)
 
 
-def test_json_has_what_the_format_names(lacking: Comparison) -> None:
+def test_json_has_what_the_format_names(lacking: LabComparison) -> None:
     reported = json.loads(json.dumps(comparison_json(lacking), allow_nan=False))
     assert {"error", "runs", "where", "evidence", "refitted", "residual_tests"} <= reported.keys()
     assert {"run", "error", "samples"} <= reported["runs"][0].keys()

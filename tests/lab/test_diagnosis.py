@@ -11,7 +11,7 @@ import pytest
 from logger.lab.diagnosis import (
     ALREADY_PRESENT,
     LAID_BY_THE_ROAD,
-    Diagnosis,
+    LabDiagnosis,
     diagnose,
     obstacles_of,
 )
@@ -31,7 +31,7 @@ SPRINGS = ("front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_pe
 
 
 def diagnosed(runs: SimulatedRuns, names: Sequence[str] = FEW, present: Sequence[Chosen] = (),
-              tolerance: Tolerance | None = None) -> Diagnosis:
+              tolerance: Tolerance | None = None) -> LabDiagnosis:
     return diagnose(posterior_of(runs, tolerance=tolerance), {name: EFFECTS[name] for name in names}, present)
 
 
@@ -41,11 +41,11 @@ def flawless() -> SimulatedRuns:
 
 
 @pytest.fixture(scope="module")
-def offset() -> Diagnosis:
+def offset() -> LabDiagnosis:
     return diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)]), (*FEW, "roll"))
 
 
-def nothing_is_missing(found: Diagnosis) -> bool:
+def nothing_is_missing(found: LabDiagnosis) -> bool:
     return not found.verdict and not found.unexplained and found.shape is None
 
 
@@ -100,7 +100,7 @@ def test_a_file_that_is_off_by_a_fifth_lacks_no_physics(seed: int) -> None:
 # --- what lacks some ---
 
 
-def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: Diagnosis) -> None:
+def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: LabDiagnosis) -> None:
     assert offset.verdict == ("sensor_offset",) and not offset.unexplained
     (one,) = offset.missing
     error = one.standard_errors["offset_m"]
@@ -111,7 +111,7 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: Diagnosis)
     assert best.confused_with == ()
 
 
-def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
+def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: LabDiagnosis) -> None:
     words = [step.words for step in offset.steps]
     assert words == ["the vehicle as its file says", "its parameters refitted", "with sensor_offset"]
     before, refitted, after = (step.error for step in offset.steps)
@@ -122,7 +122,7 @@ def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
 
 
 def test_others_are_candidates_where_they_are_better_than_the_refit_the_least_probable_by_chance_first(
-        offset: Diagnosis) -> None:
+        offset: LabDiagnosis) -> None:
     best, *others = offset.candidates
     assert {*(one.effect.name for one in others), *offset.no_better} == {*FEW} - {"sensor_offset"}
     assert [one.p_value for one in others] == sorted(one.p_value for one in others)
@@ -175,7 +175,7 @@ def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named(
     assert min(one.p_value for one in found.candidates) < FALSE_ALARM  # more than noise, and yet nothing
 
 
-def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: Diagnosis) -> None:
+def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: LabDiagnosis) -> None:
     why = {name: EFFECTS[name].obstacle_on(CAR, False, False, False) for name in (
         "roll", "constant_force", "force_limit")}
     assert all(why.values())

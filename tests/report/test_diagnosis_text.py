@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from logger.api.lab.diagnose import diagnosis_json, diagnosis_summary, looks_like, table, untested
-from logger.lab.diagnosis import ALREADY_PRESENT, Candidate, Diagnosis
-from logger.lab.likelihood.noise_floor import Noise
+from logger.lab.diagnosis import ALREADY_PRESENT, CandidateEffect, LabDiagnosis
+from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence
 from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
-from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, Step
+from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, ErrorStep
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -26,23 +26,23 @@ from ..support.lab.runs_with_residual import beside_with
 EFFECTS = shipped_effects()
 
 
-def candidate(name: str, p_value: float, gain: float, **values: float) -> Candidate:
-    return Candidate(EFFECTS[name], EFFECTS[name].usual | values, 0.2, p_value, gain, gain - 4.0, ())
+def candidate(name: str, p_value: float, gain: float, **values: float) -> CandidateEffect:
+    return CandidateEffect(EFFECTS[name], EFFECTS[name].usual | values, 0.2, p_value, gain, gain - 4.0, ())
 
 
 OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
 AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.151)
-NOTHING = Diagnosis(
-    runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=Noise(0.05, 0.001),
+NOTHING = LabDiagnosis(
+    runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=NoiseLevel(0.05, 0.001),
     noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, beyond={}, in_conflict=False,
-    steps=(Step(AS_FILED, 0.31), Step(REFITTED, 0.152)), effects=(),
+    steps=(ErrorStep(AS_FILED, 0.31), ErrorStep(REFITTED, 0.152)), effects=(),
     undetectable=(), shape=None, removed=AS_USUAL)
 FRICTION = candidate("dry_friction", 1e-12, 500.0, friction_force_n=84.7)
 FOUND = replace(
     NOTHING, candidates=(FRICTION, *OTHERS), verdict=("dry_friction",),
     effects=(chosen(EFFECTS["dry_friction"], FRICTION.values, standard_errors={
         "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")}),),
-    steps=(NOTHING.steps[0], Step(REFITTED, 0.25), Step("with dry_friction", 0.153)))
+    steps=(NOTHING.steps[0], ErrorStep(REFITTED, 0.25), ErrorStep("with dry_friction", 0.153)))
 
 
 @pytest.fixture(scope="module")
@@ -170,7 +170,7 @@ def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> Non
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:
-    steps = (*FOUND.steps[:2], Step("with tire_damping", 0.2), *FOUND.steps[2:])
+    steps = (*FOUND.steps[:2], ErrorStep("with tire_damping", 0.2), *FOUND.steps[2:])
     assert diagnosis_summary(replace(FOUND, steps=steps))[-1] == (
         "Tried and dropped: tire_damping (the others explain the same).")
     assert not any("dropped" in one for one in diagnosis_summary(FOUND))

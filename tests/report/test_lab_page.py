@@ -9,13 +9,13 @@ from html.parser import HTMLParser
 import pytest
 
 from logger.api.lab.compare import evidence, headline, page
-from logger.lab.compare import Comparison, compare
+from logger.lab.compare import LabComparison, compare
 
 from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs_of
 
 
 @pytest.fixture(scope="module")
-def found() -> Comparison:
+def found() -> LabComparison:
     residuals = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": 1.6})], 0.02), lasts_s=14.0)
     return compare(runs_of(residuals), replace(CAR, name="<b>mine</b> & yours"))
 
@@ -44,7 +44,7 @@ class _Seen(HTMLParser):
         self.text += data
 
 
-def test_the_page_is_whole_and_alone(found: Comparison) -> None:
+def test_the_page_is_whole_and_alone(found: LabComparison) -> None:
     seen = _Seen()
     seen.feed(page(found))
     assert not seen.open
@@ -55,7 +55,7 @@ def test_the_page_is_whole_and_alone(found: Comparison) -> None:
         assert sentence in seen.text
 
 
-def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -> None:
+def test_pictures_hold_finite_numbers_and_what_they_promise(found: LabComparison) -> None:
     html = page(found)
     assert not re.search(r"\b(nan|inf)\b", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html)
@@ -66,7 +66,7 @@ def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -
     assert drawn and all(len(one.split()) >= 2 for one in drawn)
 
 
-def test_no_column_of_a_table_is_empty(found: Comparison) -> None:
+def test_no_column_of_a_table_is_empty(found: LabComparison) -> None:
     """Bands are given before and after the refit, though it moves their ends."""
     html = page(found)
     bands, speeds, amplitudes = (html.split(f"<h2>{title}</h2>")[1].split("</table>")[0] for title in

@@ -15,7 +15,7 @@ import pytest
 
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
-from logger.report.maps import MapWay
+from logger.report.maps import MapLine
 from logger.report.page import page
 from logger.report.summary import summarise
 from logger.store.log.log_reader import LoggedFile
@@ -302,8 +302,8 @@ def test_one_window_and_windows_that_know_little_are_drawn(open_page: Open, chan
 
 
 def test_roads_are_drawn_beneath_and_those_far_away_are_not_in_the_page(open_page: Open) -> None:
-    near = MapWay("", np.array([46.5, 46.52]), np.array([6.499, 6.499]))
-    far = MapWay("", np.array([40.0, 40.1]), np.array([6.5, 6.5]))
+    near = MapLine("", np.array([46.5, 46.52]), np.array([6.499, 6.499]))
+    far = MapLine("", np.array([40.0, 40.1]), np.array([6.5, 6.5]))
     tab = open_page(rows_of_drive(200), base=[near, far], base_name="roads.geojson")
     assert json.loads(tab.text_content("#data"))["base"]["count"] == 2
     assert coloured(tab, "#map", (217, 222, 227)) > 200

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from logger.report.maps import MapWay, ways_map
+from logger.report.maps import MapLine, ways_map
 
 
 def test_north_is_up_and_a_metre_is_as_long_in_both_directions() -> None:
@@ -15,7 +15,7 @@ def test_north_is_up_and_a_metre_is_as_long_in_both_directions() -> None:
     side_deg = 100 / (60 * 1852)
     lat = 60.0 + side_deg * np.array([0, 1, 1, 0])
     lon = 10.0 + side_deg / np.cos(np.radians(60)) * np.array([0, 0, 1, 1])
-    drawn = ways_map([MapWay("<line>", lat, lon)], [MapWay("a & b", lat, lon), MapWay("other", lat[:1], lon[:1])])
+    drawn = ways_map([MapLine("<line>", lat, lon)], [MapLine("a & b", lat, lon), MapLine("other", lat[:1], lon[:1])])
     dots = [(float(x), float(y)) for x, y in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="2.4"', drawn)]
     assert len(dots) == 5
     (x0, y0), (x1, y1), (x2, y2), *_ = dots

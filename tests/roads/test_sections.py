@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import ridelog
 from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.sections import WindowErrors, Windows, even_edges, federal_condition, sections
+from logger.roads.sections import SectionWindows, WindowErrors, even_edges, federal_condition, sections
 
 NAN = float("nan")
 
 
 @st.composite
-def ways(draw: st.DrawFn) -> tuple[Windows, np.ndarray]:
+def ways(draw: st.DrawFn) -> tuple[SectionWindows, np.ndarray]:
     """Windows with gaps between them, some without values, and limits at any place: all in centimetres, so that a grid
     of them is exact."""
     lengths = draw(st.lists(st.integers(50, 900), min_size=1, max_size=12))
@@ -26,13 +26,13 @@ def ways(draw: st.DrawFn) -> tuple[Windows, np.ndarray]:
     std = np.where(np.isfinite(iri), 0.1 + 0.1 * np.nan_to_num(iri), NAN)
     cuts = sorted(draw(st.sets(st.integers(0, int(ends[-1]) + 300), min_size=2, max_size=6)))
     errors = WindowErrors(std, *np.zeros((3, len(std))))
-    windows = Windows((ends - lengths) / 100, ends / 100, np.array(lengths) / 1000, iri, errors, square)
+    windows = SectionWindows((ends - lengths) / 100, ends / 100, np.array(lengths) / 1000, iri, errors, square)
     return windows, np.array(cuts) / 100
 
 
 @given(ways())
 @settings(max_examples=60, deadline=None)
-def test_sums_over_a_grid_of_a_centimetre_agree(way: tuple[Windows, np.ndarray]) -> None:
+def test_sums_over_a_grid_of_a_centimetre_agree(way: tuple[SectionWindows, np.ndarray]) -> None:
     windows, edges_m = way
     found = sections(windows, edges_m)
     grid_m = np.arange(0.005, max(edges_m[-1], windows.end_m[-1]), 0.01)
@@ -66,8 +66,8 @@ def test_the_iri_of_a_section_is_the_exact_one() -> None:
     slope = rectified_slope(road.elevation_m, road.spacing_m)
     edges_m = 7.62 * np.arange(52)
     iri = window_iri(slope, road.spacing_m, edges_m)
-    windows = Windows(edges_m[:-1], edges_m[1:], np.ones(51), iri, WindowErrors(np.full(51, 0.3), *np.zeros((3, 51))),
-                      np.ones(51))
+    windows = SectionWindows(edges_m[:-1], edges_m[1:], np.ones(51), iri,
+                             WindowErrors(np.full(51, 0.3), *np.zeros((3, 51))), np.ones(51))
     limits_m = even_edges(300.0, 100.0)
     assert sections(windows, limits_m).iri_m_per_km == pytest.approx(window_iri(slope, 0.05, limits_m), rel=0.02)
     whole = np.array([0.0, edges_m[-1]])

@@ -8,7 +8,7 @@ import pytest
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope
 from logger.roads.repeated_drives import passes_of
-from logger.roads.sections import ALONG_M, WindowErrors, Windows, even_edges, sections
+from logger.roads.sections import ALONG_M, SectionWindows, WindowErrors, even_edges, sections
 
 WINDOW_M, COUNT, PARTS = 7.5, 120, 15  # of half a metre
 OWN, LEVEL, COMMON, PLACE = (np.linspace(*ends, COUNT) for ends in ((0.3, 0.7), (0.5, 0.2), (0.1, 0.1), (0.4, 0.6)))
@@ -35,7 +35,7 @@ def drawn_errors(count: int) -> np.ndarray:
 def test_errors_of_sections_are_those_of_drawn_errors(length_m: float) -> None:
     per_section = round(2 * length_m)
     drawn = drawn_errors(4000).reshape(4000, -1, per_section).mean(axis=2)
-    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, ERRORS, NOTHING + 1)
+    windows = SectionWindows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, ERRORS, NOTHING + 1)
     found = sections(windows, even_edges(EDGES_M[-1], length_m)).iri_std_m_per_km
     assert found == pytest.approx(drawn.std(axis=0), rel=0.06)
 
@@ -44,7 +44,7 @@ def test_a_row_with_holes_has_the_ends_of_its_parts() -> None:
     only_place = WindowErrors(NOTHING + 0.5, NOTHING, NOTHING, NOTHING + 0.5)
     iri = NOTHING + 3
     iri[40:50] = np.nan
-    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, iri, only_place, NOTHING + 1)
+    windows = SectionWindows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, iri, only_place, NOTHING + 1)
     whole = sections(windows, EDGES_M[[0, -1]]).iri_std_m_per_km
     assert whole == pytest.approx(np.sqrt(2) * 0.5 / (COUNT - 10))
 
@@ -53,8 +53,8 @@ def test_a_window_that_is_cut_may_be_rougher_on_one_side() -> None:
     """Means over half metres that are drawn alike, and windows that are known exactly."""
     rough = 3 + np.random.default_rng(6).standard_normal(COUNT * PARTS)
     exact = WindowErrors(NOTHING, NOTHING, NOTHING, NOTHING)
-    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, rough.reshape(COUNT, PARTS).mean(axis=1), exact,
-                      NOTHING + 1)
+    windows = SectionWindows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, rough.reshape(COUNT, PARTS).mean(axis=1), exact,
+                             NOTHING + 1)
     edges_m = even_edges(EDGES_M[-1], 10.0)[:-1]
     found = sections(windows, edges_m)
     true = rough[:(len(edges_m) - 1) * 20].reshape(-1, 20).mean(axis=1)
@@ -70,7 +70,7 @@ def test_a_piece_of_a_window_has_the_error_of_the_window(part: int) -> None:
     parts = 0.5 * np.eye(3, 4)[:, [part % 4]]  # none of the three, where the error is the window's own
     errors = WindowErrors(np.array([0.5]), *(parts if part < 4 else np.full((3, 1), np.nan)))
     for piece_m in (WINDOW_M, WINDOW_M / 2, 0.1, 1e-6):
-        windows = Windows(np.zeros(1), np.array([WINDOW_M]), np.ones(1), np.array([3.0]), errors, np.ones(1))
+        windows = SectionWindows(np.zeros(1), np.array([WINDOW_M]), np.ones(1), np.array([3.0]), errors, np.ones(1))
         assert sections(windows, np.array([0.0, piece_m])).iri_std_m_per_km == pytest.approx(0.5)
 
 
@@ -82,7 +82,8 @@ def test_a_piece_of_a_road_differs_from_its_window_by_its_standard_error(piece_m
         slope = rectified_slope(iso8608.generate(iso8608.gd_n0_from_iri(3.0), 2000, spacing_m, seed), spacing_m)
         slope = slope[1000:1000 + 240 * 150].reshape(240, 150)
         iri, nothing, start_m = slope.mean(axis=1), np.zeros(240), WINDOW_M * np.arange(240)
-        windows = Windows(start_m, start_m + WINDOW_M, nothing + 1, iri, WindowErrors(*[nothing] * 4), nothing + 1)
+        windows = SectionWindows(start_m, start_m + WINDOW_M, nothing + 1, iri, WindowErrors(*[nothing] * 4),
+                                 nothing + 1)
         found = sections(windows, np.sort(np.append(start_m, start_m + piece_m)))
         true = slope[:, :round(piece_m / spacing_m)].mean(axis=1)
         off.append((iri - true) / found.iri_std_m_per_km[::2])
@@ -94,7 +95,7 @@ def test_a_sliver_by_rounding_is_no_cell_and_no_part_of_a_section() -> None:
     one = WindowErrors.undivided(np.ones(2))
     passes = passes_of(np.zeros(2, np.intp), start_m, end_m, np.zeros(2, np.intp), np.zeros(2), np.ones(2), one, 25.0)
     assert passes.known_m == pytest.approx([25.0, 25.0])
-    found = sections(Windows(start_m, end_m, np.ones(2), np.ones(2), one, np.ones(2)), 25.0 * np.arange(5))
+    found = sections(SectionWindows(start_m, end_m, np.ones(2), np.ones(2), one, np.ones(2)), 25.0 * np.arange(5))
     assert np.isfinite(found.iri_m_per_km).tolist() == [False, True, True, False]
 
 
@@ -114,7 +115,7 @@ def test_parts_may_exceed_the_whole_by_what_was_rounded() -> None:
 
 def test_errors_of_which_the_whole_alone_is_known_count_as_shared_by_neighbours() -> None:
     old = WindowErrors.undivided(NOTHING + 0.5)
-    windows = Windows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, old, NOTHING + 1)
+    windows = SectionWindows(EDGES_M[:-1], EDGES_M[1:], NOTHING + 1, NOTHING + 3, old, NOTHING + 1)
     two = sections(windows, EDGES_M[[0, 2]]).iri_std_m_per_km
     assert two == pytest.approx(0.5 * np.sqrt((1 + np.exp(-WINDOW_M / ALONG_M)) / 2))
 

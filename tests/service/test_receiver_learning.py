@@ -12,7 +12,7 @@ from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, open_dump
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
-from logger.estimation.receiver_delay import Belief, DelayEstimate
+from logger.estimation.receiver_delay import CarriedDelay, DelayEstimate
 from logger.service import wiring
 from logger.service.config import Config, GpsConfig
 from logger.service.learning import DELAY, SAVE_EVERY_US, UNKNOWN, ReceiverLearning, delay_at_start, read_delay
@@ -74,7 +74,7 @@ def test_a_delay_of_about_nothing_is_read_back(tmp_path: Path) -> None:
 
 
 def test_a_number_in_the_settings_counts_and_has_no_error() -> None:
-    assert delay_at_start(SET, Belief(0.1, 0.01, 4)) == Belief(0.25, 0.0)
+    assert delay_at_start(SET, CarriedDelay(0.1, 0.01, 4)) == CarriedDelay(0.25, 0.0)
 
 
 def test_it_is_saved_now_and_then(tmp_path: Path) -> None:
@@ -120,10 +120,10 @@ def test_a_disk_that_refuses_is_tried_again(tmp_path: Path) -> None:
 
 
 def test_a_recording_carries_what_its_drive_went_by() -> None:
-    known = Belief(0.17, 0.02, 3)
+    known = CarriedDelay(0.17, 0.02, 3)
     header = wiring.dump_header(Config(), known)
     assert wiring.receiver_for_dump(header, Config()) == known
-    assert wiring.receiver_for_dump(header, replace(Config(), gps=SET)) == Belief(0.25, 0.0)
+    assert wiring.receiver_for_dump(header, replace(Config(), gps=SET)) == CarriedDelay(0.25, 0.0)
     old = replace(header, gps={"baud": 9600})
     assert wiring.receiver_for_dump(old, Config()) == UNKNOWN
 
@@ -141,7 +141,7 @@ def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> No
     with open_dump(short_dump) as reader:
         header, events = reader.header, list(reader)[:6000]
     header = replace(header, accelerometer={**header.accelerometer, "noise": {"noise_mps2": "auto"}})
-    learnt = replace(header, gps={**header.gps, **DELAY.fields(Belief(0.25, 0.0, 3))})
+    learnt = replace(header, gps={**header.gps, **DELAY.fields(CarriedDelay(0.25, 0.0, 3))})
     rows = rows_of(learnt, events).rows
     assert rows == rows_of(header, events, config_of(header, SET)).rows
     assert rows != rows_of(header, events).rows
@@ -150,14 +150,14 @@ def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> No
 def test_a_sidecar_says_what_its_rows_went_by() -> None:
     config = Config()
     car = read_model(vehicle_file("rav4-2009"))
-    known = Belief(0.17, 0.02, 3)
+    known = CarriedDelay(0.17, 0.02, 3)
     facts = wiring.sidecar(config, wiring.instrument(config.accelerometer), car, known)
     assert DELAY.from_fields(facts["receiver"]) == known
     assert facts["receiver"] == DELAY.fields(known)
 
 
 def test_status_says_it_in_words(tmp_path: Path) -> None:
-    learnt = Belief(0.14, 0.02, 2)
+    learnt = CarriedDelay(0.14, 0.02, 2)
     words = ReceiverLearning(tmp_path, NOTHING, learnt, learnt).words()
     assert words == "0.14 ± 0.02 s, learnt over 2 drives"
     assert ReceiverLearning(tmp_path, FOUND, learnt, learnt).words().endswith("learnt over 3 drives")

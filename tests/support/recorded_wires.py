@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Protocol, Self
 
-from drivers.played_bus import PlayedBus, RecordedChip, Recording, os_error
+from drivers.played_bus import PlayedBus, PlayedRecording, RecordedChip, os_error
 from drivers.readings import US_PER_S, Event
 
 
@@ -107,7 +107,7 @@ class RecordedBus(PlayedBus):
     chip: FailingChip
 
     def __init__(self, chip: FailingChip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
-                 address: int = 0x0A, recording: Recording | None = None) -> None:
+                 address: int = 0x0A, recording: PlayedRecording | None = None) -> None:
         super().__init__(chip, recording, address)
         self._cues = _Cues(cues, BUS_FAULTS, now_us)
         self._failing: list[int] = []
@@ -120,7 +120,7 @@ class RecordedBus(PlayedBus):
                 first_us: int | None = None) -> Self:
         """A bus on which ``events`` (of this sensor only) happen from now on, the first at once unless ``first_us``
         names another start on the recording's scale."""
-        recording = Recording(events, now_us, first_us)
+        recording = PlayedRecording(events, now_us, first_us)
         return cls(chip, cues, recording.now_us, recording=recording)
 
     def load(self, data: bytes) -> None:
@@ -179,7 +179,7 @@ class RecordedPort:
         self.written = bytearray()
         self._cues = _Cues(cues, PORT_FAULTS, now_us)
         self._waiting = bytearray()
-        self._recording: Recording | None = None
+        self._recording: PlayedRecording | None = None
         self._sleep: Callable[[float], None] | None = None
         self._unplugged = False
         self._gone = False
@@ -198,7 +198,7 @@ class RecordedPort:
     ) -> Self:
         """A port on which ``events`` (of this port only) happen from now on, the first at once unless ``first_us``
         names another start on the recording's scale. ``sleep`` takes seconds."""
-        recording = Recording(events, now_us, first_us)
+        recording = PlayedRecording(events, now_us, first_us)
         port = cls(cues, recording.now_us)
         port._recording = recording
         port._sleep = sleep

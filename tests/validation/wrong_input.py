@@ -28,7 +28,7 @@ from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats.drive_file import read_run
-from logger.store.formats.vehicle_file import Model, read_model
+from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.compose import compose
 
@@ -71,7 +71,7 @@ def main() -> int:
     passed: Counter[str] = Counter()
     refused: Counter[str] = Counter()
     others: Track | None = None
-    cars: dict[bool, Model] = {}
+    cars: dict[bool, CarModel] = {}
     for number, seed in enumerate(seeds(first_seed(options), options.cases, options.release)):
         kind = KINDS[number % len(KINDS)]
         runs, model = made(kind, seed)
@@ -92,12 +92,12 @@ def main() -> int:
     return max(list(_reported(refused, passed)))
 
 
-def says_little(runs: list[Run], model: Model) -> bool:
+def says_little(runs: list[Run], model: CarModel) -> bool:
     """Whether a model explains less than a third of the power of what was measured."""
     return normalised_rms_error(runs, SimulatedRuns(runs).predict(compose(model.vehicle, model.effects))) > POOR_ERROR
 
 
-def made(kind: str, seed: int) -> tuple[list[Run], Model]:
+def made(kind: str, seed: int) -> tuple[list[Run], CarModel]:
     """Runs and the vehicle of a case, as the lab reads them."""
     with tempfile.TemporaryDirectory() as name:
         write_case(case(kind, seed), Path(name))
@@ -105,7 +105,7 @@ def made(kind: str, seed: int) -> tuple[list[Run], Model]:
         return list(checked_runs(list(map(read_run, folders))).runs), read_model(Path(name) / "vehicle.yaml")
 
 
-def refusal(runs: list[Run], model: Model) -> str | None:
+def refusal(runs: list[Run], model: CarModel) -> str | None:
     """Why a model and runs are refused; None: they are not."""
     try:
         check_model("vehicle.yaml", model, SimulatedRuns(runs), silent, known_effects(model, ())[0],

@@ -16,7 +16,7 @@ from logger.api.lab.bench import among, known_effects, sought_effects
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import own_effect, shipped_effects
-from logger.store.formats.vehicle_file import Model, read_vehicle
+from logger.store.formats.vehicle_file import CarModel, read_vehicle
 from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
@@ -413,7 +413,7 @@ def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
 
 
 def test_which_a_search_tries_unasked() -> None:
-    model = Model(RIG, ())
+    model = CarModel(RIG, ())
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_limit", "frame_damping", "frame_friction", "orifice_damping", "play"}

@@ -219,7 +219,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
         tuple(doubts(fit, *checks)))
 
 
-def _with_unknown_numbers(given: vehicle_file.Model, word: str, records: Sequence[Record],
+def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
                           question: IdentifyQuestion) -> IdentifyQuestion:
     """The question with those numbers free as well that the vehicle's file calls unknown, where a force was measured;
     without one they may not be found together, and it is said that they are held."""
@@ -250,7 +250,7 @@ def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
     return runs_left_out([replace(one, skip_s=0.0) for one in records])
 
 
-def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Record],
+def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
                    question: IdentifyQuestion) -> None:
     """Raise BadInput for an effect that cannot be there on these roads, or one that is to be found and is not there."""
     from logger.store.formats.effect_file import check_on, shipped_effects
@@ -302,7 +302,7 @@ def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
     return RoadInput(**found), [name for name, one in (question.obstacles or {}).items() if "start_m" not in one]
 
 
-def _drive_model(given: vehicle_file.Model, records: list[Record], road: RoadInput, unplaced: list[str],
+def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: RoadInput, unplaced: list[str],
                  question: IdentifyQuestion) -> DriveModel:
     from logger.identification.session import drive_model, obstacle_starts
 
@@ -318,7 +318,7 @@ def _drive_model(given: vehicle_file.Model, records: list[Record], road: RoadInp
         raise question.wrong("free", f": {error}") from None
 
 
-def _free(given: vehicle_file.Model, road: RoadInput, found: Mapping[str, float], runs: int,
+def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, float], runs: int,
           question: IdentifyQuestion) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
@@ -345,7 +345,7 @@ def _free(given: vehicle_file.Model, road: RoadInput, found: Mapping[str, float]
         raise question.wrong("free", f": {error}") from None
 
 
-def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: float | None,
+def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start: float | None,
                  between: tuple[float, float] | None) -> Free:
     """A number of the road, of an effect or of the car. ValueError for one that none of them has."""
     from logger.identification.unknown_inputs import free_input, is_input
@@ -367,7 +367,7 @@ def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
     return fit_options(model, question.noise, low_pass_hz, question.tries)
 
 
-def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_file.Model:
+def _fitted(given: vehicle_file.CarModel, model: DriveModel, fit: Fit) -> vehicle_file.CarModel:
     """The model with the numbers that were found and their standard errors, those of its effects with them too."""
     values = np.array(list(fit.parameters.values()))
     effects = []
@@ -415,8 +415,9 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     one_road = question.road == SAME
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
-    model = vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))), errors=_road_fit_errors(fit),
-                               given=given.given or given.vehicle, known=given.known)
+    fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
+    model = vehicle_file.CarModel(fitted, errors=_road_fit_errors(fit),
+                                  given=given.given or given.vehicle, known=given.known)
     text = [_head(given, len(parameters), records, f"; over {where}", ","), *unmeasured_lines(fit, parameters),
             *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
@@ -449,7 +450,7 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
                     place_off_m=_PLACES_OFF_M, scale_off=_SCALE_OFF), replace(question, free=names))
 
 
-def _head(given: vehicle_file.Model, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
+def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
     vehicle, runs = given.vehicle, "1 run" if len(records) == 1 else f"{len(records)} runs"
     begun = (f"the first {records[0].skip_s:g} s of a run left out" if records[0].skip_s else
              "nothing drives it: the state that a run begins in is found with the rest")

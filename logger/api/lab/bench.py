@@ -23,8 +23,8 @@ from logger.api.lab.question import LabQuestion
 from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, WrongOption, each, silent
 from logger.api.vehicles import model_of
 from logger.errors import BadInput
-from logger.lab.compare import Comparison, compare
-from logger.lab.diagnosis import Diagnosis, diagnose, refit
+from logger.lab.compare import LabComparison, compare
+from logger.lab.diagnosis import LabDiagnosis, diagnose, refit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import with_pass_bands
@@ -37,7 +37,7 @@ from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
-from logger.store.formats.vehicle_file import Model, Step
+from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
 from logger.vehicle.uncertain import Known, Scales, sized
@@ -57,7 +57,7 @@ class Bench:
     """
 
     word: str
-    model: Model
+    model: CarModel
     runs: SimulatedRuns
     effects: Mapping[str, Effect]
     files: Mapping[str, str]
@@ -102,12 +102,12 @@ class Bench:
         """Whether forces drive all runs."""
         return all(run.pushed for run in self.runs.runs)
 
-    def compared(self) -> Comparison:
+    def compared(self) -> LabComparison:
         """The model against the runs. BadInput when the vehicle lacks what it needs."""
         with self.blamed():
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given, self.tolerance)
 
-    def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> Diagnosis:
+    def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> LabDiagnosis:
         """Which effects the model lacks, without some that are left out. Where the runs contradict what is known of the
         car's numbers and nothing explains that, nothing is taken to be known of them. BadInput as ``compared``."""
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
@@ -168,18 +168,18 @@ class Bench:
         with self.blamed():
             return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 
-    def model_with(self, found: AddedEffects) -> Model:
+    def model_with(self, found: AddedEffects) -> CarModel:
         """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
         fit ended at numbers that no car has."""
         for one in found.effects:
             check_on(found.vehicle, one, two_tracks=True)
         history = self.model.history
         if not history:
-            history = (Step("as it was given", found.error_before, found.noise_floor_error),
-                       Step("parameters refitted", found.error_refitted, found.noise_floor_error))
-        step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
-        return Model(found.vehicle, found.effects, (*history, step),
-                     self.model.given or self.model.vehicle, found.errors, self.model.known)
+            history = (ModelStep("as it was given", found.error_before, found.noise_floor_error),
+                       ModelStep("parameters refitted", found.error_refitted, found.noise_floor_error))
+        step = ModelStep(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
+        return CarModel(found.vehicle, found.effects, (*history, step),
+                        self.model.given or self.model.vehicle, found.errors, self.model.known)
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -190,7 +190,7 @@ class Bench:
             raise BadInput(f"{self.word}: {error}") from None
 
 
-def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str],
+def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequence[str],
              tolerance: Tolerance, searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
@@ -214,7 +214,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
 
-def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str],
+def planned_bench(word: str, model: CarModel, drives: Sequence[Run], effect_files: Sequence[str],
                   tolerance: Tolerance) -> Bench:
     """The model on drives that nobody has driven yet, without readings. Arguments and BadInput as ``bench_of``, and for
     a road that moves no car."""
@@ -239,7 +239,7 @@ def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingP
     return Tolerance(numbers=float(said) / Tolerance.band, by_name=by_name)
 
 
-def _scales(word: str, model: Model, runs: SimulatedRuns) -> Scales | None:
+def _scales(word: str, model: CarModel, runs: SimulatedRuns) -> Scales | None:
     """How large forces and motions are on the bench that the runs are of; None where they are those of a car. BadInput
     as ``check_moves``."""
     if model.vehicle.model not in OWN_NAMES:
@@ -256,7 +256,7 @@ def _scales(word: str, model: Model, runs: SimulatedRuns) -> Scales | None:
     return Scales.of(float(max(forces_n)), travel_m, rate_mps)
 
 
-def known_effects(model: Model, files: Sequence[str], on_rig: bool = False, scales: Scales | None = None
+def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, scales: Scales | None = None
                   ) -> tuple[dict[str, Effect], dict[str, str]]:
     """The effects that a search tries, by name: those that it tries unasked, in the model's sizes, a model's own, and
     those of some more files; and the files of the user's own, by name. BadInput for a name that is there twice.
@@ -380,6 +380,6 @@ def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:
                                    track=run.track) for run in map(run_on_road, given) if run.track is not None]
 
 
-def word_of(vehicle: Model | Path | str, model: Model) -> str:
+def word_of(vehicle: CarModel | Path | str, model: CarModel) -> str:
     """By which the user knows a vehicle."""
     return str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from logger.runs import Array, Bools, Run, Signal
     from logger.simulation.virtual_drive import SimulatedRuns
     from logger.store.formats.drive_file import Drive, DriveOnRoad
-    from logger.store.formats.vehicle_file import Model
+    from logger.store.formats.vehicle_file import CarModel
     from logger.vehicle.compose import Car
     from logger.vehicle.effect import Chosen, Effect
     from logger.vehicle.vehicle import Vehicle
@@ -45,8 +45,8 @@ _NAMED = 4
 """Of the numbers of another car, so many are said."""
 
 
-def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], known: Mapping[str, Effect],
-                numbers: float, anyway: bool = False) -> list[Array]:
+def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None],
+                known: Mapping[str, Effect], numbers: float, anyway: bool = False) -> list[Array]:
     """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
     the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
     profile is in another unit, or the road or the car is another one, unless the user wants to go on ``anyway`` (then
@@ -67,7 +67,7 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     return predictions
 
 
-def check_moves(word: str, model: Model, runs: SimulatedRuns) -> list[Array]:
+def check_moves(word: str, model: CarModel, runs: SimulatedRuns) -> list[Array]:
     """What the model predicts (n,) per run, whatever was measured. Raises BadInput where an effect of the model cannot
     be on one of the runs, the model's motion grows without bound, or the road moves no car."""
     for run in runs.runs:
@@ -83,7 +83,7 @@ def check_moves(word: str, model: Model, runs: SimulatedRuns) -> list[Array]:
     return predictions
 
 
-def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
+def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
     """Raise BadInput where a run was driven over another road than that of its profile, as ``check_model``: all that
     can be asked where the vehicle's numbers may be far off."""
     from logger.vehicle.compose import compose
@@ -93,7 +93,7 @@ def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     _say(_other_roads(runs, followed, car), warn, anyway)
 
 
-def predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
+def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
     """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
     from logger.vehicle.compose import bounded, compose
 
@@ -222,7 +222,7 @@ def _is_coherent(run: Run, car: Car) -> bool:
     return chance < FALSE_ALARM  # of a run too short to tell it is NaN
 
 
-def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],
+def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array],
                  known: Mapping[str, Effect], numbers: float) -> Iterator[str]:
     """That the runs are of another car, which explains them as no effect does, and how it differs."""
     from logger.lab.another_car import another_car
@@ -240,7 +240,7 @@ def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequ
                + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
 
 
-def _explained_by_an_effect(found: AnotherCar, model: Model, known: Mapping[str, Effect], numbers: float) -> bool:
+def _explained_by_an_effect(found: AnotherCar, model: CarModel, known: Mapping[str, Effect], numbers: float) -> bool:
     """Whether an effect, in the model's car, explains as much as another car does."""
     from logger.lab.best_effect import error_with_best_effect
 

@@ -31,8 +31,7 @@ from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Chart, Curves, Line, line
 from logger.lab.another_car import POOR_ERROR
-from logger.lab.compare import Comparison as LabComparison
-from logger.lab.compare import Standing
+from logger.lab.compare import LabComparison, Standing
 from logger.lab.residual_tests.tests import ResidualTestResult
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments

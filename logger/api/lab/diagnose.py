@@ -37,7 +37,7 @@ from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
-from logger.lab.diagnosis import Diagnosis as LabDiagnosis
+from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable

@@ -19,14 +19,14 @@ from logger.api.question import Notify, function, silent
 from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
-from logger.lab.diagnosis import Diagnosis as LabDiagnosis
+from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.learn import Law, Learning
 from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
 from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects, add
-from logger.lab.selection.error_scale import JUDGED_ON, Step
+from logger.lab.selection.error_scale import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
 from logger.report.charts import chart
 from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
@@ -246,7 +246,7 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
 
 
 def _errors(addition: AddedEffects) -> str:
-    steps = (*addition.steps[:-1], Step("with the law", addition.error_after))
+    steps = (*addition.steps[:-1], ErrorStep("with the law", addition.error_after))
     return " ".join(error_words(steps, addition.noise_floor_error))
 
 

@@ -68,7 +68,7 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.maps import MapWay, ways_map
+from logger.report.maps import MapLine, ways_map
 from logger.report.quantities import columns, wrapped
 from logger.store.formats import vehicle_file as vehicle_format
 from logger.vehicle.effect import Chosen
@@ -198,13 +198,13 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
 
 
 def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,
-               learns: Learns = always) -> tuple[Story, vehicle_format.Model]:
+               learns: Learns = always) -> tuple[Story, vehicle_format.CarModel]:
     """The same without its end and its page."""
     word = given.word
     notify(chapter("Compare", explain("compare", "", word)))
     first = _compared(given, progress)
     notify(_comparison_lines(first))
-    diagnoses: list[diagnosis.Diagnosis] = []
+    diagnoses: list[diagnosis.LabDiagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
     law: LawSearch | None = None
@@ -298,12 +298,12 @@ def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
         return given.search_values(given.effects[name], {}, notify)
 
 
-def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:
+def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.LabDiagnosis:
     with progress() as notify:
         return given.diagnosed(notify, left_out)
 
 
-def _compared(given: Bench, progress: Progress) -> compare.Comparison:
+def _compared(given: Bench, progress: Progress) -> compare.LabComparison:
     with progress() as notify:
         notify("comparing")
         return given.compared()
@@ -314,7 +314,7 @@ def chapter(title: str, explained: str = "") -> list[str]:
     return ["", f"=== {title} ===", *([explained] if explained else []), ""]
 
 
-def _comparison_lines(found: compare.Comparison) -> list[str]:
+def _comparison_lines(found: compare.LabComparison) -> list[str]:
     return [wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- ")]
 
 
@@ -498,7 +498,7 @@ def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
             f"{beside['within_one']:.0%}", f"{beside['within_two']:.0%}")
 
 
-def field_page(title: str, about: Sequence[str], measured: Sequence[MapWay], driven: Sequence[MapWay], story: Story,
+def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], driven: Sequence[MapLine], story: Story,
          before: Assessment, after: Assessment, answer: Sequence[str]) -> Html:
     """The whole of it as one HTML document.
 

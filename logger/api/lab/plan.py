@@ -25,10 +25,9 @@ from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.lab.planning.outlook import ISOLABLE_SIGMA
-from logger.lab.planning.plan import NextDrive as LabNextDrive
-from logger.lab.planning.plan import Plan as LabPlan
+from logger.lab.planning.plan import LabNextDrive, LabPlan
 from logger.lab.planning.plan import plan as planned_by_lab
-from logger.lab.planning.planned_drive import Option, PlannedCar, SensorNoise, at_speed
+from logger.lab.planning.planned_drive import DriveOption, PlannedCar, SensorNoise, at_speed
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.report.document import (
@@ -99,7 +98,7 @@ def plan_by(question: PlanQuestion) -> Plan:
     model, bench = model_of(question.vehicle), None
     tolerance = tolerance_of(question.tolerance, model.known)
     road = None if question.profile is None else drive_file.track_of(
-        question.profile if isinstance(question.profile, profile_file.Profile) else read_profile(question.profile))
+        question.profile if isinstance(question.profile, profile_file.Wheelpaths) else read_profile(question.profile))
     if each(question.runs):
         bench = bench_with(question, "ridelog plan")
         if alone := next((run.name for run in bench.runs.runs if run.begins_freely), None):
@@ -133,7 +132,7 @@ def plan_of(found: LabPlan, vehicle: str) -> Plan:
                 summary["noise_mps2"])
 
 
-def _empty_drives(model: vehicle_file.Model, road: Track | None, question: PlanQuestion) -> list[Run]:
+def _empty_drives(model: vehicle_file.CarModel, road: Track | None, question: PlanQuestion) -> list[Run]:
     """The drives that are planned. WrongOption for one that is too short, or too long to be simulated."""
     name = str(question.profile) if isinstance(question.profile, Path | str) else "profile"
     found = []
@@ -226,7 +225,7 @@ def plan_lines(found: LabPlan) -> list[str]:
     return lines
 
 
-def do_words(option: Option) -> str:
+def do_words(option: DriveOption) -> str:
     """What is to be done."""
     words = (f"The same excitation again, {option.seconds:.0f} s" if option.speed_mps is None else
              f"{option.seconds:.0f} s over this road at {option.speed_mps:.3g} m/s")

@@ -27,7 +27,7 @@ from logger.api.question import (
 )
 
 if TYPE_CHECKING:
-    from logger.store.formats.profile_file import Profile
+    from logger.store.formats.profile_file import Wheelpaths
 
 
 PAGE = Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
@@ -207,7 +207,7 @@ class PlanQuestion(LabQuestion):
     runs: Annotated[Runs, Argument(
         "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)] = ()
     _: KW_ONLY
-    profile: Annotated[Union["Profile", Path, str, None], Option(
+    profile: Annotated[Union["Wheelpaths", Path, str, None], Option(
         "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
         read=Path)] = None
     speeds_mps: Annotated[Sequence[float], Option(

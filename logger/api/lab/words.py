@@ -16,7 +16,7 @@ from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift
 from logger.lab.residuals.unexplained import Shape, SpatialLine
-from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, Step, fit_percent, rising
+from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.charts import Steps, chart, steps_figure
 from logger.report.document import EMPTY, Html, grid, hint, section
@@ -164,7 +164,7 @@ def _alike(one: Drift, other: Drift) -> bool:
 _ERROR_WORDS = {AS_FILED: "as the vehicle's file says", REFITTED: "with its parameters refitted"}
 
 
-def error_words(steps: Sequence[Step], floor: float) -> list[str]:
+def error_words(steps: Sequence[ErrorStep], floor: float) -> list[str]:
     """The errors of each step and of the noise alone, and why one rises."""
     each = ", ".join(f"{error_and_fit(one.error)} {_ERROR_WORDS.get(one.words, one.words)}" for one in steps)
     lines = [f"NRMSE on {JUDGED_ON}: {each}. Noise floor: about {error_and_fit(floor)}."]
@@ -180,10 +180,10 @@ def error_and_fit(error: float) -> str:
     return f"{error:.3f} (fit {fit_percent(error):.1f} %)"
 
 
-def errors_json(steps: Sequence[Step], floor: float) -> dict[str, Any]:
+def errors_json(steps: Sequence[ErrorStep], floor: float) -> dict[str, Any]:
     """The same for a program."""
     return {"errors": [{"model": one.words, "error": one.error, "fit_percent": fit_percent(one.error)}
-                       for one in (*steps, Step("noise alone", floor))]}
+                       for one in (*steps, ErrorStep("noise alone", floor))]}
 
 
 def band_words(band: ComparedBand | None) -> list[str]:

@@ -42,9 +42,9 @@ from logger.identification.noise_models import RoadNoise
 from logger.identification.unknown_road.road_operator import (
     MOST_ROUNDS,
     Crossing,
-    Drive,
     DrivesModel,
     Preconditioner,
+    RoadDrive,
     best_placement,
     factored,
     grid_under,
@@ -146,7 +146,8 @@ _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
 class UnknownRoad:
     """One road and the drives over it: what they say of a car's numbers, the road's, their places and the noise."""
 
-    def __init__(self, car: ResponseCar, drives: list[Drive], options: Options, generator: np.random.Generator) -> None:
+    def __init__(self, car: ResponseCar, drives: list[RoadDrive], options: Options, generator: np.random.Generator
+                 ) -> None:
         self._car, self._options = car, options
         self._cars = [car] * len(drives)
         highest = max(_highest_cpm(drive) for drive in drives)
@@ -357,7 +358,7 @@ class UnknownRoad:
         return solve(model, readings, self.grid.count, self._options.solved, rounds, nearby)
 
 
-def _highest_cpm(drive: Drive) -> float:
+def _highest_cpm(drive: RoadDrive) -> float:
     pace_m = float(np.median(np.abs(np.diff(drive.distance_m))))
     return 0.45 / max(pace_m, 1e-3)
 
@@ -383,7 +384,7 @@ class Roads:
     ValueError unless there is a drive over every road.
     """
 
-    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options) -> None:
+    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[RoadDrive]], options: Options) -> None:
         if not roads or not all(roads):
             raise ValueError("expected a drive over every road")
         generator = np.random.default_rng(options.seed)

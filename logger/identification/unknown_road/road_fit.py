@@ -24,7 +24,7 @@ from logger.identification.unknown_road.marginal_likelihood import (
     RoadsScore,
     at_n0,
 )
-from logger.identification.unknown_road.road_operator import Drive, Grid
+from logger.identification.unknown_road.road_operator import Grid, RoadDrive
 from logger.vehicle.named_parameters import WEAKEST, Coordinates
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +80,7 @@ class RoadProblem:
     """All roads and a car, in coordinates (m,): logarithms of sizes, places in metres, other numbers over half their
     bounds' width; the car's numbers first, then those of ``Roads``."""
 
-    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options) -> None:
+    def __init__(self, car: ResponseCar, roads: Sequence[Sequence[RoadDrive]], options: Options) -> None:
         self.car, self.options, self.free = car, options, list(car.parameters)
         if not self.free:
             raise ValueError("expected at least one free number")
@@ -189,7 +189,7 @@ class RoadProblem:
         return np.append(self.coordinates.slopes(values), np.ones(len(numbers)))
 
 
-def fit_roads(car: ResponseCar, roads: Sequence[Sequence[Drive]], options: Options | None = None) -> RoadFit:
+def fit_roads(car: ResponseCar, roads: Sequence[Sequence[RoadDrive]], options: Options | None = None) -> RoadFit:
     """Fit a car's free numbers to drives, those over one road together.
 
     Raises NotIdentifiable when the drives cannot identify them, ValueError for no drive or no free number.

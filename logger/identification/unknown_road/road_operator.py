@@ -36,7 +36,7 @@ _MARGIN_M = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class RoadDrive:
     """One drive, evenly sampled: arrays (n,).
 
     rate_hz          samples a second
@@ -63,7 +63,7 @@ class Grid:
         return np.asarray(np.fft.rfftfreq(self.count, self.spacing_m))
 
 
-def grid_under(drives: list[Drive], behind_m: Array, spacing_m: float, most_off_m: float,
+def grid_under(drives: list[RoadDrive], behind_m: Array, spacing_m: float, most_off_m: float,
                scale_off: float = 0.0) -> Grid:
     """A grid that holds the way of all drives, from where they came to where they went on, were their places so much
     off and their distances longer by such a share."""
@@ -81,7 +81,7 @@ class Crossing:
     what is under the axles counts times the distance from the drive's middle, about which distances can be scaled.
     """
 
-    def __init__(self, drive: Drive, grid: Grid, behind_m: Array, contact_patch_m: float) -> None:
+    def __init__(self, drive: RoadDrive, grid: Grid, behind_m: Array, contact_patch_m: float) -> None:
         self.measured_mps2, self._grid, self._axles = drive.measured_mps2, grid, len(behind_m)
         way, lead = _way(drive)
         self._middle_m = 0.5 * float(drive.distance_m.min() + drive.distance_m.max())
@@ -185,7 +185,7 @@ def _level(readings: Array) -> Array:
     return np.asarray(readings - readings.mean(axis=1, keepdims=True))
 
 
-def _way(drive: Drive) -> tuple[Array, int]:
+def _way(drive: RoadDrive) -> tuple[Array, int]:
     """Distances of the drive with what came before and after it, and how many samples came before."""
     lead, tail = (int(seconds * drive.rate_hz) for seconds in (_SWELL_S + _APPROACH_S, _TAIL_S))
     way = drive.distance_m

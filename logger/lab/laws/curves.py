@@ -25,7 +25,7 @@ ends of its travel does most where it hardly ever is."""
 
 
 @dataclass(frozen=True)
-class Motion:
+class LawMotion:
     """A motion that a force may depend on.
 
     at         its short name, as drafts have it
@@ -49,12 +49,12 @@ class Motion:
         return f"{factor * size:g} {unit}"
 
 
-RATE = Motion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"),
-              "with_force(lambda travel_m, rate_mps: force_n(p, rate_mps))")
-TRAVEL = Motion("travel", "travel", "travel_m", "m", (1000.0, "mm"),
-                "with_spring(lambda travel_m: force_n(p, travel_m))")
-DEFLECTION = Motion("deflection", "tire's deflection", "deflection_m", "m", (1000.0, "mm"),
-                    "with_tire(lambda deflection_m: force_n(p, deflection_m))")
+RATE = LawMotion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"),
+                 "with_force(lambda travel_m, rate_mps: force_n(p, rate_mps))")
+TRAVEL = LawMotion("travel", "travel", "travel_m", "m", (1000.0, "mm"),
+                   "with_spring(lambda travel_m: force_n(p, travel_m))")
+DEFLECTION = LawMotion("deflection", "tire's deflection", "deflection_m", "m", (1000.0, "mm"),
+                       "with_tire(lambda deflection_m: force_n(p, deflection_m))")
 
 
 class CurveFamily(Family):
@@ -70,7 +70,7 @@ class CurveFamily(Family):
                          words
     """
 
-    motion: Motion
+    motion: LawMotion
     force: str
     source: str
     signature: str

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from logger.lab.diagnosis import Diagnosis, assess, search_effects
+from logger.lab.diagnosis import LabDiagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft, Family, LawContext
 from logger.lab.laws.refusals import Nearest, Refusal, known_instead, refusal
 from logger.lab.likelihood.map_fit import align, effect_slopes, fit_to_the_end
@@ -34,8 +34,7 @@ from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine, refine_to_the_end
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, screen
-from logger.lab.selection.stepwise import Effort as Usual
-from logger.lab.selection.stepwise import Search, Selection
+from logger.lab.selection.stepwise import Search, SearchEffort, Selection
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, with_coordinates
 
@@ -85,7 +84,7 @@ DECISIVE = 2 * INDISTINGUISHABLE
 
 
 @dataclass(frozen=True)
-class Effort:
+class LawEffort:
     """How much work the choice of a law takes.
 
     listed                          how many known effects are sought first, unless a law outdoes them, and on top of a
@@ -174,13 +173,13 @@ class Learning:
     verdict: tuple[str, ...]
     listed_error: float
     unexplained: bool
-    diagnosis: Diagnosis | None
+    diagnosis: LabDiagnosis | None
     refused: Refusal | None = None
 
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
           known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None,
-          workers: int = 2, effort: Effort | None = None) -> Learning:
+          workers: int = 2, effort: LawEffort | None = None) -> Learning:
     """Learn a law, in so many threads.
 
     effects     the known effects that are searched first, by name
@@ -188,15 +187,15 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    effort = effort or Effort()
-    one = replace(Usual(), effects=1)
+    effort = effort or LawEffort()
+    one = replace(SearchEffort(), effects=1)
     search, selection = search_effects(posterior, effects, present, progress, workers, one)
     choice = _LawChoice(search, selection, families, known, effort)
     if not choice.outdoes_two():
         choice = choice.seeking(effort.listed)
     law = choice.explaining_all()
     if law is None:
-        choice = choice.seeking(Usual().effects)
+        choice = choice.seeking(SearchEffort().effects)
         law = choice.with_effects()
     selection = choice.selection
     context = LawContext(selection.before.posterior, selection.before.state)
@@ -234,7 +233,7 @@ class _LawChoice:
     selection: Selection
     families: Mapping[str, Family]
     known: Mapping[str, Effect]
-    effort: Effort
+    effort: LawEffort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
     ended: dict[LawFit, tuple[Baseline, dict[str, float]]] = field(default_factory=dict)
     refused: dict[str, Refusal] = field(default_factory=dict)

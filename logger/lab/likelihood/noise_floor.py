@@ -36,7 +36,7 @@ _FLAT_SHARE, _FILTERED_SHARE = 0.22, 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseLevel:
     """The noise of the sensors: its standard deviation, and the standard error of that [m/s2]."""
 
     deviation_mps2: float
@@ -52,7 +52,7 @@ class SignalErrors:
     noise_floor: float
 
 
-def sensor_noise_of(posterior: Posterior, state: State) -> Noise:
+def sensor_noise_of(posterior: Posterior, state: State) -> NoiseLevel:
     """The noise of the sensor under the residuals of a fitted state, or the r.m.s. of several sensors'; without their
     rounding where readings are taken for bounds."""
     sensors = [one for one in _by_signal(posterior, state) if not one.name]
@@ -61,10 +61,10 @@ def sensor_noise_of(posterior: Posterior, state: State) -> Noise:
     deviation = float(np.sqrt(np.average([one.deviation_mps2**2 for one in each], weights=weights)))
     parts = [weight / weights.sum() * one.deviation_mps2 / deviation * one.standard_error_mps2
              for weight, one in zip(weights, each, strict=True)]
-    return Noise(deviation, float(np.linalg.norm(parts)))
+    return NoiseLevel(deviation, float(np.linalg.norm(parts)))
 
 
-def sensor_noise_with_rounding(posterior: Posterior, state: State) -> Noise:
+def sensor_noise_with_rounding(posterior: Posterior, state: State) -> NoiseLevel:
     """The noise with rounding, which adds a twelfth of the step's square to its variance."""
     return sensor_noise_of(posterior.without_rounding(), state)
 
@@ -81,17 +81,18 @@ def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
     return by_signal(posterior.readings, posterior.bands, posterior.residuals(state))
 
 
-def _noise_of(one: SignalResiduals) -> Noise:
+def _noise_of(one: SignalResiduals) -> NoiseLevel:
     """The noise of one signal; of a sensor no less than what repeated runs differ by."""
     scaled = [residual * np.sqrt(share) for residual, share in zip(one.residuals, one.shares, strict=True)]
     found = sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
     repeats = None if one.name else find_repeats(one.runs, one.residuals)
     if repeats is None or repeats.deviation_mps2 <= found.deviation_mps2:
         return found
-    return Noise(repeats.deviation_mps2, repeats.deviation_mps2 / float(np.sqrt(2 * repeats.freedom)))
+    return NoiseLevel(repeats.deviation_mps2, repeats.deviation_mps2 / float(np.sqrt(2 * repeats.freedom)))
 
 
-def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
+def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True
+                 ) -> NoiseLevel:
     """The sensor's noise under residuals (n,), per run; no less than ``least_mps2``.
 
     fitted    the residuals are a fit's, whose quietest bands are noise; else bands have to be equally loud to be taken
@@ -117,7 +118,7 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
     if not fitted and not (flat and highest[0] < _FILTERED_SHARE * power):
         power, freedom = highest
     power = max(power, least_mps2**2)
-    return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
+    return NoiseLevel(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 
 def gain_of_full_explanation(posterior: Posterior, state: State) -> float:
@@ -151,7 +152,7 @@ def excess_over_noise(posterior: Posterior, state: State, chance: float) -> floa
     return max(excess_by_signal(posterior, state, chance).values())
 
 
-def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: Noise | None = None
+def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: NoiseLevel | None = None
                      ) -> dict[str, float]:
     """Share by which the residual is above what right models leave, by name of the signal (empty: the sensor's
     acceleration), of the run where it is largest. They leave the noise, what the model makes of the noise of its
@@ -184,7 +185,7 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
     return found
 
 
-def floor_error(posterior: Posterior, noise: Noise) -> float:
+def floor_error(posterior: Posterior, noise: NoiseLevel) -> float:
     """Noise floor: rms(noise) / rms(measured) over all samples that count, both in the pass band."""
     runs = posterior.runs.runs
     share = np.average([one.share_passed for one in runs], weights=[one.count - one.first for one in runs])

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.planning.planned_drive import SIZES, Information, with_larger_errors
+from logger.lab.planning.planned_drive import SIZES, FisherInformation, with_larger_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, is_uninformative_at_usual
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.vehicle.effect import Chosen, Effect, chosen
@@ -108,7 +108,7 @@ class Outlook:
         return np.minimum(ndtr(self.detectability - DETECTABLE_SIGMA), ndtr(self.isolability - ISOLABLE_SIGMA))
 
 
-def representatives(settings: EffectGrid, information: Information, precision: Array) -> Indices:
+def representatives(settings: EffectGrid, information: FisherInformation, precision: Array) -> Indices:
     """The column (e,) that represents each effect: its usual values or, where these say little, those of the largest
     expected significance.
 
@@ -124,7 +124,7 @@ def representatives(settings: EffectGrid, information: Information, precision: A
     return found
 
 
-def outlook(settings: EffectGrid, information: Information, precision: Array, columns: Indices) -> Outlook:
+def outlook(settings: EffectGrid, information: FisherInformation, precision: Array, columns: Indices) -> Outlook:
     """Detectability and isolability by the information of drives; arguments as of ``representatives``, whose result is
     ``columns``."""
     marginal, costs = _marginal(information, precision)
@@ -137,7 +137,7 @@ def outlook(settings: EffectGrid, information: Information, precision: Array, co
     return Outlook(np.diag(found).copy(), found)
 
 
-def most_likely_sizes(information: Information, precision: Array, columns: Indices) -> tuple[Indices, Array]:
+def most_likely_sizes(information: FisherInformation, precision: Array, columns: Indices) -> tuple[Indices, Array]:
     """The most likely of ``SIZES`` of the distance errors with each effect (e,), and its cost (e,) [minus twice a
     log-likelihood]; arguments as of ``outlook``."""
     marginal, costs = _marginal(information, precision)
@@ -145,7 +145,7 @@ def most_likely_sizes(information: Information, precision: Array, columns: Indic
     return which, costs[which]
 
 
-def _marginal(information: Information, precision: Array) -> tuple[Array, Array]:
+def _marginal(information: FisherInformation, precision: Array) -> tuple[Array, Array]:
     """Information on the effects' columns (s, m, m), the car's numbers integrated out, and the cost of distance errors
     of each size over that of the expected size (s,)."""
     count = len(precision)

@@ -35,8 +35,8 @@ from logger.lab.planning.outlook import (
 )
 from logger.lab.planning.planned_drive import (
     SIZES,
-    Information,
-    Option,
+    DriveOption,
+    FisherInformation,
     PlannedCar,
     PlannedDrive,
     SensorNoise,
@@ -58,20 +58,20 @@ _LEAST_GAIN_SIGMA = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class NextDrive:
+class LabNextDrive:
     """A next drive and its gains.
 
     gains         of isolability, by effect: first those that it makes likelier to be named, then the relatively largest
     more_named    how many more effects a search would name, were each the only one
     """
 
-    option: Option
+    option: DriveOption
     gains: Mapping[str, float]
     more_named: float
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class LabPlan:
     """The effects that some drives could show, and next drives.
 
     drives       names and seconds of the runs and the planned drives
@@ -92,7 +92,7 @@ class Plan:
     effects: tuple[Chosen, ...]
     now: Outlook
     obstacles: Mapping[str, str]
-    next: tuple[NextDrive, ...]
+    next: tuple[LabNextDrive, ...]
 
     @property
     def groups(self) -> list[tuple[str, ...]]:
@@ -110,7 +110,7 @@ class Plan:
 
 def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
-         progress: Progress = lambda words: None, workers: int = 2) -> Plan:
+         progress: Progress = lambda words: None, workers: int = 2) -> LabPlan:
     """Analyse what runs and planned drives could show of ``effects``.
 
     there          the car; its numbers are fitted to the runs first
@@ -148,14 +148,14 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
         now = outlook(settings, total, analysis.precision, columns)
         progress("what a refit would leave of each effect")
         refitted = analysis.by_refit(parts, total, columns, now)
-        following: list[NextDrive] = []
+        following: list[LabNextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
             changes = analysis.changes(one.drive)
             for option, signals in one.options:
                 after = total + one.drive.information(changes, signals)
                 following.append(_next(option, settings, now, outlook(settings, after, analysis.precision, columns)))
-    return Plan(
+    return LabPlan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise,
         base[0].facts.main.unit, measured,
         tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), refitted,
@@ -169,7 +169,7 @@ class _DriveSet:
 
     there: LinearisedDrives
     changes: list[Array]
-    information: Information
+    information: FisherInformation
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +205,7 @@ class _Analysis:
         drives = LinearisedDrives(fitted, levels, here)
         return _DriveSet(drives, changes, information(fitted, changes))
 
-    def by_refit(self, parts: Sequence[_DriveSet], total: Information, columns: Indices, now: Outlook) -> Outlook:
+    def by_refit(self, parts: Sequence[_DriveSet], total: FisherInformation, columns: Indices, now: Outlook) -> Outlook:
         """The outlook with detectabilities by a refit of the car without each effect."""
         which, costs = most_likely_sizes(total, self.precision, columns)
         with_size = {size: [one.there.with_size(SIZES[size]) for one in parts] for size in set(which.tolist())}
@@ -221,9 +221,9 @@ class _Analysis:
         return now.scaled_to(np.array(list(self.pool.map(deviations, range(len(columns))))))
 
 
-def _next(option: Option, settings: EffectGrid, now: Outlook, then: Outlook) -> NextDrive:
+def _next(option: DriveOption, settings: EffectGrid, now: Outlook, then: Outlook) -> LabNextDrive:
     """The gains of an option, by the outlooks without and with it."""
     gained, likelier = then.isolability - now.isolability, then.chances - now.chances
     order = np.lexsort((now.isolability / np.maximum(then.isolability, 1.0), -likelier.round(2)))
     gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _LEAST_GAIN_SIGMA}
-    return NextDrive(option, gains, float(likelier.sum()))
+    return LabNextDrive(option, gains, float(likelier.sum()))

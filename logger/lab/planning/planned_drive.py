@@ -148,7 +148,7 @@ class PlannedDrive:
         """The largest acceleration of the sensor."""
         return float(np.abs(self.run.measured_mps2).max())
 
-    def information(self, changes: Array, signals: Sequence[int]) -> Information:
+    def information(self, changes: Array, signals: Sequence[int]) -> FisherInformation:
         """Information on effects' changes (m, (1 + s) n) by the sensor and some of the signals alone."""
         return information(self.model(signals), [self._of_kept(changes, signals)])
 
@@ -181,7 +181,7 @@ class PlannedDrive:
 
 
 @dataclass(frozen=True, eq=False)
-class Information:
+class FisherInformation:
     """Information of drives, which is additive: products of whitened derivatives by the car's numbers and of effects'
     changes, the records' errors projected out, without the prior of the numbers, for each of ``SIZES`` of these errors:
     an effect that shifts runs is taken for larger errors, if these are likely enough.
@@ -193,11 +193,11 @@ class Information:
     products: Array
     costs: Array
 
-    def __add__(self, other: Information) -> Information:
-        return Information(self.products + other.products, self.costs + other.costs)
+    def __add__(self, other: FisherInformation) -> FisherInformation:
+        return FisherInformation(self.products + other.products, self.costs + other.costs)
 
 
-def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
+def information(linear: LinearModel, changes: Sequence[Array]) -> FisherInformation:
     """Information of the runs of a linear model on effects' changes (m, n) per run."""
     free, white = linear, linear.whitened(changes)
     each, costs = [], []
@@ -207,7 +207,7 @@ def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
         found[: free.count, : free.count] -= np.diag(free.prior.precision)
         each.append(found)
         costs.append(there.occam_factor)
-    return Information(np.array(each), np.array(costs))
+    return FisherInformation(np.array(each), np.array(costs))
 
 
 def with_larger_errors(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
@@ -226,7 +226,7 @@ _PLANK = {"height_m": 0.03, "length_m": 0.3}
 
 
 @dataclass(frozen=True)
-class Option:
+class DriveOption:
     """A drive that may come next; ``speed_mps`` None: the same excitation repeated."""
 
     seconds: float
@@ -240,7 +240,7 @@ class OptionDrive:
     """A drive with several options, each with the indices of its signals."""
 
     drive: PlannedDrive
-    options: tuple[tuple[Option, tuple[int, ...]], ...]
+    options: tuple[tuple[DriveOption, tuple[int, ...]], ...]
 
 
 def option_drives(there: PlannedCar, noise: SensorNoise, road: Track | None, known: Sequence[Run]
@@ -267,7 +267,7 @@ def option_drives(there: PlannedCar, noise: SensorNoise, road: Track | None, kno
             obstacle = Obstacle(kind, {"start_m": middle_m, **size}, kind)
             cut = _cut(road, speed * MOST_S)
             if (over := _possible(there, noise, with_obstacles(cut, [obstacle]), speed, ())) is not None:
-                yield OptionDrive(over, ((Option(_seconds(over), speed, obstacle), ()),))
+                yield OptionDrive(over, ((DriveOption(_seconds(over), speed, obstacle), ()),))
 
 
 def second_sensors(vehicle: Vehicle) -> list[Signal]:
@@ -285,8 +285,8 @@ def second_sensors(vehicle: Vehicle) -> list[Signal]:
 
 
 def _with_signals(drive: PlannedDrive, speed: float | None, signals: Sequence[Signal], seconds: float) -> OptionDrive:
-    alone = (Option(seconds, speed), ())
-    return OptionDrive(drive, (alone, *((Option(seconds, speed, signal=one), (index,))
+    alone = (DriveOption(seconds, speed), ())
+    return OptionDrive(drive, (alone, *((DriveOption(seconds, speed, signal=one), (index,))
                                         for index, one in enumerate(signals))))
 
 

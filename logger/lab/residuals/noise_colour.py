@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.growing_power import growing_power
-from logger.lab.likelihood.noise_floor import Noise
+from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
@@ -41,7 +41,7 @@ def is_coloured_noise(posterior: Posterior, state: State) -> bool:
     return coloured_noise(bands, shape) is not None
 
 
-def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise | None:
+def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> NoiseLevel | None:
     """The noise of a residual that has a colour; None where it may be more than that, or the runs do not show it.
 
     every    the bands of each run; those of one signal, the same in all runs, are asked for
@@ -54,7 +54,7 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> Noise |
 
 
 def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array], model: Sequence[Array],
-                  sigma: float = 2.0) -> Noise | None:
+                  sigma: float = 2.0) -> NoiseLevel | None:
     """The noise of residuals (n,) per run that fall or rise with frequency and do not grow with a model's motion (n,).
 
     sigma    what grows with the motion is taken to be so many standard errors more than it is found to be
@@ -74,7 +74,7 @@ def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array]
     if not mean - may_grow > mean / (1 + UNEXPLAINED) ** 2:
         return None
     level = mean - max(float(freedom @ grows) / float(freedom.sum()), 0.0)
-    return Noise(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
+    return NoiseLevel(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
 
 
 def is_monotonic(levels: Array, freedom: Array, sigma: float = 3.0) -> bool:

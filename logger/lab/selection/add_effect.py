@@ -27,7 +27,7 @@ from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, Step, rising
+from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep, rising
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import cross_validate
 from logger.vehicle.effect import Chosen, chosen
@@ -109,10 +109,10 @@ class AddedEffects:
         return self.p_value < FALSE_ALARM
 
     @property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> tuple[ErrorStep, ...]:
         """The model as it was, refitted, and with the effects, on one scale."""
-        return (Step(AS_FILED, self.error_before), Step(REFITTED, self.error_refitted),
-                Step(f"with {' and '.join(self.names)}", self.error_after))
+        return (ErrorStep(AS_FILED, self.error_before), ErrorStep(REFITTED, self.error_refitted),
+                ErrorStep(f"with {' and '.join(self.names)}", self.error_after))
 
     @property
     def worsens_hold_out(self) -> bool:

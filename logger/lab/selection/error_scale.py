@@ -26,14 +26,14 @@ def fit_percent(error: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class ErrorStep:
     """A model: what was done, and its error on what no fit saw."""
 
     words: str
     error: float
 
 
-def rising(steps: Sequence[Step]) -> list[str]:
+def rising(steps: Sequence[ErrorStep]) -> list[str]:
     """What was done in those steps that raise the error by more than a rounding."""
     return [now.words for before, now in pairwise(steps)
             if now.error > (1 + ROUNDING) * before.error]

@@ -41,7 +41,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchEffort:
     """How much work a search takes; more of it finds no less.
 
     effects                    most effects that are added
@@ -67,7 +67,7 @@ class Effort:
     least: float = 0.0
 
 
-class Model(Protocol):
+class FittedModel(Protocol):
     """A fitted model that effects are sought on top of.
 
     score          minus twice the log of its evidence, over any one for all models of a search
@@ -115,7 +115,7 @@ class Fitted(Protocol):
     def gain(self) -> float: ...
 
 
-M = TypeVar("M", bound=Model)
+M = TypeVar("M", bound=FittedModel)
 P = TypeVar("P", bound=Promise)
 F = TypeVar("F", bound=Fitted)
 
@@ -233,7 +233,7 @@ class MeasuredRoad:
 
 
 @dataclass(frozen=True, eq=False)
-class Round(Generic[P, F]):
+class SearchRound(Generic[P, F]):
     """All effects tried on a model: those that were fitted, best first, and the screening of the others."""
 
     fits: tuple[F, ...]
@@ -257,9 +257,9 @@ class Selection(Generic[M, P, F]):
     now: M
     gains: dict[str, float]
     rivals: dict[str, tuple[str, ...]]
-    first: Round[P, F]
+    first: SearchRound[P, F]
     steps: tuple[tuple[str, HoldOut], ...]
-    last: Round[P, F] = Round((), ())
+    last: SearchRound[P, F] = SearchRound((), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +279,7 @@ class Search(Generic[M, P, F]):
     misalignment: Misalignment
     progress: Progress = lambda words: None
     workers: int = 2
-    effort: Effort = Effort()
+    effort: SearchEffort = SearchEffort()
     likelihood: Likelihood[Any, Any, Any] = field(default_factory=MeasuredRoad)
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -292,7 +292,7 @@ class Search(Generic[M, P, F]):
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
-        return self.go_on(Selection(before, before, {}, {}, Round((), ()), ()))
+        return self.go_on(Selection(before, before, {}, {}, SearchRound((), ()), ()))
 
     def go_on(self, begun: Selection[M, P, F]) -> Selection[M, P, F]:
         """A search that ended because it had found as many effects as it might, with more of them."""
@@ -321,7 +321,7 @@ class Search(Generic[M, P, F]):
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
             now = self._reconsider(self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]
-            last = Round((), ())
+            last = SearchRound((), ())
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(now, name)
@@ -330,7 +330,7 @@ class Search(Generic[M, P, F]):
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps), last)
 
-    def _reconsidered(self, now: M, tried: Round[P, F]) -> M:
+    def _reconsidered(self, now: M, tried: SearchRound[P, F]) -> M:
         """The model with others in the place of its effects, where what is left is within sensors' calibration and an
         effect explains a part of it: it may be the right one, and what it would be added to its imitation."""
         if not self.likelihood.is_within_calibration(now) or not any(self.may_imitate(now, one) for one in tried.fits):
@@ -340,7 +340,7 @@ class Search(Generic[M, P, F]):
             other = self._reconsider(other, name)
         return other if other.score < now.score - INDISTINGUISHABLE else now
 
-    def _underlaid(self, now: M, tried: Round[P, F]) -> M | None:
+    def _underlaid(self, now: M, tried: SearchRound[P, F]) -> M | None:
         """The model with an effect that is nearly always there and may hide others; None where there is no such effect,
         or nothing to explain."""
         if now.explanation == 0:
@@ -356,7 +356,7 @@ class Search(Generic[M, P, F]):
         return replace(found, now=now, gains=gains)
 
     def round(self, now: M, effects: Sequence[Effect], required_gain: float = 0.0,
-              instead: Replaced[M] | None = None) -> Round[P, F]:
+              instead: Replaced[M] | None = None) -> SearchRound[P, F]:
         """Every effect tried on a model. Where its distance errors are large, effects that shift runs are also tried
         with the recorded distances: what they do may have been taken for a start or scale error.
 
@@ -403,7 +403,7 @@ class Search(Generic[M, P, F]):
         fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
                 if one.gain > -min_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
-        return Round(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
+        return SearchRound(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
     def _screen_all(self, pool: ThreadPoolExecutor, base: M, effects: Sequence[Effect],
                     near: Mapping[str, float] = MappingProxyType({})) -> list[P]:
@@ -461,7 +461,7 @@ class Search(Generic[M, P, F]):
         pursued."""
         return max(min_gain(len(self.effects)), IMITATION * without.explanation)
 
-    def _simplest(self, now: M, tried: Round[P, F]) -> F | None:
+    def _simplest(self, now: M, tried: SearchRound[P, F]) -> F | None:
         """The simplest of the accepted effects that cannot be distinguished from the most likely one."""
         accepted = [one for one in tried.fits if self.is_accepted(now, one)]
         return min((one for one in accepted if one.gain > accepted[0].gain - INDISTINGUISHABLE),
@@ -515,7 +515,7 @@ class Search(Generic[M, P, F]):
         self._rivals[name] = (*alike, *self._rivals_of(without, gain, name, tried))
         return now
 
-    def _rivals_of(self, without: M, gain: float, name: str, tried: Round[P, F]) -> tuple[str, ...]:
+    def _rivals_of(self, without: M, gain: float, name: str, tried: SearchRound[P, F]) -> tuple[str, ...]:
         """Names of other effects that cannot be distinguished from one that gains so much."""
         return tuple(one.effect.name for one in tried.fits
                      if one.effect.name != name and abs(one.gain - gain) < INDISTINGUISHABLE
@@ -560,7 +560,7 @@ def is_outside_data(posterior: Posterior, one: Chosen) -> bool:
     return one.at_bound or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
 
 
-def names_of(model: Model) -> list[str]:
+def names_of(model: FittedModel) -> list[str]:
     """Names of a model's effects."""
     return [one.effect.name for one in model.effects]
 

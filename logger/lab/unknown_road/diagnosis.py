@@ -17,15 +17,15 @@ import numpy as np
 
 from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
-from logger.lab.likelihood.noise_floor import Noise
+from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import shared_parameters
-from logger.lab.selection.stepwise import Effort, Search, Selection, names_of
-from logger.lab.unknown_road.fit import SameRoadFit, Trial, fit, screen
+from logger.lab.selection.stepwise import Search, SearchEffort, Selection, names_of
+from logger.lab.unknown_road.fit import SameRoadFit, TrialOnRoad, fit, screen
 from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
 from logger.lab.unknown_road.one_road import certain_two_roads, placed_by_road, possible_two_roads, road_agreements
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, Misalignment, RoadEffect, chosen
@@ -40,7 +40,7 @@ show it seven times as well (root of 1 / 0.02)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class SharedRoadCandidate:
     """An effect that was tried.
 
     error            leave-one-out error of all drives
@@ -83,7 +83,7 @@ class UnknownRoadDiagnosis:
     exact_places  whether the distances of the drives are a recorder's, not a receiver's
     """
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[SharedRoadCandidate, ...]
     missing: tuple[Chosen, ...]
     errors: tuple[float, ...]
     by_run: tuple[tuple[float, float], ...]
@@ -95,7 +95,7 @@ class UnknownRoadDiagnosis:
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
-    undecided: tuple[Candidate, ...] = ()
+    undecided: tuple[SharedRoadCandidate, ...] = ()
     exact_places: bool = True
 
     @property
@@ -133,7 +133,7 @@ class RoadModel:
         return HoldOut(self.problem.error(self.state), float("nan"))
 
     @cached_property
-    def noise(self) -> Noise:
+    def noise(self) -> NoiseLevel:
         """The sensor's noise by what this model leaves."""
         return self.problem.noise(self.state)
 
@@ -149,7 +149,7 @@ class RoadModel:
 class RoadTrial:
     """An effect as it was screened: where fits may begin, the largest gain first."""
 
-    starts: tuple[Trial, ...]
+    starts: tuple[TrialOnRoad, ...]
 
     @property
     def effect(self) -> Effect:
@@ -203,7 +203,7 @@ class UnmeasuredRoad:
         trials = [chosen(one, values) for one in effects
                   for values in (*one.trials(), *([one.trials()[0] | shared_parameters(one, near)] if near else []))]
         progress(f"screening {len(effects)} effects")
-        by_effect: dict[str, list[Trial]] = {}
+        by_effect: dict[str, list[TrialOnRoad]] = {}
         for one in sorted(screen(base.problem, base.fit, trials), key=lambda one: -one.gain):
             by_effect.setdefault(one.chosen.effect.name, []).append(one)
         return [RoadTrial(tuple(ones)) for ones in by_effect.values()]
@@ -305,7 +305,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
         tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
         # A fit takes as long as ten over a measured road; 6 is less than what one number costs.
-        effort=Effort(effects=3, fitted=3, fit_share=0.1, least=6.0))
+        effort=SearchEffort(effects=3, fitted=3, fit_share=0.1, least=6.0))
     selection = search.run(base)
     now, steps = selection.now, dict(selection.steps)
     names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
@@ -328,15 +328,17 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     )
 
 
-def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count: int) -> tuple[Candidate, ...]:
+def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count: int
+                ) -> tuple[SharedRoadCandidate, ...]:
     """Effects that were found, then the others of the first round, best first."""
     now, hold_outs = selection.now, dict(selection.steps)
     found = []
     for name, gain in selection.gains.items():
         one = next(one for one in now.effects if one.effect.name == name)
         error = hold_outs.get(name, now.hold_out).error
-        found.append(Candidate(one, error, probability_by_chance(gain, count), gain, selection.rivals.get(name, ()),
-                               stands_in=not now.problem.is_linear([one], now.state.logs)))
+        found.append(SharedRoadCandidate(one, error, probability_by_chance(gain, count), gain,
+                                         selection.rivals.get(name, ()),
+                                         stands_in=not now.problem.is_linear([one], now.state.logs)))
     fits = selection.first.fits
     others = [replace(_candidate(one, count), confused_with=tuple(
         other.effect.name for other in fits if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE
@@ -346,17 +348,17 @@ def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count
         best = trial.starts[0].best
         there = UnmeasuredRoad(lambda words: None)._state(before, (*before.effects, best))
         gain = trial.gain - len(free_parameters_of([best])) * float(np.log(before.problem.samples))
-        others.append(Candidate(best, before.problem.error(there), probability_by_chance(gain, count), gain,
-                                fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
+        others.append(SharedRoadCandidate(best, before.problem.error(there), probability_by_chance(gain, count), gain,
+                                          fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
     others.sort(key=lambda one: (not one.fitted, -one.gain))
     return (*found, *(one for one in others if one.name not in selection.gains))
 
 
-def _candidate(one: RoadCandidate, count: int) -> Candidate:
+def _candidate(one: RoadCandidate, count: int) -> SharedRoadCandidate:
     """A fitted effect as one of so many candidates."""
     model = one.model
-    return Candidate(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
-                     stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
+    return SharedRoadCandidate(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
+                               stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen],

@@ -113,7 +113,7 @@ def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter],
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class TrialOnRoad:
     """An effect at some values on top of a model.
 
     gain                 expected, in minus twice the log-likelihood
@@ -129,7 +129,7 @@ class Trial:
     share_beyond_road: float
 
 
-def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list[Trial]:
+def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list[TrialOnRoad]:
     """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
     numbers and the roads' are projected out."""
     state = base.state
@@ -156,17 +156,17 @@ def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list
 
 
 def _trial(one: Chosen, slope: float, remaining: float, alone: float, share: float, weakest: float = 0.03,
-           strongest: float = 3.0) -> Trial:
+           strongest: float = 3.0) -> TrialOnRoad:
     """The trial at its best strength by its score and its information, within these bounds.
 
     remaining, alone    its information with all free numbers projected out, and before; a share below 1e-4 is mostly
                         rounding
     """
     if not remaining > 1e-4 * alone:
-        return Trial(one, 0.0, one, 0.0, share)
+        return TrialOnRoad(one, 0.0, one, 0.0, share)
     strength = float(np.clip(slope / remaining, weakest, strongest))
     scaled = scale_strength(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one
     gain = (2 * strength * slope - strength**2 * remaining) / (1 + 1 / PROBES)
-    return Trial(one, gain, scaled, float(np.sqrt(remaining)), share)
+    return TrialOnRoad(one, gain, scaled, float(np.sqrt(remaining)), share)

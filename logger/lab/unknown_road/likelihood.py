@@ -37,8 +37,8 @@ from logger.identification.unknown_road.marginal_likelihood import (
     UnknownRoad,
     displacement_psd_m3,
 )
-from logger.identification.unknown_road.road_operator import Drive
-from logger.lab.likelihood.noise_floor import Noise, sensor_noise
+from logger.identification.unknown_road.road_operator import RoadDrive
+from logger.lab.likelihood.noise_floor import NoiseLevel, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.roads.iso8608 import STANDARD_WAVINESS
@@ -346,7 +346,7 @@ class SameRoad:
         """Number of samples of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
-    def noise(self, state: RoadFitState) -> Noise:
+    def noise(self, state: RoadFitState) -> NoiseLevel:
         """The sensor's noise, from the leave-one-out residuals: these are more than noise where the road moves the car,
         so that bands of noise that the recorder filtered have to be equally loud."""
         residuals: dict[int, list[Array]] = {}
@@ -387,7 +387,7 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
     return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
-def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
+def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, RoadDrive]]]:
     """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: the
     numbers of the runs of each, and their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
@@ -406,7 +406,7 @@ def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[l
             first = max(int(first), run.first)
             if last - first >= least_s * run.rate_hz:
                 part = slice(first, int(last))
-                parts.append((number, Drive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
+                parts.append((number, RoadDrive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
         if len(parts) > 1:
             found.append(parts)
     return found

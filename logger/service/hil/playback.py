@@ -28,7 +28,7 @@ from drivers.errors import BadReply, NotPresent, SettingsError
 from drivers.hardware import BytePort
 from drivers.readings import AccelerationBlock, RecordedWords
 from logger.errors import BadInput
-from logger.estimation.receiver_delay import Belief
+from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import AXES, Config
@@ -129,7 +129,7 @@ def send(
     return Sent(played_us / US_PER_S, size_bytes, (float(half), float(most), float(all_of_them)))
 
 
-def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief | None = None,
+def expected_rows(recording: Wired, config: Config, place: str, receiver: CarriedDelay | None = None,
                   noise: KnownNoise | None = None) -> list[WindowRecord]:
     """The rows that a service with these settings makes of the recording; all have UTC when any has.
 

@@ -33,7 +33,7 @@ from logger.store.formats.profile_file import (
     EXCITATION_COLUMNS,
     PART_COLUMNS,
     PROFILE_NAME,
-    Profile,
+    Wheelpaths,
     read_excitation,
     read_profile,
 )
@@ -397,7 +397,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     return time_s, speed_mps
 
 
-def track_of(profile: Profile) -> Track:
+def track_of(profile: Wheelpaths) -> Track:
     """The road that a profile describes, with one or two tracks."""
     if profile.elevation_right_m is None:
         return Track(profile.spacing_m, profile.elevation_m, profile.start_m)

@@ -330,7 +330,7 @@ _ROUNDING_STEPS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Wheelpaths:
     """Elevations (n,) [m] of one or two wheel tracks at start_m, start_m + spacing_m, ... [m].
 
     widest_step_m    for a profile that was resampled: the widest distance between its samples that a straight line
@@ -344,7 +344,7 @@ class Profile:
     widest_step_m: float | None = None
 
 
-def read_profile(path: Path | str, resample_m: float | None = None, judged: bool = False) -> Profile:
+def read_profile(path: Path | str, resample_m: float | None = None, judged: bool = False) -> Wheelpaths:
     """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line).
 
     resample_m    lay a grid of this spacing [m] over the profile, linearly between its samples
@@ -362,7 +362,7 @@ def read_profile(path: Path | str, resample_m: float | None = None, judged: bool
     return found
 
 
-def check_road(profile: Profile, name: str) -> None:
+def check_road(profile: Wheelpaths, name: str) -> None:
     """Raise BadInput for a profile that cannot be one in metres; ``name``: what it is called."""
     for track in (profile.elevation_m, profile.elevation_right_m):
         if track is not None and (words := unit_complaint(track, profile.spacing_m)):
@@ -417,7 +417,7 @@ def _check_place(row: Array, where: str) -> None:
                        f"{lat_deg:g},{lon_deg:g}")
 
 
-def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
+def _from_table(table: Array, file: str, resample_m: float | None) -> Wheelpaths:
     try:
         tracks = [taken(ELEVATION, "elevations", track, file) for track in table.T[1:]]
     except BadInput as error:
@@ -436,7 +436,7 @@ def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
             raise BadInput(f"{place(file, sample)}: expected no gap above {WIDEST_BRIDGED_M:g} m, found one of "
                            f"{steps[sample - 1]:.6g} m: cut the profile there")
         return _resampled(distance, tracks, resample_m, file)
-    return Profile(float(distance[0]), _even_spacing(distance, steps, file), *_pair(tracks))
+    return Wheelpaths(float(distance[0]), _even_spacing(distance, steps, file), *_pair(tracks))
 
 
 def _even_spacing(distance: Array, steps: Array, file: str) -> float:
@@ -471,22 +471,22 @@ def _pair(tracks: Sequence[Array]) -> tuple[Array, Array | None]:
     return tracks[0], tracks[1] if len(tracks) > 1 else None
 
 
-def _resampled(distance: Array, tracks: Sequence[Array], spacing_m: float, file: str) -> Profile:
+def _resampled(distance: Array, tracks: Sequence[Array], spacing_m: float, file: str) -> Wheelpaths:
     length_m = float(distance[-1] - distance[0])
     if not 0 < spacing_m <= length_m <= MOST_SAMPLES * spacing_m:
         raise BadInput(f"{file}: expected a spacing within the {length_m:.6g} m of profile to resample to, "
                        f"found {spacing_m:g} m")
     grid = distance[0] + spacing_m * np.arange(int(length_m / spacing_m + 1e-9) + 1)
     laid = [np.interp(grid, distance, track) for track in tracks]
-    return Profile(float(distance[0]), spacing_m, *_pair(laid), float(np.diff(distance).max()))
+    return Wheelpaths(float(distance[0]), spacing_m, *_pair(laid), float(np.diff(distance).max()))
 
 
-def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
+def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Wheelpaths:
     tracks = erd.wheel_tracks()
     if resample_m is not None:
         distance = erd.spacing_m * np.arange(len(tracks[0]), dtype=float)
         return _resampled(distance.astype(np.float64), tracks, resample_m, file)
-    return Profile(0.0, erd.spacing_m, *_pair(tracks))
+    return Wheelpaths(0.0, erd.spacing_m, *_pair(tracks))
 
 
 EXCITATION_COLUMNS = (TIME, "elevation_m", "elevation_rear_m")

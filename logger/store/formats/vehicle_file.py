@@ -1,7 +1,7 @@
 """Vehicle files (YAML) to vehicles and back, with complaints that name the line, and calibrations kept beside them.
 
 What knows the plain car only must not take a car with effects for one without: ``read_vehicle`` refuses it. Commands
-read a ``Model``: the car, its effects, how certain its numbers are, and how it came to them. A user's own effect is
+read a ``CarModel``: the car, its effects, how certain its numbers are, and how it came to them. A user's own effect is
 Python that reading it runs, which the service on board never does: ``read_on_board`` refuses it unread.
 
 A calibration takes a moment and never changes while vehicle, recorder and settings stay as they are; but a number that
@@ -88,7 +88,7 @@ _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 87
 
 
 @dataclass(frozen=True)
-class Step:
+class ModelStep:
     """A step in the making of a model: what was done, and the error that it left.
 
     noise_floor_error    below which no model can come; None: not known
@@ -100,7 +100,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Model:
+class CarModel:
     """A vehicle with its effects, and the steps that led to them, the first one first.
 
     given    the vehicle as it was before any of its numbers was refitted; None: none was
@@ -110,7 +110,7 @@ class Model:
 
     vehicle: Vehicle
     effects: tuple[Chosen, ...] = ()
-    history: tuple[Step, ...] = ()
+    history: tuple[ModelStep, ...] = ()
     given: Vehicle | None = None
     errors: NumberErrors | None = None
     known: Mapping[str, Known] = field(default_factory=dict)
@@ -133,7 +133,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
     return vehicle
 
 
-def read_model(path: Path | str) -> Model:
+def read_model(path: Path | str) -> CarModel:
     """Read a vehicle file with its effects, those in files of the user's own too, which are run.
 
     Raises BadInput as ``read_vehicle``, and for an effect, a parameter or a step of the history that is not what it
@@ -144,7 +144,7 @@ def read_model(path: Path | str) -> Model:
     vehicle, keys, known = _read(path)
     effects = read_effects(keys["effects"], vehicle) if "effects" in keys else ()
     given = _read_given(keys["given"], vehicle, known) if "given" in keys else None
-    return Model(
+    return CarModel(
         vehicle,
         effects,
         tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
@@ -160,7 +160,7 @@ def check_on_road(vehicle: Vehicle) -> None:
         raise BadInput(f"{vehicle.name}: expected a car, found model: {vehicle.model}, which stands on a test bench")
 
 
-def read_on_board(path: Path | str) -> Model:
+def read_on_board(path: Path | str) -> CarModel:
     """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput),
     and so are parts on a test bench.
     """
@@ -404,19 +404,19 @@ def _read_sensor(node: Node, model: str) -> SensorPlace:
     return SensorPlace(**place)
 
 
-def _read_step(node: Node) -> Step:
+def _read_step(node: Node) -> ModelStep:
     keys = node.mapping(required=("step", "error"), optional=("noise_floor_error",))
     floor = keys.get("noise_floor_error")
-    return Step(word(keys["step"].text(), LONGEST_COMPLAINT), keys["error"].number(low=0),
-                None if floor is None or floor.is_null() else floor.number(low=0))
+    return ModelStep(word(keys["step"].text(), LONGEST_COMPLAINT), keys["error"].number(low=0),
+                     None if floor is None or floor.is_null() else floor.number(low=0))
 
 
 def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
     """Write a vehicle as a file that ``read_vehicle`` reads back equal, to the last bit. OSError if that fails."""
-    write_model(path, Model(vehicle))
+    write_model(path, CarModel(vehicle))
 
 
-def write_model(path: Path | str, model: Model, comments: str = "") -> None:
+def write_model(path: Path | str, model: CarModel, comments: str = "") -> None:
     """Write a model as a file that ``read_model`` reads back equal, to the last bit. OSError if that fails.
 
     comments    lines that begin with #, to stand before it

@@ -51,7 +51,7 @@ class BadRow(BadInput):
 
 
 @dataclass(frozen=True)
-class Column:
+class LogColumn:
     """One column: its name in the file, the record's attribute, how a value is written and read, and how large a number
     may be; 0: it holds no such number."""
 
@@ -101,8 +101,8 @@ def _read_count(text: str) -> int:
     return int(text)
 
 
-def _seconds_of_us(name: str, attribute: str) -> Column:
-    return Column(name, attribute, _write_seconds, _read_seconds)
+def _seconds_of_us(name: str, attribute: str) -> LogColumn:
+    return LogColumn(name, attribute, _write_seconds, _read_seconds)
 
 
 def _read_decimal(text: str, pattern: str, largest: float) -> float:
@@ -115,7 +115,7 @@ def _read_decimal(text: str, pattern: str, largest: float) -> float:
     return value
 
 
-def _number(name: str, decimals: int, largest: float = LARGEST) -> Column:
+def _number(name: str, decimals: int, largest: float = LARGEST) -> LogColumn:
     """A float that may be unknown: None, NaN and what is beyond ``largest`` are written as nothing."""
     pattern = f"%.{decimals}f"
 
@@ -125,10 +125,10 @@ def _number(name: str, decimals: int, largest: float = LARGEST) -> Column:
     def read(text: str) -> float | None:
         return _read_decimal(text, pattern, largest) if text else None
 
-    return Column(name, name, write, read, largest)
+    return LogColumn(name, name, write, read, largest)
 
 
-def _known_number(name: str, decimals: int) -> Column:
+def _known_number(name: str, decimals: int) -> LogColumn:
     """A float that is always known. Writing NaN or one beyond ``LARGEST`` raises ``ValueError``."""
     pattern = f"%.{decimals}f"
 
@@ -137,15 +137,15 @@ def _known_number(name: str, decimals: int) -> Column:
             raise ValueError(f"{name} is {value}, expected a finite number up to {LARGEST:g}")
         return pattern % value
 
-    return Column(name, name, write, lambda text: _read_decimal(text, pattern, LARGEST), LARGEST)
+    return LogColumn(name, name, write, lambda text: _read_decimal(text, pattern, LARGEST), LARGEST)
 
 
-def _count(name: str) -> Column:
-    return Column(name, name, lambda value: f"{value:d}", _read_count)
+def _count(name: str) -> LogColumn:
+    return LogColumn(name, name, lambda value: f"{value:d}", _read_count)
 
 
-def _word(name: str, known: re.Pattern[str]) -> Column:
-    return Column(name, name, str, lambda text: _read_word(text, known))
+def _word(name: str, known: re.Pattern[str]) -> LogColumn:
+    return LogColumn(name, name, str, lambda text: _read_word(text, known))
 
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
@@ -156,7 +156,7 @@ def _read_word(text: str, known: re.Pattern[str]) -> str:
 
 COLUMNS = (
     _count("segment"),
-    Column("t_utc", "utc_us", write_utc, _read_utc),
+    LogColumn("t_utc", "utc_us", write_utc, _read_utc),
     _seconds_of_us("t_s", "t_us"),
     _number("distance_start_m", 3),
     _number("distance_end_m", 3),
@@ -172,7 +172,7 @@ COLUMNS = (
     _number("crest_factor", 3),
     _word("comfort", _COMFORT),
     _word("iri_class", _CLASS),
-    Column("flags", "flags", "|".join, lambda text: tuple(_read_word(text, FLAGS).split("|")) if text else ()),
+    LogColumn("flags", "flags", "|".join, lambda text: tuple(_read_word(text, FLAGS).split("|")) if text else ()),
     _count("drive"),
     _known_number("duration_s", 6),
     _number("accel_rms_mps2", 4),
@@ -231,7 +231,7 @@ _COUNTS = (len(COLUMNS), 29, 23)
 from the noise."""
 
 
-def _header(columns: Sequence[Column]) -> str:
+def _header(columns: Sequence[LogColumn]) -> str:
     return ",".join([*(column.name for column in columns), "crc32"])
 
 

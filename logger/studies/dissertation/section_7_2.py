@@ -24,7 +24,7 @@ from logger.estimation.sensor_noise import Sensor
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.unknown_road.marginal_likelihood import Options
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
-from logger.identification.unknown_road.road_operator import Drive
+from logger.identification.unknown_road.road_operator import RoadDrive
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file, vehicle_names
@@ -190,7 +190,7 @@ def _input(effort: Workload) -> Result:
 
 def _mass(drives: list[Run], probes: int) -> RoadFit:
     car = AxleResponse(rav4(), [free(rav4(), MASS, _START * TRUTH[MASS])], RATE_HZ)
-    roads = [[Drive(float(RATE_HZ), one.measured_mps2, one.distance_m) for one in drives]]
+    roads = [[RoadDrive(float(RATE_HZ), one.measured_mps2, one.distance_m) for one in drives]]
     return fit_roads(car, roads, Options(probes=probes, last_probes=probes, refuse=False))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.planning.outlook import EffectGrid, outlook, representatives
-from logger.lab.planning.planned_drive import Information, PlannedCar, PlannedDrive, SensorNoise, at_speed
+from logger.lab.planning.planned_drive import FisherInformation, PlannedCar, PlannedDrive, SensorNoise, at_speed
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.runs import Array
@@ -34,7 +34,7 @@ def test_what_remains_is_what_least_squares_leave() -> None:
     deviations = np.array([0.1, 0.3, 1.0, 3.0])
     every = np.vstack([numbers, changes])
     precision = deviations**-2.0
-    information = Information((every @ every.T)[None], np.zeros(1))
+    information = FisherInformation((every @ every.T)[None], np.zeros(1))
     shown = representatives(settings, information, precision)
     found = outlook(settings, information, precision, shown)
     assert list(shown) == list(settings.first)
@@ -49,7 +49,8 @@ def test_what_remains_is_what_least_squares_leave() -> None:
 
 def test_an_effect_is_as_likely_named_as_not_where_it_just_stands_out() -> None:
     settings = EffectGrid.of([shipped_effects()["wheel_lift"]])
-    found = outlook(settings, Information(np.diag([1.0, 36.0])[None], np.zeros(1)), np.array([1.0]), settings.first)
+    information = FisherInformation(np.diag([1.0, 36.0])[None], np.zeros(1))
+    found = outlook(settings, information, np.array([1.0]), settings.first)
     assert found.chances[0] == pytest.approx(0.5)
 
 

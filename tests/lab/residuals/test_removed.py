@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.api.lab.compare import comparison_json, conclusion, evidence, headline
-from logger.lab.compare import Comparison, compare
+from logger.lab.compare import LabComparison, compare
 from logger.lab.likelihood.record_band import with_pass_bands
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -19,7 +19,7 @@ from ...support.lab.runs_with_residual import CAR, beside_with, measuring
 NOISE_MPS2 = 0.03
 
 
-def compared(change: Callable[[Run], Run]) -> Comparison:
+def compared(change: Callable[[Run], Run]) -> LabComparison:
     made = beside_with(lambda run, _, rng: rng.normal(0, NOISE_MPS2, run.count), 2002, 30.0)
     return compare(SimulatedRuns([change(run) for run in made.runs]), CAR)
 
@@ -47,7 +47,7 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     assert shown["removed"]["drift"]["runs"][0]["time_s"] == pytest.approx(9.0, rel=0.1)
 
 
-def clean_size(clean: Comparison, found: Comparison) -> float:
+def clean_size(clean: LabComparison, found: LabComparison) -> float:
     """Errors are divided by what was measured, the drift in it."""
     sizes = [float(np.concatenate(one.plain.residuals.measured).std()) for one in (clean, found)]
     whole = float(np.sqrt(np.mean(np.concatenate(found.plain.residuals.measured) ** 2)))

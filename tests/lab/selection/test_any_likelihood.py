@@ -10,7 +10,7 @@ import pytest
 
 from logger.lab.selection.evidence import IMITATION, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
-from logger.lab.selection.stepwise import Effort, Progress, Search, names_of
+from logger.lab.selection.stepwise import Progress, Search, SearchEffort, names_of
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 
 from ...support.lab.secret_runs import EFFECTS
@@ -107,7 +107,7 @@ class MadeUp:
 
 def search(*doubtful: str, effects: int = 4) -> Search[Made, Tried, Tried]:
     return Search([EFFECTS[name] for name in WORTH], 0, Misalignment(1.0, 0.0), workers=1,
-                  effort=Effort(effects=effects), likelihood=MadeUp(doubtful))
+                  effort=SearchEffort(effects=effects), likelihood=MadeUp(doubtful))
 
 
 def test_all_that_is_evident_is_found_the_most_telling_first() -> None:

@@ -15,7 +15,7 @@ from logger.lab.likelihood.map_fit import MapFit, align, fit
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.screening import Baseline, misalignment, screen
-from logger.lab.selection.stepwise import MeasuredRoad, Round, Search, Selection
+from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchRound, Selection
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen, Misalignment, chosen
 
@@ -168,7 +168,7 @@ def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) 
     posterior = offset_base.posterior
     effects = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.0), hidden("tire_damping")]
     now = Baseline.of(fit(align(posterior, posterior.start(effects))))
-    chosen_too_many = Selection(offset_base, now, {}, {}, Round((), ()), ())
+    chosen_too_many = Selection(offset_base, now, {}, {}, SearchRound((), ()), ())
     rest = search(FEW).without_effect(chosen_too_many, "tire_damping")
     assert rest.now.state.names == ("sensor_offset",) and [*rest.gains] == ["sensor_offset"]
     assert rest.before is offset_base

@@ -11,9 +11,9 @@ import pytest
 
 from logger.api.lab.diagnose import same_road_json
 from logger.identification.unknown_road.marginal_likelihood import at_n0
-from logger.identification.unknown_road.road_operator import Crossing, Drive, grid_under
+from logger.identification.unknown_road.road_operator import Crossing, RoadDrive, grid_under
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
+from logger.lab.unknown_road.diagnosis import SharedRoadCandidate, UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.fit import fit, screen
 from logger.lab.unknown_road.likelihood import (
     DriveConditions,
@@ -67,7 +67,7 @@ def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int, 
 ], ids=lambda one: one.effect.name)
 def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
     run = run_of([effect], 14.0, 80.0, 1)
-    drive = Drive(RATE_HZ, run.measured_mps2, run.distance_m)
+    drive = RoadDrive(RATE_HZ, run.measured_mps2, run.distance_m)
     structure = compose(CAR).structure
     behind_m = np.unique(structure.behind_m)
     grid = grid_under([drive], behind_m, SPACING_M, 0.0)
@@ -102,7 +102,7 @@ def test_a_linear_car_stands_in_for_one_that_bends_its_laws(effect: Chosen) -> N
     """Most of what such an effect does to a record of the stepping simulation is in proportion to the road, and not to
     one that moves the car less."""
     run = run_of([effect], 14.0, 200.0, 1)
-    drive = Drive(RATE_HZ, run.measured_mps2, run.distance_m)
+    drive = RoadDrive(RATE_HZ, run.measured_mps2, run.distance_m)
     structure = compose(CAR).structure
     behind_m = np.unique(structure.behind_m)
     grid = grid_under([drive], behind_m, SPACING_M, 0.0)
@@ -139,7 +139,7 @@ def test_friction_is_not_taken_for_another_damping() -> None:
 
 
 def test_what_may_only_imitate_is_not_named() -> None:
-    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
+    one = SharedRoadCandidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
     reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
@@ -264,7 +264,7 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
 
 
 def test_what_was_not_fitted_says_so() -> None:
-    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
+    one = SharedRoadCandidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
     found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
     reported = same_road_json(found)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
-from logger.store.formats.profile_file import Profile, parse_erd, read_profile
+from logger.store.formats.profile_file import Wheelpaths, parse_erd, read_profile
 
 LEFT = np.array([0.0, 1.0, -2.0, 3.5])
 RIGHT = np.array([10.0, 20.0, 30.0, -40.0])
@@ -18,7 +18,7 @@ def header(layout: str, *lines: str) -> str:
     return "\n".join(["ERDFILEV2.00", layout, "TITLE   US-23, lane 2", *lines, "END", ""])
 
 
-def read(tmp_path: Path, content: str | bytes, numbers: bytes | None = None, suffix: str = ".erd.bin") -> Profile:
+def read(tmp_path: Path, content: str | bytes, numbers: bytes | None = None, suffix: str = ".erd.bin") -> Wheelpaths:
     path = tmp_path / "road.erd"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     if numbers is not None:

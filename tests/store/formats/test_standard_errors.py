@@ -6,7 +6,7 @@ import pytest
 
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import Model, read_model, read_on_board, write_model
+from logger.store.formats.vehicle_file import CarModel, read_model, read_on_board, write_model
 from logger.vehicle.uncertain import NumberErrors
 
 CAR = read_model(vehicle_file("rav4-2009")).vehicle
@@ -17,9 +17,9 @@ FRICTION = "effects: [{name: dry_friction, friction_force_n: 80}]\n"
 def test_they_are_read_back_as_they_were_written(tmp_path: Path) -> None:
     errors = NumberErrors({"sprung_mass_kg": 12.5, "both.suspension_stiffness_n_per_m": 0.1 + 0.2,
                            "sensor.ahead_m": 0.02}, ((), (0.9,), (-1 / 3, 0.0)))
-    write_model(tmp_path / "car.yaml", Model(CAR, errors=errors))
+    write_model(tmp_path / "car.yaml", CarModel(CAR, errors=errors))
     assert read_model(tmp_path / "car.yaml").errors == errors
-    write_model(tmp_path / "plain.yaml", Model(CAR))
+    write_model(tmp_path / "plain.yaml", CarModel(CAR))
     assert read_model(tmp_path / "plain.yaml").errors is None
     assert "standard_errors" not in (tmp_path / "plain.yaml").read_text()
 

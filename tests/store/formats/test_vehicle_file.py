@@ -14,8 +14,8 @@ from logger.printable import word
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import (
-    Model,
-    Step,
+    CarModel,
+    ModelStep,
     read_model,
     read_on_board,
     read_vehicle,
@@ -355,16 +355,16 @@ def chosen_effects(draw: st.DrawFn) -> Chosen:
     return chosen(effect, values, standard_errors=errors)
 
 
-steps_taken = st.builds(Step, names, st.floats(0, 10), st.none() | st.floats(0, 1))
+steps_taken = st.builds(ModelStep, names, st.floats(0, 10), st.none() | st.floats(0, 1))
 
 
 @given(st.lists(chosen_effects(), max_size=5, unique_by=lambda one: one.effect.name), st.lists(steps_taken, max_size=4))
 @settings(max_examples=40)
 def test_a_written_model_is_read_back_to_the_last_bit(
-    tmp_path_factory: pytest.TempPathFactory, effects: list[Chosen], history: list[Step]
+    tmp_path_factory: pytest.TempPathFactory, effects: list[Chosen], history: list[ModelStep]
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "model.yaml"
-    model = Model(read_vehicle(vehicle_file("rav4-2009")), tuple(effects), tuple(history))
+    model = CarModel(read_vehicle(vehicle_file("rav4-2009")), tuple(effects), tuple(history))
     write_model(path, model)
     assert read_model(path) == model
 
@@ -374,7 +374,8 @@ def test_effects_are_written_as_people_write_them(tmp_path: Path) -> None:
     tire = chosen(shipped_effects()["tire_damping"], {"tire_damping_n_s_per_m": 150},
                   standard_errors={"tire_damping_n_s_per_m": np.float64(8.5)})
     lift = chosen(shipped_effects()["wheel_lift"], {}, standard_errors={})
-    write_model(path, Model(read_vehicle(vehicle_file("rav4-2009")), (tire, lift), (Step("plain car", 0.25, None),)))
+    write_model(path, CarModel(read_vehicle(vehicle_file("rav4-2009")), (tire, lift),
+                               (ModelStep("plain car", 0.25, None),)))
     assert path.read_text().split("contact_patch_m: 0.25\n")[1] == (
         "effects:\n"
         "- {name: tire_damping, tire_damping_n_s_per_m: 150.0, standard_errors: {tire_damping_n_s_per_m: 8.5}}\n"
@@ -383,7 +384,7 @@ def test_effects_are_written_as_people_write_them(tmp_path: Path) -> None:
         "- {step: plain car, error: 0.25, noise_floor_error: null}\n"
     )
     unknown = replace(tire, standard_errors={"tire_damping_n_s_per_m": float("inf")})
-    write_model(path, Model(read_vehicle(vehicle_file("rav4-2009")), (unknown,)))
+    write_model(path, CarModel(read_vehicle(vehicle_file("rav4-2009")), (unknown,)))
     assert read_model(path).effects[0].standard_errors == {}
 
 
@@ -399,7 +400,7 @@ def test_a_number_at_its_limit_is_within_it(tmp_path: Path) -> None:
 
 def test_a_car_without_effects_is_a_model_too(tmp_path: Path) -> None:
     (tmp_path / "q.yaml").write_text(QUARTER)
-    assert read_model(tmp_path / "q.yaml") == Model(read_vehicle(tmp_path / "q.yaml"))
+    assert read_model(tmp_path / "q.yaml") == CarModel(read_vehicle(tmp_path / "q.yaml"))
 
 
 def test_what_is_not_said_is_the_default(tmp_path: Path) -> None:
@@ -518,11 +519,11 @@ def test_the_numbers_that_were_given_first_come_back_with_the_refitted_ones(tmp_
     first = read_vehicle(vehicle_file("rav4-2009"))
     refitted = changed(first, {"sprung_mass_kg": 700.0, "front.suspension_damping_n_s_per_m": 1000.0})
     path = tmp_path / "refitted.yaml"
-    write_model(path, Model(refitted, given=first))
-    assert read_model(path) == Model(refitted, given=first)
+    write_model(path, CarModel(refitted, given=first))
+    assert read_model(path) == CarModel(refitted, given=first)
     text = path.read_text()
     assert "given:" in text and text.count("suspension_damping_n_s_per_m") == 3  # two axles, and the one that moved
-    write_model(path, Model(first))
+    write_model(path, CarModel(first))
     assert "given" not in path.read_text()
 
 

@@ -21,7 +21,7 @@ from logger.store.log.row_format import (
     LINE_BYTES,
     SHORTEST_ROW_BYTES,
     BadRow,
-    Column,
+    LogColumn,
     as_now,
     format_row,
     parse_row,
@@ -117,7 +117,7 @@ def test_numbers_that_are_none_are_never_written(value: float) -> None:
 
 @pytest.mark.parametrize("value", [2 * LARGEST, -2 * LARGEST, 1e300, 3e38])
 @pytest.mark.parametrize("column", [column for column in COLUMNS if column.largest], ids=lambda column: column.name)
-def test_what_no_row_can_hold_is_written_as_unknown_and_refused_when_read(column: Column, value: float) -> None:
+def test_what_no_row_can_hold_is_written_as_unknown_and_refused_when_read(column: LogColumn, value: float) -> None:
     values = format_row(RECORD).split(",")[:-1]
     values[COLUMNS.index(column)] = f"{value:.{7 if 'deg' in column.name else 3}f}"
     with pytest.raises(BadRow, match=r"expected|finite"):
