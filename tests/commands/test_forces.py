@@ -558,3 +558,22 @@ def test_what_a_file_calls_unknown_is_found_where_a_force_is_measured_and_said_t
     with pytest.raises(CheckFailed):  # this record is of no mass
         main(["identify", "--vehicle", str(tmp_path / "mass.yaml"), "--free", "stiffness_n_per_m", str(shaken)])
     assert "held, although the file calls them unknown: damping_n_s_per_m" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rate_hz", [100, 200, 240, 1000])
+def test_the_shortest_test_of_a_part_is_compared_at_any_rate(rate_hz: int, tmp_path: Path,
+                                                             capsys: pytest.CaptureFixture[str]) -> None:
+    """A sine of 5 Hz for just over a second, noise of 0.2 N: a damper of 100 N s/m where the file says 150."""
+    time_s = np.arange(int(1.01 * rate_hz)) / rate_hz
+    way_m, rate_mps = 0.01 * np.sin(31.416 * time_s), 0.31416 * np.cos(31.416 * time_s)
+    drawn = np.random.default_rng(1).normal(0.0, 0.2, len(time_s))
+    run = tmp_path / "run"
+    run.mkdir()
+    for name, head, values in (("excitation.csv", "t_s,displacement_m", way_m),
+                               ("drive.csv", "t_s,force_n", 100.0 * rate_mps + drawn)):
+        np.savetxt(run / name, np.stack([time_s, values], axis=1), "%.9g", ",", header=head, comments="")
+    (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 0 +- 100\n"
+                                        "damping_n_s_per_m: 150 +- 60%\npreload_n: 0\n")
+    assert main(["compare", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
+    refitted = json.loads(capsys.readouterr().out)["refitted"]
+    assert refitted["shifts"]["damping_n_s_per_m"] == pytest.approx(-1 / 3, abs=0.02)

@@ -109,7 +109,7 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
     highest = (power, freedom) if freedom else (levels[-1], freedoms[-1])
     by_level = sorted(zip(levels, freedoms, strict=True))
     louder = EQUAL_SIGMA
-    if power < _FILTERED * by_level[0][0]:
+    if not freedom or power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
         louder = OF_QUIETEST
     power, freedom = pooled(by_level, power, freedom, louder)

@@ -70,6 +70,9 @@ class Bands:
         f_hz = np.fft.rfftfreq(size, 1 / rate)
         band_hz = run.pass_band_hz if signal is None else (0.0, rate / 2)
         edges = _edges_hz(run, band_hz, run.facts.main if signal is None else run.signals[signal])
+        # A run of a second has lines 1 Hz apart: a band that holds none belongs to the one below.
+        held = np.diff(np.searchsorted(f_hz, edges)) > 0
+        edges = np.array([edges[0], *edges[:-1][held][1:], edges[-1]])
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         passed = band_hz[1] >= rate / 2

@@ -53,9 +53,10 @@ class SpeedTest(ResidualTest):
 
         residuals = tested.residuals
         speed = block_means(residuals, residuals.kept(lambda run: run.speed_mps))
+        if (freedom := len(speed) - 5) < 6:
+            return self.result()
         slow, fast = (float(np.quantile(speed, one)) for one in (0.05, 0.95))
-        freedom = len(speed) - 5
-        if fast < LEAST_GROWTH * max(slow, 0.1) or freedom < 6:
+        if fast < LEAST_GROWTH * max(slow, 0.1):
             return self.result()
         residual, model = (np.log(np.maximum(block_means(residuals, [one**2 for one in signals]), 1e-300))
                            for signals in (residuals.residual, residuals.model))
