@@ -248,9 +248,12 @@ def conclusion(found: LabComparison) -> str:
         return ("The model fits, but only with parameters far from those of the vehicle's file. Either the file is "
                 "wrong, or these parameters imitate a missing effect.")
     if found.missing:
-        return ("The model lacks something: after a refit, the residual (measured - model) still depends on the road "
-                "and the car's motion.")
+        return ("The model lacks something: after a refit, the residual (measured - model) still depends on "
+                + ("what drives the rig and on its motion." if _on_rig(found) else "the road and the car's motion."))
     if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
+        if _on_rig(found):
+            return ("The model lacks no effect of the rig. The residual (measured - model) does not depend on what "
+                    "drives it; it looks like coloured noise of the sensor.")
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
@@ -258,12 +261,17 @@ def conclusion(found: LabComparison) -> str:
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
 
 
+def _on_rig(found: LabComparison) -> bool:
+    return all(run.timed for run in found.refitted.residuals.runs)
+
+
 def next_step(found: LabComparison) -> str:
     """What to do now."""
     if found.refitted.error > POOR_ERROR:
         return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
-        return "Next: nothing. Rougher roads or other speeds would test the model harder."
+        harder = "Stronger motion or other frequencies" if _on_rig(found) else "Rougher roads or other speeds"
+        return f"Next: nothing. {harder} would test the model harder."
     if any(test.road for test in found.tests_found):
         return "Next: ridelog diagnose with the same arguments finds the physical effect that explains the residual."
     return (f"Next: ridelog diagnose with the same arguments. If it finds nothing, ridelog identify --free "

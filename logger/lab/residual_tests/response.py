@@ -32,11 +32,12 @@ class CoherenceTest(ResidualTest):
         bands = [band for band in residuals.bands if band.from_hz < top]
         most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
                    * coherence.power_between(band.from_hz, band.to_hz))
-        return self.result(share, None, p_value, share > LEAST_SHARE, band=most.name)
+        return self.result(share, None, p_value, share > LEAST_SHARE, band=most.name,
+                           of="what drives the rig" if all(run.timed for run in residuals.runs) else "the road")
 
     def sentence(self, found: ResidualTestResult) -> str:
         """How much, and where."""
-        return (f"At least {percent(found.value)} of the residual is coherent with the road, mostly "
+        return (f"At least {percent(found.value)} of the residual is coherent with {found.figures['of']}, mostly "
                 f"{BANDS[found.figures['band']]}: not noise, and a linear effect could cause it.")
 
 
