@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -39,7 +40,7 @@ from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import Chosen, Effect, ForceEffect, Sought, chosen
+from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, chosen
 from logger.vehicle.uncertain import Known, Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
@@ -265,7 +266,7 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     on_rig    as ``sought_effects``
     scales    as ``sized``
     """
-    effects, own = {name: sized(one, model.vehicle, scales) for name, one in sought_effects(
+    effects, own = {name: sized(_on_rig(one) if on_rig else one, model.vehicle, scales) for name, one in sought_effects(
         on_rig, model.vehicle.model == "component").items()}, {}
     for one in model.effects:
         if one.file is not None:
@@ -280,6 +281,16 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
         if not is_shipped:
             own[effect.name] = file
     return effects, own
+
+
+def _on_rig(effect: Effect) -> Effect:
+    """The same effect, of which no road is asked to show it."""
+    if effect.sought is not Sought.ALWAYS:
+        return effect  # it speaks of rigs
+    found = copy(effect)
+    found.shown_by = ("excite it well above its natural frequencies" if isinstance(effect, SensorEffect) else
+                      "move it faster and farther, at several amplitudes, through its natural frequencies")
+    return found
 
 
 def sought_effects(on_rig: bool = False, of_part: bool = False) -> dict[str, Effect]:
