@@ -96,7 +96,7 @@ class LabDiagnosis:
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
                          farthest first, by their tolerance; of masses and forces, against their mean
-    left_open            numbers of which the vehicle's file says less than is usual: their value and its standard error
+    left_open            numbers of which less was known than is usual: their value and its standard error
     shows_forces         whether a force was measured, so that these are known for themselves
     as_moved             the effect that changes the records as the move of all of these does; None: none does
     effects              of the model that it ends with, with standard errors
@@ -262,7 +262,8 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
             state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
         left_open=left_open,
         ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
-        as_moved=None if left_open else effect_as_moved(after, [one for one in tried if one.name not in state.names]),
+        as_moved=None if {*left_open} & {*fine.tolerance.by_name} else effect_as_moved(
+            after, [one for one in tried if one.name not in state.names]),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,

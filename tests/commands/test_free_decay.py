@@ -52,7 +52,7 @@ def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("vehicle", "lasts_s", "words"), [
-    (VEHICLE, 0.6, "run/drive.csv: expected a drive of 0.896 s or longer, found 0.6 s"),
+    (VEHICLE, 0.6, "run/drive.csv: expected a record of 0.896 s or longer, found 0.6 s"),
     ("name: part\nmodel: component\nstiffness_n_per_m: 1\ndamping_n_s_per_m: 1\n", 3.0,
      "run: expected an excitation.csv with t_s,displacement_m, as the vehicle is a part that its bench moves"),
 ])

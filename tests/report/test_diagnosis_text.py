@@ -138,7 +138,7 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
 def test_parameters_that_the_file_leaves_open_are_said_as_they_were_fitted() -> None:
     found = replace(NOTHING, left_open={"stiffness_n_per_m": (2100.4, 1.4), "mass_kg": (2.45, 0.02)})
     fitted = diagnosis_summary(found)[1]
-    assert fitted == ("Parameters that the vehicle's file leaves open, as fitted: stiffness_n_per_m 2100.4 ± 1.4 N/m "
+    assert fitted == ("Parameters that were left open, as fitted: stiffness_n_per_m 2100.4 ± 1.4 N/m "
                       "and mass_kg 2.45 ± 0.02 kg.")
     assert diagnosis_json(found)["fitted_parameters"]["mass_kg"] == {"value": 2.45, "standard_error": 0.02}
 

@@ -216,7 +216,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     return Identification(
         "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
-        tuple(doubts(fit, *checks)))
+        tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
 
 
 def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequence[Record],

@@ -418,12 +418,16 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
 
 def check_decay(drive: Drive, file: Path) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives."""
+    import numpy as np
+
     from logger.runs import begins_freely
 
-    half = len(drive.accel_z_mps2) // 2
     if begins_freely(getattr(drive, "track", None)):
-        first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
-        if last > _DIES_DOWN * first:
+        samples = drive.accel_z_mps2
+        begun = samples[np.abs(samples - np.median(samples)).argmax():]  # it may lie still before it is let go
+        half = len(begun) // 2
+        first, last = (float(part.std()) for part in (begun[:half], begun[half:]))
+        if half and last > _DIES_DOWN * first:
             raise BadInput(f"{file}: expected an excitation that moves the car, or a record that dies down, as of what "
                            f"is let go: nothing drives it, and its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
@@ -448,11 +452,12 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
         if (share := share_at_ends(samples)) > _CLIPPED_SHARE:
             raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
                            "the smallest one exactly, as of an amplifier at its end: set its range wider, or add a "
-                           "column usable, 2 there and 1 elsewhere")
+                           "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
             from_s, to_s = (float(drive.time_s[min(one, len(samples) - 1)]) for one in still)
             raise BadInput(f"{file}: {signal.name}: expected readings, found {samples[still[0]]:g} from {from_s:.4g} "
-                           f"to {to_s:.4g} s, as of a cable that is out: add a column usable, 0 there and 1 elsewhere")
+                           f"to {to_s:.4g} s, as of a cable that is out: add a column usable, 0 there and 1 elsewhere "
+                           "(1 everywhere if this is right)")
     times_s = track.start_s + np.arange(len(track.elevation_m)) / track.rate_hz
 
     def then(samples: Array) -> Array:
@@ -576,22 +581,23 @@ def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
 
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
-    """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is shorter than 5 s, has
+    """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is too short, has
     another rate than the others, recorded nothing, or repeats samples."""
     import numpy as np
 
     from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
-    from logger.runs import READING, unknown_past_s
+    from logger.runs import READING, begins_freely, unknown_past_s
 
-    past_s, shortest_s = unknown_past_s(getattr(drive, "track", None)), least_s(drive, vehicle)
+    track = getattr(drive, "track", None)
+    past_s, shortest_s = unknown_past_s(track), least_s(drive, vehicle)
     least_hz, seen = _least_hz(drive, vehicle)
     if drive.rate_hz < (1 - _CLOCK) * least_hz:
         raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
                        f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < shortest_s:
-        raise BadInput(f"{file}: expected a drive of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
+        raise BadInput(f"{file}: expected a record of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
@@ -605,7 +611,8 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
     check_decay(drive, file)
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
-    if is_acceleration and abs(counted.mean()) > _MOST_MEAN_MPS2:
+    # Three periods of what rings loudly have a mean of their own.
+    if is_acceleration and abs(counted.mean()) > max(_MOST_MEAN_MPS2, counted.std() if begins_freely(track) else 0.0):
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
     read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]

@@ -241,7 +241,7 @@ def evidence(found: LabComparison) -> list[str]:
 
 def conclusion(found: LabComparison) -> str:
     """The answer: whether the model lacks something."""
-    if found.refitted.error > POOR_ERROR:
+    if _explains_nothing(found):
         return ("The model explains next to nothing of what was measured, even with its parameters refitted. Do both "
                 "files of the run belong together? Are signs and units right? If they are, something large is missing.")
     if found.missing and not any(test.road for test in found.tests_found):
@@ -261,13 +261,19 @@ def conclusion(found: LabComparison) -> str:
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
 
 
+def _explains_nothing(found: LabComparison) -> bool:
+    """Whether the refitted model explains less of what is no noise than ``POOR_ERROR`` has it."""
+    noise = min(found.floor, 1.0) ** 2
+    return found.refitted.error**2 - noise > POOR_ERROR**2 * (1 - noise)
+
+
 def _on_rig(found: LabComparison) -> bool:
     return all(run.timed for run in found.refitted.residuals.runs)
 
 
 def next_step(found: LabComparison) -> str:
     """What to do now."""
-    if found.refitted.error > POOR_ERROR:
+    if _explains_nothing(found):
         return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
         harder = "Stronger motion or other frequencies" if _on_rig(found) else "Rougher roads or other speeds"

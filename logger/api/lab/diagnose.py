@@ -429,7 +429,7 @@ def _car(found: LabDiagnosis) -> list[str]:
     if found.left_open:
         fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
                              for name, (value, error) in found.left_open.items()], "and")
-        lines.append(f"Parameters that the vehicle's file leaves open, as fitted: {fitted}.")
+        lines.append(f"Parameters that were left open, as fitted: {fitted}.")
     if found.moved:
         lines.append(_moved(found))
     if found.as_moved is not None:

@@ -322,5 +322,8 @@ def _spectrum(run: Run, samples: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
     edges = np.arange(_LOWEST_HZ, HIGHEST_OF_RATE * run.rate_hz + 0.1, _WIDTH_HZ)
     floor = _LEAST_POWER * power.max() + np.finfo(float).tiny
-    means = np.exp([np.log(power[(f_hz >= low) & (f_hz < high)] + floor).mean() for low, high in pairwise(edges)])
+    # In a run of a second no line may lie in a band: it has the power of the nearest.
+    inside = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
+    means = np.exp([np.log(power[one if len(one) else [np.abs(f_hz - low).argmin()]] + floor).mean()
+                    for one, low in zip(inside, edges[:-1], strict=True)])
     return means, means < 2 * floor

@@ -29,6 +29,8 @@ def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap
     None where no frequency that is tested has power around it.
     """
     reach = max(NEIGHBOURS, reach)
+    if len(power) <= 2 * reach:  # no frequency has so many neighbours
+        return None
     around = np.ones(2 * reach + 1)
     around[reach - gap : reach + gap + 1] = 0.0
     level = np.convolve(power, around / around.sum(), mode="same")

@@ -383,7 +383,7 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
     searched for in the slow part of the motion, whose waves are long."""
     pairs: list[tuple[Run, Array, Array]] = []
     for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
-        size = max(1, round(slow_s * run.rate_hz))
+        size = min(max(1, round(slow_s * run.rate_hz)), run.count - 2)
         hat = np.hanning(size + 2)[1:-1]
         slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, run.main(predicted))]
         pairs.append((run, slow[0], slow[1]))
