@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.support.command import called
+from tests.support.slow import slow
 
 M, K, C = 0.79, 280.0, 2.1
 VEHICLE = f"name: mass\nmodel: single_mass\nmass_kg: {M} +- 1%\nstiffness_n_per_m: 350\ndamping_n_s_per_m: 4\n"
@@ -49,6 +50,27 @@ def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
                                ).stdout)
     assert answer["runs"][0]["samples"] == 300
     assert "lacks nothing" in answer["evidence"][0]
+
+
+@pytest.mark.parametrize("frequency_hz", [20.0, *slow(170.0, 400.0)])
+def test_three_periods_of_a_stiff_mass_are_enough(frequency_hz: float, tmp_path: Path) -> None:
+    """1 kg with a damping ratio of 3 %, let go 1 mm from its rest, as the textbook has it."""
+    w, share = 2 * np.pi * frequency_hz, 0.03
+    damped = w * np.sqrt(1 - share**2)
+    time_s = np.arange(66) / (20 * frequency_hz)
+    decays = 0.001 * np.exp(-share * w * time_s)
+    way_m = decays * (np.cos(damped * time_s) + share * w / damped * np.sin(damped * time_s))
+    rate_mps = -decays * w**2 / damped * np.sin(damped * time_s)
+    accel_mps2 = -(w**2) * way_m - 2 * share * w * rate_mps
+    accel_mps2 += np.random.default_rng(1).normal(0, 1e-3 * accel_mps2.std(), len(time_s))
+    (tmp_path / "run").mkdir()
+    np.savetxt(tmp_path / "run" / "drive.csv", np.stack([time_s, accel_mps2], axis=1), "%.9g", ",",
+               header="t_s,accel_z_mps2", comments="")
+    vehicle = tmp_path / "vehicle.yaml"
+    vehicle.write_text(f"name: mass\nmodel: single_mass\nmass_kg: 1\nstiffness_n_per_m: {w**2}\n"
+                       f"damping_n_s_per_m: {2 * share * w}\n")
+    assert json.loads(called("compare", "--json", "--vehicle", vehicle, tmp_path / "run").stdout)["error"] < 2e-3
+    assert json.loads(called("diagnose", "--json", "--vehicle", vehicle, tmp_path / "run").stdout)["verdict"] == []
 
 
 @pytest.mark.parametrize(("vehicle", "lasts_s", "words"), [

@@ -28,6 +28,8 @@ def test_a_cable_that_is_out_is_found_and_what_rests_is_not() -> None:
     out[1000:1100] = out[1000]
     assert longest_still(out, RATE_HZ) == (1000, 1100)
     assert longest_still(0.2 * np.round(np.exp(-TIME_S) * SWING / 0.2), RATE_HZ) is None
+    play = 0.1 * np.round(30.0 * np.sign(SWING) * np.maximum(np.abs(SWING) - 0.4, 0.0))  # read in steps
+    assert longest_still(play, RATE_HZ) is None
 
 
 @pytest.mark.parametrize("measured", [0, 1, 2])
