@@ -18,6 +18,7 @@ import pytest
 
 import logger.api
 import ridelog
+from logger.store.formats.effect_file import shipped_effects
 
 from ..support.slow import slow
 
@@ -50,7 +51,7 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
 def test_examples(module: ModuleType, names: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Once each: a function that asks a question shows the question's examples. A search has few effects to try."""
     if "lab" in module.__name__:
-        few = {name: ridelog.effects()[name] for name in ("sensor_gain", "sensor_offset", "time_offset")}
+        few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset", "time_offset")}
         monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     for one in doctest.DocTestFinder().find(module, extraglobs=names):
