@@ -11,7 +11,7 @@ depend on.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -317,8 +317,9 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations. Effects that are at an end of their range then are dropped,
-    and those that are not unusually far from doing nothing: they made up for the roughness of the search's simulations
-    (a delay beside dry friction, whose force comes part of a step late)."""
+    and what they imitated is sought without them (a damper whose knee goes to 0 is friction). Dropped are those, too,
+    that are not unusually far from doing nothing: they made up for the roughness of the search's simulations (a delay
+    beside dry friction, whose force comes part of a step late)."""
     search.progress("fitting it finely")
     fine = selection.before.posterior.simulated_finely()
     while True:
@@ -326,15 +327,18 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
         start = fine.state_at(state.effects, state.logs, state.record, state.size)
         after = fit_model(fine, start, selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if is_outside_data(fine, one)]
-        if not ended:
+        if ended:
+            selection = search.without_effect(selection, ended[0])
+            search = replace(search, effects=[one for one in search.effects if one.name != ended[0]])
+            selection = search.go_on(selection)
+        else:
             errors = standard_errors(after)
             far = {one.effect.name: deviations_from_null(one, errors.numbers)
                    for one in errors.effects[search.present:]}
             weakest = min(far, key=far.__getitem__, default=None)
             if weakest is None or far[weakest] > UNUSUAL_SIGMA:
                 return selection, after
-            ended = [weakest]
-        selection = search.without_effect(selection, ended[0])
+            selection = search.without_effect(selection, weakest)
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
