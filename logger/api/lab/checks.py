@@ -243,8 +243,10 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
 def _explained_by_an_effect(found: AnotherCar, model: CarModel, known: Mapping[str, Effect], numbers: float) -> bool:
     """Whether an effect, in the model's car, explains as much as another car does."""
     from logger.lab.best_effect import error_with_best_effect
+    from logger.lab.selection.holdout import ROUNDING
 
-    return error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) <= found.found_error
+    error = error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers)
+    return error <= (1 + ROUNDING) * found.found_error  # both may have come down to the noise
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
