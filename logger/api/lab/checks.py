@@ -425,8 +425,8 @@ def check_decay(drive: Drive, file: Path) -> None:
     from logger.runs import begins_freely
 
     if begins_freely(getattr(drive, "track", None)):
-        samples = drive.accel_z_mps2
-        begun = samples[np.abs(samples - np.median(samples)).argmax():]  # it may lie still before it is let go
+        size = np.abs(drive.accel_z_mps2 - np.median(drive.accel_z_mps2))
+        begun = drive.accel_z_mps2[(size > 0.5 * size.max()).argmax():]  # it may lie still before it is let go
         half = len(begun) // 2
         first, last = (float(part.std()) for part in (begun[:half], begun[half:]))
         if half and last > _DIES_DOWN * first:
