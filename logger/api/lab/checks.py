@@ -420,16 +420,12 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
 
 def check_decay(drive: Drive, file: Path) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives."""
-    import numpy as np
-
     from logger.runs import begins_freely
 
     if begins_freely(getattr(drive, "track", None)):
-        size = np.abs(drive.accel_z_mps2 - np.median(drive.accel_z_mps2))
-        begun = drive.accel_z_mps2[(size > 0.5 * size.max()).argmax():]  # it may lie still before it is let go
-        half = len(begun) // 2
-        first, last = (float(part.std()) for part in (begun[:half], begun[half:]))
-        if half and last > _DIES_DOWN * first:
+        half = len(drive.accel_z_mps2) // 2
+        first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
+        if last > _DIES_DOWN * first:
             raise BadInput(f"{file}: expected an excitation that moves the car, or a record that dies down, as of what "
                            f"is let go: nothing drives it, and its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
