@@ -311,6 +311,11 @@ class Run:
         return isinstance(self.track, Excitation) and not np.ptp(self.track.elevation_m)
 
 
+def are_on_rig(runs: Sequence[Run]) -> bool:
+    """Whether all runs are driven by time."""
+    return all(run.timed for run in runs)
+
+
 def begins_freely(track: Track | Excitation | None) -> bool:
     """Whether the state in which a run begins is one of its unknowns: that of a rig which nothing drives."""
     return isinstance(track, Excitation) and track.is_still

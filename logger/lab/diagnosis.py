@@ -29,7 +29,7 @@ from logger.lab.likelihood.noise_floor import (
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
+from logger.lab.likelihood.standard_errors import StandardErrors, deviations_from_null, standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
@@ -46,7 +46,7 @@ from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
-from logger.runs import BY_ROAD
+from logger.runs import BY_ROAD, are_on_rig
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
@@ -242,10 +242,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     if colour is not None:
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
         excess = max(excess_of.values())
-    vehicle = fine.prior.vehicle(fine.vehicle, state.logs)
-    left_open = {name: (value, value * float(error)) for name, error, deviation in zip(
-        fine.prior.names, errors.logs, fine.prior.deviations, strict=True)
-        if deviation > Tolerance().numbers for value in [named_parameters.read(vehicle, name)]}
+    left_open = _left_open(fine, state, errors)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return LabDiagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
@@ -289,10 +286,20 @@ def refit(posterior: Posterior, nominal: State) -> Baseline:
     return Baseline.of(fit_model(posterior, nominal))
 
 
+def _left_open(posterior: Posterior, state: State, errors: StandardErrors) -> dict[str, tuple[float, float]]:
+    """As of ``LabDiagnosis``."""
+    vehicle, found = posterior.prior.vehicle(posterior.vehicle, state.logs), {}
+    for name, error, deviation in zip(posterior.prior.names, errors.logs, posterior.prior.deviations, strict=True):
+        if deviation > Tolerance().numbers:
+            value = named_parameters.read(vehicle, name)
+            found[name] = value, value * float(error)
+    return found
+
+
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
     runs = posterior.runs.runs
-    driven = (all(run.two_tracks for run in runs), all(run.timed for run in runs), all(run.pushed for run in runs))
+    driven = (all(run.two_tracks for run in runs), are_on_rig(runs), all(run.pushed for run in runs))
     by_road = all(run.facts.places_by == BY_ROAD for run in runs)
     at_rest = posterior.vehicle.model == "single_mass" and all(run.at_rest for run in runs)
     there = {one.effect.name for one in present}

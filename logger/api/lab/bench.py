@@ -33,7 +33,7 @@ from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment, screen
 from logger.profiles.excitation import Excitation
-from logger.runs import Array, Run
+from logger.runs import Array, Run, are_on_rig
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, effect_file
@@ -96,7 +96,7 @@ class Bench:
     @property
     def timed(self) -> bool:
         """Whether all runs are driven by time."""
-        return all(run.timed for run in self.runs.runs)
+        return are_on_rig(self.runs.runs)
 
     @property
     def pushed(self) -> bool:
@@ -203,7 +203,7 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
     low_pass_hz what lies above is not compared; None: all is that the records hold
     """
-    effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs), _scales(word, model, runs))
+    effects, files = known_effects(model, effect_files, are_on_rig(runs.runs), _scales(word, model, runs))
     if searches is not None:
         require_compiler(searches, effects.values())
     found = Bench(word, model, runs, effects, files, tolerance)
@@ -266,8 +266,9 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     on_rig    as ``sought_effects``
     scales    as ``sized``
     """
-    effects, own = {name: sized(_on_rig(one) if on_rig else one, model.vehicle, scales) for name, one in sought_effects(
-        on_rig, model.vehicle.model == "component").items()}, {}
+    sought, own = sought_effects(on_rig, model.vehicle.model == "component"), dict[str, str]()
+    effects = {name: sized(_shown_on_rig(one) if on_rig else one, model.vehicle, scales)
+               for name, one in sought.items()}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
@@ -283,7 +284,7 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     return effects, own
 
 
-def _on_rig(effect: Effect) -> Effect:
+def _shown_on_rig(effect: Effect) -> Effect:
     """The same effect, of which no road is asked to show it."""
     if effect.sought is not Sought.ALWAYS:
         return effect  # it speaks of rigs

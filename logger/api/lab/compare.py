@@ -56,7 +56,7 @@ from logger.report.document import (
     tiles,
 )
 from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, wrapped
-from logger.runs import Run, normalised_rms_error, runs_left_out, short_names
+from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Effect
 
@@ -241,6 +241,7 @@ def evidence(found: LabComparison) -> list[str]:
 
 def conclusion(found: LabComparison) -> str:
     """The answer: whether the model lacks something."""
+    on_rig = are_on_rig(found.refitted.residuals.runs)
     if _explains_nothing(found):
         return ("The model explains next to nothing of what was measured, even with its parameters refitted. Do both "
                 "files of the run belong together? Are signs and units right? If they are, something large is missing.")
@@ -249,9 +250,9 @@ def conclusion(found: LabComparison) -> str:
                 "wrong, or these parameters imitate a missing effect.")
     if found.missing:
         return ("The model lacks something: after a refit, the residual (measured - model) still depends on "
-                + ("what drives the rig and on its motion." if _on_rig(found) else "the road and the car's motion."))
+                + ("what drives the rig and on its motion." if on_rig else "the road and the car's motion."))
     if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
-        if _on_rig(found):
+        if on_rig:
             return ("The model lacks no effect of the rig. The residual (measured - model) does not depend on what "
                     "drives it; it looks like coloured noise of the sensor.")
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
@@ -267,16 +268,13 @@ def _explains_nothing(found: LabComparison) -> bool:
     return found.refitted.error**2 - noise > POOR_ERROR**2 * (1 - noise)
 
 
-def _on_rig(found: LabComparison) -> bool:
-    return all(run.timed for run in found.refitted.residuals.runs)
-
-
 def next_step(found: LabComparison) -> str:
     """What to do now."""
     if _explains_nothing(found):
         return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
-        harder = "Stronger motion or other frequencies" if _on_rig(found) else "Rougher roads or other speeds"
+        on_rig = are_on_rig(found.refitted.residuals.runs)
+        harder = "Stronger motion or other frequencies" if on_rig else "Rougher roads or other speeds"
         return f"Next: nothing. {harder} would test the model harder."
     if any(test.road for test in found.tests_found):
         return "Next: ridelog diagnose with the same arguments finds the physical effect that explains the residual."
@@ -490,7 +488,7 @@ def _alignment(found: LabComparison) -> Html:
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
-    if not lines or all(run.timed for run in runs):
+    if not lines or are_on_rig(runs):
         return EMPTY
     drawn = chart(Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]",
                            tuple(lines), (0.0, "together")))

@@ -16,6 +16,7 @@ from logger.lab.residuals.block_statistics import band_pass, block_means, mean_o
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import coherence_with_road
 from logger.printable import percent
+from logger.runs import are_on_rig
 from logger.vehicle.simulate import PASS_OF_RATE
 
 
@@ -33,7 +34,7 @@ class CoherenceTest(ResidualTest):
         most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
                    * coherence.power_between(band.from_hz, band.to_hz))
         return self.result(share, None, p_value, share > LEAST_SHARE, band=most.name,
-                           of="what drives the rig" if all(run.timed for run in residuals.runs) else "the road")
+                           of="what drives the rig" if are_on_rig(residuals.runs) else "the road")
 
     def sentence(self, found: ResidualTestResult) -> str:
         """How much, and where."""

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.lag import WINDOW_S
-from logger.runs import Run
+from logger.runs import Run, are_on_rig
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import body_and_wheels_hz
@@ -198,7 +198,7 @@ def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
 
 def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
     """Parts by speed, in so many round steps at most, or one more; none on rigs."""
-    if all(run.timed for run in residuals.runs):
+    if are_on_rig(residuals.runs):
         return ()
     speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
     low, high = float(speed.min()), float(speed.max())

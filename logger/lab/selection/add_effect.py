@@ -30,6 +30,7 @@ from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep, rising
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import cross_validate
+from logger.runs import are_on_rig
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -200,7 +201,7 @@ def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...], 
                 rounds: int = 6) -> State | None:
     """On rigs, whose numbers are known less, where squares are least from sizes of the last effect that a search begins
     at, the best so many of them improved; None on roads."""
-    if not all(run.timed for run in posterior.runs.runs):
+    if not are_on_rig(posterior.runs.runs):
         return None
     by_squares, one = BySquares(posterior), nominal[-1]
     cars = (near.logs, posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))

@@ -3,8 +3,8 @@
 Problem: an error is honest on data that the fit did not see, and twenty models cannot be fitted three times over.
 Solution: three sets of stretches are held out in turn, and one Gauss-Newton step from the fit of all data gives the fit
 without them (A. Beirami et al., Advances in Neural Information Processing Systems 30, 2017). Where the car was is not
-judged: distance errors stay as fitted to all data. Nor is a number that one stretch alone tells, as a stop that is hit
-by one pothole, or the damping of a mode that a sweep passes once: without that stretch nothing tells it, and one step
+judged: distance errors stay as fitted to all data. Nor is a number that is estimated from one stretch alone, as of
+a stop that is hit by one pothole, or the damping of a mode that a sweep passes once: one step without that stretch
 would extrapolate without limit. It stays as fitted too.
 """
 
@@ -30,7 +30,7 @@ _STRETCH_S, _FOLDS = 6.0, 3
 """Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
 set."""
 _ONCE = 0.1
-"""A number of which the other stretches hold a smaller share of the information is told once: of one that acts
+"""A number of which the other stretches hold a smaller share of the information is estimated from one: of one that acts
 throughout they hold two thirds."""
 
 

@@ -24,7 +24,7 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import HoldOut, cross_validate
-from logger.runs import Run
+from logger.runs import Run, are_on_rig
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
 from logger.vehicle.effects.time_offset import EFFECT as TIME_OFFSET
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, read, with_coordinates
@@ -116,7 +116,7 @@ class Baseline:
     @property
     def on_rig(self) -> bool:
         """Whether all runs are driven by time."""
-        return all(run.timed for run in self.posterior.runs.runs)
+        return are_on_rig(self.posterior.runs.runs)
 
     @cached_property
     def is_within_calibration(self) -> bool:
@@ -236,7 +236,7 @@ def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment, falls: i
                      gains nine tenths of its fit)
     """
     bests = []
-    timed = all(run.timed for run in base.posterior.runs.runs)
+    timed = base.on_rig
     for kind in effect.delaying_trials(seen):
         tried: list[tuple[Trial, float]] = []
         for values in kind:
