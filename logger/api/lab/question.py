@@ -14,7 +14,6 @@ from logger.api.question import (
     Candidates,
     EffectFiles,
     LongQuestion,
-    LowPass,
     Option,
     Out,
     Runs,
@@ -38,7 +37,6 @@ class LabQuestion(LongQuestion):
     """What the lab's verbs have in common; each has a ``vehicle``, ``runs`` and maybe ``effect_files`` as well."""
 
     tolerance: Tolerance = None
-    low_pass_hz: LowPass = None
     anyway: Anyway = False
 
     def files_read(self) -> Sequence[Path]:
