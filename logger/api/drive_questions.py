@@ -3,7 +3,7 @@ learn-car.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
@@ -19,7 +19,6 @@ from logger.api.question import (
     MODAL_METHODS_GONE,
     MOST_ROAD_SAMPLES,
     NOISE,
-    PASSENGERS,
     PICTURES,
     RATE,
     ROAD_WAVINESS,
@@ -170,7 +169,7 @@ class CalibrateQuestion(LongQuestion):
     cache, and found again, unless an effect of your own is in it.
 
       ridelog calibrate --vehicle rav4-2009
-      ridelog calibrate --vehicle mycar.yaml --passengers 2
+      ridelog calibrate --vehicle mycar.yaml --out mycar.csv
 
     In Python: raises BadInput for numbers out of range, and as ``read_vehicle``. What is found of a model is not kept.
     Source: Blum 2015, section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
@@ -183,9 +182,6 @@ class CalibrateQuestion(LongQuestion):
     vehicle: VehicleName
     _: KW_ONLY
     window_m: Annotated[float, InPython("length of a window [m], 2 to 200 (default: 7.62, 25 ft)")] = WINDOW_M
-    passengers: Annotated[int, Option(
-        "people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a quarter car "
-        "a quarter", PASSENGERS, "N")] = 0
 
     stays: ClassVar[bool] = True
 
@@ -302,8 +298,8 @@ class SimulateQuestion(Question):
       ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
       ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --effect wheel_lift \\
           --effect tire_damping:tire_damping_n_s_per_m=200 --out drive.csv
-      ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
-          --out run/drive.csv --profile-out run/profile.csv
+      ridelog simulate --vehicle rav4-2009 --profile 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 \\
+          --speed 5 --out run/drive.csv --out run/profile.csv
       ridelog simulate --vehicle ./rig.yaml --excitation run/excitation.csv --rate 500 --out run/drive.csv
 
     The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires
@@ -312,8 +308,8 @@ class SimulateQuestion(Question):
     the profile.csv it was driven on is a run. A rig that is driven by time (--excitation) has no speed and no distance;
     its drive.csv lasts as long as the excitation.csv beside it.
 
-    Physical effects are those of the vehicle's file, then those of --effect; --list-effects lists them. The speed
-    asked for is the true one: with speed_scale the drive's own columns say something else.
+    Physical effects are those of the vehicle's file, then those of --effect; docs/reference/effects.md lists them. The
+    speed asked for is the true one: with speed_scale the drive's own columns say something else.
 
     In Python: a run. Raises BadInput for what no car can do, obstacles that do not lie on the road, and as
     ``read_vehicle`` and ``read_profile``.
@@ -346,34 +342,37 @@ class SimulateQuestion(Question):
             raise self.wrong("speed_mps", words)
 
 
-def _speed(text: str) -> float | Path:
-    try:
-        return float(text)
-    except ValueError:
-        if text[:1].isdigit() and not Path(text).exists():
-            raise ValueError("expected a number in m/s, without its unit, or a file") from None
-        return Path(text)
+_FLAT = Range(1.0, 10_000.0, "m")
+
+
+def _file_or(unit: str) -> Callable[[str], float | Path]:
+    """A reader of a number in a unit, or of a file's name."""
+    def read(text: str) -> float | Path:
+        try:
+            return float(text)
+        except ValueError:
+            if text[:1].isdigit() and not Path(text).exists():
+                raise ValueError(f"expected a number in {unit}, without its unit, or a file") from None
+            return Path(text)
+
+    return read
 
 
 @dataclass(frozen=True)
 class SimulateCommand(SimulateQuestion):
-    """At the terminal files stand for roads, and more can be asked for."""
+    __doc__ = SimulateQuestion.__doc__    # at the terminal files stand for roads, and more can be asked for
 
-    vehicle: Annotated[Vehicle | None, Option(
-        "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)", metavar="NAME|FILE",
-        read=str)] = None  # type: ignore[assignment]
-    profile: Annotated[Path | None, Option(
-        "CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
-        "left one", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
+    profile: Annotated[Path | float | None, Option(
+        f"CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
+        f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M",
+        read=_file_or("m"))] = None  # type: ignore[assignment]
     speed_mps: Annotated[float | Path | None, Option(
         f"the same all the way, {SPEED.words}; or a CSV with t_s,speed_mps, straight lines between them: the drive "
-        "then lasts as long as the file", metavar="MPS|FILE", read=_speed)] = None  # type: ignore[assignment]
+        "then lasts as long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
     _: KW_ONLY
     excitation: Annotated[Path | None, Option(
         "what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m[,elevation_rear_m]); without "
         "--speed", metavar="FILE", read=Path)] = None
-    flat_m: Annotated[float | None, Option(
-        "a flat road of this length instead [m]", Range(1.0, 10_000.0, "m"), "M")] = None
     effects: Annotated[Sequence[str], Option(
         "a physical effect, or the path of a Python file with one of your own; may repeat. What is not said is at its "
         "usual value; takes the place of the vehicle's own effect of that name", metavar="NAME[:PARAM=VALUE,...]",
@@ -382,26 +381,29 @@ class SimulateCommand(SimulateQuestion):
         "further columns; may repeat. wheels: their acceleration; travel: extension of the suspensions; tires: height "
         "of the wheels over the road; body:ahead_m=X,left_m=Y: acceleration of another point of the body, from the "
         "centre of gravity", metavar="WHAT", read=str, many=list, flag="--output")] = ()
-    list_effects: Annotated[bool, Option(
-        "print the effects there are, with their parameters, and do nothing else")] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(given := [one for one in ("profile", "excitation", "flat_m") if getattr(self, one) is not None]) > 1:
-            raise self.wrong(given[1], f": expected no `{given[0]}` with it")
-        beside = [one for one in ("speed_mps", "obstacles") if getattr(self, one) not in (None, [])]
-        if self.excitation is not None and beside:
+        given = {one: getattr(self, one) for one in ("profile", "speed_mps", "obstacles")}
+        if self.excitation is not None and (beside := [one for one, value in given.items() if value not in (None, [])]):
             raise self.wrong(beside[0], ": expected none of it with `excitation`: a rig stands, and has no road")
+        if self.excitation is None and (missing := [one for one in ("profile", "speed_mps") if given[one] is None]):
+            raise self.complaint(f"simulate: expected {', '.join(f'`{one}`' for one in missing)}")
+        if isinstance(self.profile, float) and (words := _FLAT.fault(self.profile)):
+            raise self.wrong("profile", words)
+
+    def named(self) -> str:
+        return str(self.excitation or self.profile)
 
     def files_read(self) -> Sequence[Path]:
-        return [*super().files_read(), *([self.speed_mps] if isinstance(self.speed_mps, Path) else [])]
+        given = (self.profile, self.excitation, self.speed_mps)
+        return [*(one for one in given if isinstance(one, Path)), *files_of(self.vehicle)]
 
 
-SIMULATE = Verb(SimulateCommand, "", (
-    Out("drive to write; DIR/drive.csv beside DIR/profile.csv makes a run. FILE.html, .png, .svg or .pdf: pictures; "
-        "may repeat", metavar="FILE", others=("*",)),
-    Out("write the road that was driven as well, with its obstacles", "--profile-out", "FILE", ("*",), many=False,
-        is_drawn=False)))
+SIMULATE = Verb(SimulateCommand, "logger.api.simulation:simulation", (
+    Out("drive to write; a file called profile.csv: the road that was driven, with its obstacles. Both in one folder "
+        "are a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",),
+        required=True),))
 
 
 ProfileFile = Annotated[Union["Wheelpaths", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
@@ -492,7 +494,7 @@ class RandomRoadQuestion(Question):
     length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
     spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
     seed: Annotated[int, Option("another number, another road (default: 1)", Range(0, float("inf")), "N")] = 1
-    waviness: Annotated[float, Option("w", ROAD_WAVINESS, "W")] = 2.0
+    waviness: Annotated[float, InPython("w, the slope of the spectrum", ROAD_WAVINESS)] = 2.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

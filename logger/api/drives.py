@@ -1,4 +1,4 @@
-"""Drives: recorded ones as runs, simulated ones, and the roughness of the road as a drive shows it.
+"""Drives: recorded ones as runs, and the roughness of the road as a drive shows it.
 
 What was estimated of a drive's road, for a person and for a program.
 """
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger import bounds
-from logger.api.drive_questions import EstimateQuestion, SimulateQuestion
-from logger.api.question import Notify, function, named_numbers, silent
+from logger.api.drive_questions import EstimateQuestion
+from logger.api.question import Notify, function, silent
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, table
-from logger.api.vehicles import car_on, model_of
+from logger.api.vehicles import model_of
 from logger.chart_data import Array, line
 from logger.errors import BadInput
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
@@ -29,7 +29,7 @@ from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
-from logger.store.formats import drive_file, profile_file, vehicle_file
+from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.drive_file import facts_beside, write_run_facts
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
 
@@ -200,56 +200,6 @@ def make_run(
     if not all(np.isfinite(one).all() for one in (accel, speed, distance)):
         raise BadInput(f"{name}: expected finite values")
     return Run(Path(name), rate_hz, np.arange(len(accel)) / rate_hz, accel, speed, distance, None, None, profile)
-
-
-def simulated(question: SimulateQuestion) -> Run:
-    """The answer to ``SimulateQuestion``, which says what is raised."""
-    from logger.simulation.virtual_drive import (
-        SENSOR,
-        Obstacle,
-        SensorErrors,
-        at_one_speed,
-        motion_along,
-        recorded_drive,
-        with_obstacles,
-    )
-    from logger.vehicle.structure import body_point
-
-    model, name, speed = model_of(question.vehicle), question.name, question.speed_mps
-    given, rate_hz = question.obstacles or {}, question.rate_hz
-    obstacles = ([Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
-                 if isinstance(given, Mapping) else
-                 [Obstacle(*named_numbers(text, "obstacle"), f"obstacle {text}") for text in given])
-    road = question.profile if isinstance(question.profile, profile_file.Wheelpaths) else read_profile(question.profile)
-    try:
-        track = with_obstacles(drive_file.track_of(road), obstacles)
-        car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
-        place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
-        knots = (_knots(*speed, name) if isinstance(speed, tuple | list) else
-                 at_one_speed(track, float(car.structure.behind_m.max()), speed))
-        motion = motion_along(*knots, track.start_m, rate_hz)
-        columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,
-                                 SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
-    except ValueError as error:
-        raise BadInput(f"{name}: {error}") from None
-    time_s, accel_z_mps2, recorded_mps, distance_m = columns.values()
-    return Run(Path(name), rate_hz, time_s, accel_z_mps2, recorded_mps, distance_m, None, None, _profile_of(track))
-
-
-simulate = function("simulate", SimulateQuestion, simulated)
-
-
-def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
-    times, speeds = (np.asarray(one, dtype=np.float64) for one in (time_s, speed_mps))
-    grows, possible = (np.diff(times) > 0).all(), ((speeds >= 0) & (speeds <= 100)).all()
-    if not 1 < len(times) == len(speeds) or not (grows and possible):
-        raise BadInput(f"{name}: expected two times or more that grow, and as many speeds of 0 to 100 m/s")
-    return times, speeds
-
-
-def _profile_of(track: Track) -> Profile:
-    tracks = track.elevation_m.reshape(len(track.elevation_m), -1).T
-    return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
 
 
 # --- the road as a drive shows it ---

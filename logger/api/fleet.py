@@ -114,8 +114,8 @@ def reported(question: ReportQuestion) -> FleetReport:
     check_folder(place)
     with _summarised(question, "segment") as (figures, running, pieces):
         if not len(figures.roads.key):
-            raise BadInput(f"{question.dataset}: expected a segment that {question.min_cars} cars have driven, found "
-                           "none")
+            raise BadInput(f"{question.dataset}: expected a segment that {question.public or 1} cars have driven, "
+                           "found none")
         steps = history_of(running, figures, day_us(question.since), day_us(question.until))
     tiles = write_report(figures, steps, pieces, place)
     page = place / INDEX
@@ -144,9 +144,9 @@ def _summarised(question: SummariseQuestion | ReportQuestion, by: str
     files = dataset.files(since_us, None if until_us is None else until_us - 1)
     if not files:
         raise empty
-    pieces, names = _pieces(dataset), {} if question.pseudonyms else names_of(folder)
+    pieces, names = _pieces(dataset), {} if question.public else names_of(folder)
     with opened(files, question.engine) as running:
-        figures = summarise(running, by, since_us, until_us, question.min_cars, pieces,
+        figures = summarise(running, by, since_us, until_us, question.public or 1, pieces,
                             lambda car: names.get(car) or shown_car(car))
         if figures is None:
             raise empty

@@ -225,10 +225,9 @@ class FleetQuestion(Question):
     until: Annotated[str | None, Option("first day that is left out", metavar="DAY", check=check_day)] = None
     engine: Annotated[str, Option(
         "duckdb, spark://HOST:PORT, or 'spark MASTER' such as 'spark local[2]'", metavar="ENGINE")] = "duckdb"
-    min_cars: Annotated[int, Option(
-        "leave out segments that fewer cars have driven", Range(1, 1_000_000), "N")] = 1
-    pseudonyms: Annotated[bool, Option(
-        "call cars by pseudonyms, for others to read; DATASET.cars.csv tells you which is which")] = False
+    public: Annotated[int | None, Option(
+        "for others to read: call cars by pseudonyms (DATASET.cars.csv tells you which is which), and leave out "
+        "segments that fewer than N cars have driven", Range(1, 1_000_000), "N")] = None
 
 
 Dataset = Annotated[Path | str, Argument("folder that 'fleet ingest' has made", metavar="DATASET", read=Path)]
@@ -240,7 +239,7 @@ class SummariseQuestion(FleetQuestion):
     that cars share.
 
       ridelog fleet summarise county --by section --out sections.csv
-      ridelog fleet summarise county --since 2026-01-01 --min-cars 3
+      ridelog fleet summarise county --since 2026-01-01 --public 3
 
     In Python: raises BadInput for no dataset, another engine, no pass in that time, and routes without a map.
 
@@ -262,7 +261,7 @@ class ReportQuestion(FleetQuestion):
     segments and sections of 0.1 mi as GeoParquet and CSV. It is there whole, in place of an older one, or not at all.
 
       ridelog fleet report county --out map/
-      ridelog fleet report county --out map/ --min-cars 3 --pseudonyms
+      ridelog fleet report county --out map/ --public 3
 
     In Python: raises BadInput as ``fleet_summarise``, for a folder with other files, and where too few cars leave no
     segment.

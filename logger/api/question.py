@@ -118,8 +118,6 @@ MODAL_METHODS_GONE = {"ar": "ssi", "ssi-cov": "ssi", "fft": "ssi", "arx": "n4sid
 """Of modes: the methods, and for those that are no longer offered the one to use."""
 COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
 """Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
-PASSENGERS = Range(0, 60)
-"""Of a calibration: people more in the car."""
 DAILY_HOURS = Range(0.001, 24.0, "hours")
 """Of riding, for values of health."""
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from logger.api.drive_questions import CalibrateQuestion
-from logger.api.question import Notify, function
+from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.errors import BadInput
 from logger.estimation import rms_calibration
-from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration, loaded
+from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
@@ -240,7 +240,7 @@ class Slopes:
 class Calibration(CommandResult):
     """A vehicle's relations between roughness and vibration at s speeds.
 
-    found                       all of it, with and without a load
+    found                       all of it
     speed_mps                   (s,) 10, 20 ... 70 mph [m/s]
     iri_per_accel_rms           whole roads: IRI per r.m.s. acceleration [m/km per m/s2]
     window_iri_per_accel_rms    the same for windows: their own IRI and their own r.m.s.
@@ -257,8 +257,8 @@ class Calibration(CommandResult):
 
     @property
     def sprung_mass_kg(self) -> float:
-        """Of the car as it was driven, with its load [kg]."""
-        return float(self._json["sprung_mass_kg"])
+        """Of the car [kg]."""
+        return self.found.vehicle.sprung_mass_kg
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the figures of each speed as CSV."""
@@ -266,8 +266,7 @@ class Calibration(CommandResult):
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """Where more is."""
-        return "Next: --out FILE.csv or --json for all figures" + (
-            "." if self.found.load else "; --passengers 2 for what a load changes.")
+        return "Next: --out FILE.csv or --json for all figures."
 
     def charts(self) -> Sequence[Chart]:
         """IRI per r.m.s. acceleration over the speed, of whole roads and of windows."""
@@ -297,8 +296,8 @@ def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
 
 
 def calibrated(model: vehicle_file.CarModel, path: Path | None, question: CalibrateQuestion) -> Calibrated:
-    """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has, and for a
-    vehicle that lacks what its model or an effect needs.
+    """The lines of a vehicle. BadInput for a window that no road has, and for a vehicle that lacks what its model or an
+    effect needs.
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
     """
@@ -310,47 +309,24 @@ def calibrated(model: vehicle_file.CarModel, path: Path | None, question: Calibr
     vehicle_file.check_on_road(vehicle)
     if any(one.file is not None for one in model.effects):
         path = None  # what is in that file may change
-    ask = _Ask(path, model.effects, settings, question.progress)
-    plain = _answer(ask, vehicle, vehicle.name)
-    people = question.passengers
-    if not people:
-        return Calibrated(vehicle, settings, plain, None)
-    heavy = loaded(vehicle, people)
-    with_load = _answer(ask, heavy, f"{vehicle.name} with its load")
-    return Calibrated(vehicle, settings, plain,
-                      Load(people, vehicle.sprung_mass_kg, heavy.sprung_mass_kg, with_load))
-
-
-@dataclass(frozen=True)
-class _Ask:
-    """What is asked of a vehicle, where a stored answer may be, and what is called with its source."""
-
-    path: Path | None
-    effects: Sequence[Chosen]
-    settings: CalibrationSettings
-    notify: Notify
-
-
-def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
-    """The stored calibration of this vehicle, or a new one, which is then stored."""
-    kept_in = () if ask.path is None else places(ask.path)
+    kept_in = () if path is None else places(path)
     gain = recorder_gain(None)
-    key = fingerprint(vehicle, gain, ask.settings, ask.effects)
+    key = fingerprint(vehicle, gain, settings, model.effects)
     found = find(kept_in, key)
     if found is not None:
-        ask.notify(f"{title}: found in {found.path}")
-        return found.speeds
+        question.progress(f"{vehicle.name}: found in {found.path}")
+        return Calibrated(vehicle, settings, found.speeds)
     started_s = time.perf_counter()
     try:
-        speeds = rms_calibration.calibrate(known_vehicle(vehicle, ask.effects), gain, ask.settings)
+        speeds = rms_calibration.calibrate(known_vehicle(vehicle, model.effects), gain, settings)
     except ValueError as error:
         raise BadInput(f"{vehicle.name}: {error}") from None
     took_s = time.perf_counter() - started_s
     path = keep(kept_in, key, speeds)
     where = (f"kept in {path}" if path else "not kept" if not kept_in else
              f"not kept: {' or '.join(map(str, kept_in))} cannot be written")
-    ask.notify(f"{title}: computed in {took_s:.1f} s, {where}")
-    return speeds
+    question.progress(f"{vehicle.name}: computed in {took_s:.1f} s, {where}")
+    return Calibrated(vehicle, settings, speeds)
 
 
 _COMFORT_WORD = "uncomfortable"
@@ -360,41 +336,21 @@ _PREFIXES = {"iri_per_accel_rms": "", "window_iri_per_accel_rms": "window_", "ac
 
 
 @dataclass(frozen=True)
-class Load:
-    """A car with a load, and its lines."""
-
-    passengers: int
-    empty_kg: float
-    sprung_mass_kg: float
-    speeds: tuple[SpeedCalibration, ...]
-
-
-@dataclass(frozen=True)
 class Calibrated:
-    """A vehicle's lines: ``plain`` without a load, and those with it."""
+    """A vehicle's lines at each speed, and on what roads they were found."""
 
     vehicle: Vehicle
     settings: CalibrationSettings
-    plain: tuple[SpeedCalibration, ...]
-    load: Load | None
-
-    @property
-    def speeds(self) -> tuple[SpeedCalibration, ...]:
-        """The lines that were asked for: with the load, if there is one."""
-        return self.load.speeds if self.load else self.plain
+    speeds: tuple[SpeedCalibration, ...]
 
 
 def as_json(found: Calibrated) -> dict[str, Any]:
-    """``vehicle`` and ``speeds``, of the car with its load if there is one; then what the roads were."""
-    vehicle, settings, load = found.vehicle, found.settings, found.load
-    result = {
-        "vehicle": vehicle.name, "speeds": [row(speed) for speed in found.speeds],
+    """``vehicle`` and ``speeds``; then what the roads were."""
+    settings = found.settings
+    return {
+        "vehicle": found.vehicle.name, "speeds": [row(speed) for speed in found.speeds],
         "window_m": settings.window_m, "road_m": settings.road_m, "roads": settings.roads, "seed": settings.seed,
-        "sprung_mass_kg": load.sprung_mass_kg if load else vehicle.sprung_mass_kg,
-    }
-    if load is not None:
-        result |= {"passengers": load.passengers, "speeds_without_load": [row(speed) for speed in found.plain]}
-    return result
+        "sprung_mass_kg": found.vehicle.sprung_mass_kg}
 
 
 def row(speed: SpeedCalibration) -> dict[str, float]:
@@ -416,11 +372,11 @@ def csv_lines(speeds: Sequence[SpeedCalibration]) -> Iterator[str]:
 
 def lines(found: Calibrated) -> list[str]:
     """What a person reads."""
-    settings, load = found.settings, found.load
+    settings = found.settings
     limit_mps2 = next(lowest for lowest, word in COMFORT_WORDS if word == _COMFORT_WORD)
     shown = [
-        f"{found.vehicle.name}{', with its load' if load else ''}: {settings.roads} random roads of "
-        f"{settings.road_m:.0f} m, IRI {LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g} m/km", "",
+        f"{found.vehicle.name}: {settings.roads} random roads of {settings.road_m:.0f} m, IRI {LEVELS_IRI[0]:g} to "
+        f"{LEVELS_IRI[-1]:g} m/km", "",
         f"{'':12}{f'roads of {settings.road_m:.0f} m':^33}{f'windows of {settings.window_m:.4g} m':^26}"
         f"{'rms per':>9}{'comfort':>10}{_COMFORT_WORD[:6]:>9}",
         f"{'m/s':>6}{'mph':>5} {'IRI per rms':>16}{'spread':>9}{'R2':>8} {'IRI per rms':>12}{'spread':>8}{'R2':>6}"
@@ -435,18 +391,4 @@ def lines(found: Calibrated) -> list[str]:
             f"{speed.a_w_per_iri.slope:10.5f}{limit_mps2 / speed.a_w_per_iri.slope:9.1f}")
     shown += ["", "IRI [m/km] = 'IRI per rms' x r.m.s. vertical acceleration [m/s2]; 68 of 100 lie within the spread.",
               f"ISO 2631-1 calls the ride '{_COMFORT_WORD}' from the last column's IRI on."]
-    if load is not None:
-        shown += ["", *_comparison(found.plain, load)]
     return shown
-
-
-def _comparison(plain: Sequence[SpeedCalibration], load: Load) -> Iterator[str]:
-    """What the load changes on the same roads (Fig 6.7, 6.8)."""
-    yield (f"The same roads without the load ({load.empty_kg:.4g} kg on the springs) and with it "
-           f"({load.sprung_mass_kg:.4g} kg):")
-    yield f"{'m/s':>6} {'IRI per rms without':>20}{'with':>9}{'r.m.s. with the load':>23}{'a_w with the load':>20}"
-    for empty, full in zip(plain, load.speeds, strict=True):
-        rms = full.accel_rms_per_root_gd.slope / empty.accel_rms_per_root_gd.slope - 1
-        a_w = full.a_w_per_iri.slope / empty.a_w_per_iri.slope - 1
-        yield (f"{empty.speed_mps:6.2f} {empty.iri_per_accel_rms.slope:20.3f}{full.iri_per_accel_rms.slope:9.3f}"
-               f"{rms:+23.1%}{a_w:+20.1%}")

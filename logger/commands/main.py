@@ -90,6 +90,7 @@ ASKED = {
     "modes": "drive_questions:MODES",
     "comfort": "drive_questions:COMFORT",
     "calibrate": "drive_questions:CALIBRATE",
+    "simulate": "drive_questions:SIMULATE",
     "fixed-point": "fixed_point:FIXED_POINT",
 }
 """Verbs that are declared by a question, and where in ``logger.api``."""

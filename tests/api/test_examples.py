@@ -101,7 +101,7 @@ def test_what_is_wrong_is_one_line_and_nothing_is_printed(
         lambda: ridelog.compare(car, run, tolerance=2.0),
         lambda: ridelog.diagnose(car, run, candidates=["magic"]),
         lambda: ridelog.add_effect("payload", car.with_effect("payload"), run),
-        lambda: ridelog.calibrate(car, window_m=0.0), lambda: ridelog.calibrate(car, passengers=61),
+        lambda: ridelog.calibrate(car, window_m=0.0), lambda: ridelog.calibrate(car, window_m=1e6),
         lambda: ridelog.read_channels(tmp_path / "wrong.csv"),
         lambda: ridelog.make_channels({"a": [1.0, 2.0], "b": [1.0]}, rate_hz=100.0),
         lambda: ridelog.make_channels({"a": [1.0, 2.0]}, rate_hz=0.0),
@@ -197,16 +197,15 @@ def test_a_calibration_is_the_commands(
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     reported: list[str] = []
-    found = ridelog.calibrate("rav4-2009", passengers=2, progress=reported.append)
-    again = ridelog.calibrate("rav4-2009", passengers=2, progress=reported.append)
-    assert ["computed in" in words for words in reported] == [True, True, False, False]
-    assert "found in" in reported[2] and again.as_json() == found.as_json()
-    assert main(["calibrate", "--vehicle", "rav4-2009", "--passengers", "2", "--json"]) == 0
+    found = ridelog.calibrate("rav4-2009", progress=reported.append)
+    again = ridelog.calibrate("rav4-2009", progress=reported.append)
+    assert ["computed in" in words for words in reported] == [True, False]
+    assert "found in" in reported[1] and again.as_json() == found.as_json()
+    assert main(["calibrate", "--vehicle", "rav4-2009", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found.as_json()
     plain = ridelog.calibrate(ridelog.read_vehicle("rav4-2009"), progress=reported.append)
     assert reported[-1].endswith("not kept") and [path.name for path in tmp_path.iterdir()] == ["ridelog"]
-    assert (found.accel_rms_per_root_gd.slope < plain.accel_rms_per_root_gd.slope).all()
-    assert found.sprung_mass_kg > plain.sprung_mass_kg
+    assert (found.accel_rms_per_root_gd.slope == plain.accel_rms_per_root_gd.slope).all()
 
 
 @pytest.mark.slow

@@ -95,16 +95,6 @@ def test_the_second_time_it_is_found(
 
 
 @pytest.mark.usefixtures("few_roads")
-@pytest.mark.parametrize("more", [["--passengers", "1"]])
-def test_what_is_asked_again_is_computed_again(car: Path, capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
-    first = Call(capsys, car, "--json")
-    other = Call(capsys, car, "--json", *more)
-    assert "computed in" in other.err
-    assert other.out != first.out
-    assert "found in" in Call(capsys, car, "--json").err  # and the first is still there
-
-
-@pytest.mark.usefixtures("few_roads")
 def test_a_changed_vehicle_and_a_damaged_file_are_computed_again(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = Call(capsys, car, "--json")
     stored = car.with_name("mine.calibration.json")
@@ -146,42 +136,24 @@ def test_a_vehicle_of_the_program_is_kept_in_the_cache(
 
 @pytest.mark.slow
 def test_the_screen(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = Call(capsys, car, "--passengers", "2").out.splitlines()
+    lines = Call(capsys, car).out.splitlines()
     assert max(map(len, lines)) <= 100
-    assert lines[0] == "my car, with its load: 120 random roads of 998 m, IRI 1 to 10 m/km"
+    assert lines[0] == "my car: 120 random roads of 998 m, IRI 1 to 10 m/km"
     rows = [line.split() for line in lines if line[:6].strip().replace(".", "").isdigit()]
     assert [row[:2] for row in rows[:7]][::6] == [["4.47", "10"], ["31.29", "70"]]
-    compared = rows[7:]
-    assert len(compared) == 7
-    for loaded, both in zip(rows, compared, strict=False):
-        assert loaded[2] == both[2]
-        assert float(both[1]) < float(both[2])  # a heavier car shakes less, so each m/s2 stands for more
-        assert both[3].startswith("-")
-    assert "875 kg" in "\n".join(lines)
-    assert "950 kg" in "\n".join(lines)
+    assert len(rows) == 7
 
 
 @pytest.mark.slow
-def test_a_load_as_json_and_csv(car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_figures_as_json_and_csv(car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "table.csv"
-    plain = Call(capsys, car, "--json").json()
-    double = Call(capsys, car, "--passengers", "2", "--json", "--out", table).json()
-    assert double["speeds_without_load"] == plain["speeds"]
-    assert double["sprung_mass_kg"] == 950
+    found = Call(capsys, car, "--json", "--out", table).json()
+    assert found["sprung_mass_kg"] == 875
     with table.open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [list(row) for row in rows] == [list(speed) for speed in double["speeds"]]
-    for row, speed in zip(rows, double["speeds"], strict=True):
+    assert [list(row) for row in rows] == [list(speed) for speed in found["speeds"]]
+    for row, speed in zip(rows, found["speeds"], strict=True):
         assert [float(value) for value in row.values()] == pytest.approx(list(speed.values()), rel=1e-6)
-
-
-@pytest.mark.parametrize(("arguments", "message"), [
-    (["--passengers", "-1"], "--passengers -1: expected 0 to 60"),
-])
-def test_numbers_out_of_range(car: Path, arguments: list[str], message: str) -> None:
-    with pytest.raises(BadInput, match=message):
-        main(["calibrate", "--vehicle", str(car), *arguments])
-    assert [path.name for path in car.parent.iterdir()] == ["mine.yaml"]
 
 
 def test_files_that_are_not_there_or_in_the_way(car: Path) -> None:

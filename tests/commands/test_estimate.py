@@ -385,9 +385,9 @@ def test_readings_that_may_be_in_g_are_said_to_be(
 def test_a_road_without_any_roughness_in_places_has_a_limit_all_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["simulate", "--vehicle", CAR, "--flat", "400", "--obstacle",
+    assert main(["simulate", "--vehicle", CAR, "--profile", "400", "--obstacle",
                  "bump:start_m=200,height_m=0.08,width_m=3.6", "--speed", "16", "--noise", "0.05", "--out",
-                 str(tmp_path / "drive.csv"), "--profile-out", str(tmp_path / "profile.csv")]) == 0
+                 str(tmp_path / "drive.csv"), "--out", str(tmp_path / "profile.csv")]) == 0
     result = reported(capsys, tmp_path)
     on_profile = [window for window in result["windows"] if window["iri_exact_m_per_km"] is not None]
     assert min(window["iri_exact_m_per_km"] for window in on_profile) == pytest.approx(0, abs=1e-3)

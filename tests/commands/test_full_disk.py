@@ -69,8 +69,8 @@ SLOW = pytest.mark.slow
 WRITERS = {
     "road generate --out": Writer(road, "road generate --class C --length 150 --out road.csv"),
     "road classify --out": Writer(road, "road classify road.csv --out a.html"),
-    "simulate --out --profile-out": Writer(road, "simulate --vehicle rav4-2009 --profile road.csv --speed 15 --out "
-                                           "drive.csv --profile-out profile.csv --out a.html"),
+    "simulate --out": Writer(road, "simulate --vehicle rav4-2009 --profile road.csv --speed 15 --out drive.csv "
+                             "--out profile.csv --out a.html"),
     "iri --out": Writer(road, "iri road.csv --out a.html --out a.pdf --out b.html --out a.png"),
     "comfort --out": Writer(shaken, "comfort shaken.csv --out a.html"),
     "modes --out": Writer(shaken, "modes shaken.csv --method ssi --out a.html"),
@@ -89,11 +89,11 @@ WRITERS = {
     "fleet report --out": Writer(dataset, "fleet report town --out page"),
     "fixed-point --out": Writer(road, "fixed-point --out firmware"),
     "study --out": Writer(road, "study table-4-3 --quick --out a.html"),
-    "extract --out": Writer(lambda folder: called("demo", "--field", "--unpack", "--out", folder / "field"),
+    "extract --out": Writer(lambda folder: called("demo", "field", "--unpack", "--out", folder / "field"),
                             "extract field/first.dump.gz --profile field/line.csv --out runs"),
     "plan --out": Writer(run, f"plan {LAB} --out a.html"),
     "diagnose --out": Writer(run, f"diagnose {LAB} --out a.html"),
-    "learn --out --page": Writer(run, f"learn {LAB} --out law.py --page a.html"),
+    "learn --out": Writer(run, f"learn {LAB} --out law.py --out a.html"),
 }
 OTHERS = {
     "demo --out": "logs of sessions that are new, and files that ship with ridelog: never written over another's",
@@ -103,7 +103,7 @@ OTHERS = {
     "install --root": "steps, each as replace_bytes does it", "uninstall --root": "removes",
 }
 """Options that ask for what is written, of commands that are judged beside their own tests, and why."""
-WRITE = {"--out", "--profile-out", "--page", "--visit", "--to", "--note", "--root"}
+WRITE = {"--out", "--profile-out", "--visit", "--to", "--note", "--root"}
 READ = {"--config", "--from", "--base", "--route", "--roads", "--smoothness", "--profile", "--location", "--csv",
         "--compare", "--excitation", "--log", "--unmounted", "--led", "--effect-file"}
 
@@ -131,7 +131,7 @@ def test_every_option_that_names_a_file_to_write_is_tried() -> None:
 QUICK = ("convert --to",)
 
 
-RELEASE = ("plan --out", "diagnose --out", "learn --out --page", "fleet report --out", "calibrate --out",
+RELEASE = ("plan --out", "diagnose --out", "learn --out", "fleet report --out", "calibrate --out",
            "compare --out", "study --out", "extract --out", "report --out", "fleet summarise --out", "comfort --out")
 """The longest, and those that write one page or table by the same writer as others (``logger.files``)."""
 

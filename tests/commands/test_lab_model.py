@@ -140,7 +140,7 @@ def test_a_search_that_could_not_try_every_effect_is_refused(
     """Without a compiler some effects cannot be tried: "nothing is missing" would be no answer."""
     monkeypatch.setattr("logger.vehicle.stepping_loop.COMPILED", False)
     out = tmp_path / "out"
-    given = ["demo", "--lab", "--out", str(out)] if command == "demo" else [
+    given = ["demo", "lab", "--out", str(out)] if command == "demo" else [
         *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", *runs]
     words = rf"the lab extra \(pip install '\.\[lab\]'\).* [1-9]\d* of {len(sought_effects())} effects"
     with pytest.raises(BadInput, match=words) as refused:
@@ -324,7 +324,7 @@ def test_what_an_own_effect_prints_is_no_json(fits: None, runs: list[str], tmp_p
     for arguments in (
         ["compare", "--vehicle", car, runs[0]],
         ["add-effect", str(tmp_path / "own.py"), "--vehicle", "rav4-2009", runs[0], "--out", str(new)],
-        ["simulate", "--vehicle", car, "--flat", "30", "--speed", "10", "--out", str(tmp_path / "drive.csv")],
+        ["simulate", "--vehicle", car, "--profile", "30", "--speed", "10", "--out", str(tmp_path / "drive.csv")],
     ):
         done = called(*arguments, "--json")
         assert done.returncode == 0

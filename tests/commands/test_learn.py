@@ -21,7 +21,8 @@ def plain_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("out", "says"), [("law.txt", r"ends in \.py"), ("nowhere/law.py", "a folder that there is")])
+@pytest.mark.parametrize(("out", "says"), [
+    ("law.txt", r"ends in one of \.py, \.html"), ("nowhere/law.py", "a folder that there is")])
 def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=says):
         main(["learn", "--vehicle", "rav4-2009", "--out", str(tmp_path / out), str(plain_run)])
@@ -30,10 +31,9 @@ def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, 
 
 def test_a_page_is_not_the_law(plain_run: Path, tmp_path: Path) -> None:
     law = str(tmp_path / "law.py")
-    other = str(tmp_path / "page.py")
-    for page, complaint in ((law, "every file to be another one"), (other, r"a file that ends in \.html")):
-        with pytest.raises(BadInput, match=f"--page .*: expected {complaint}"):
-            main(["learn", "--vehicle", "rav4-2009", "--out", law, "--page", page, str(plain_run)])
+    for page, complaint in ((law, "every file to be another one"), (str(tmp_path / "page.png"), r"a file that ends")):
+        with pytest.raises(BadInput, match=f"--out .*: expected {complaint}"):
+            main(["learn", "--vehicle", "rav4-2009", "--out", law, "--out", page, str(plain_run)])
 
 
 @pytest.mark.slow

@@ -86,8 +86,6 @@ def test_the_same_result_is_the_same_file(folder: Path, monkeypatch: pytest.Monk
      "--out x.png: expected a result with pictures, found one without; .html holds its words"),
     (["estimate", "drive.csv", "--vehicle", "rav4-2009", "--out", "drive.csv.png", "--profile-out", "drive.csv.png"],
      "--profile-out drive.csv.png: expected every file to be another one"),
-    (["simulate", "--vehicle", "rav4-2009", "--profile", "road.csv", "--speed", "12", "--out", "a.html"],
-     "simulate: expected --out"),
 ])
 def test_what_cannot_be_a_picture_is_one_line(words: list[str], complaint: str, folder: Path,
                                               monkeypatch: pytest.MonkeyPatch) -> None:

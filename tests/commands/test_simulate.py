@@ -64,8 +64,8 @@ def test_the_installed_command(folder: Path, ridelog: Path) -> None:
         [ridelog, "simulate", "--vehicle", vehicle_file("rav4-2009"), "--profile", folder / "profile.csv", "--speed",
          "12", "--out", folder / "drive.csv"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, f"Wrote {folder / 'drive.csv'}\n")
-    assert "drive.csv: rav4-2009 (half car)" in done.stdout
-    failed = called("simulate", "--vehicle", "rav5", "--flat", "9", "--speed", "1", "--out", folder / "x.csv")
+    assert "rav4-2009 (half car)" in done.stdout
+    failed = called("simulate", "--vehicle", "rav5", "--profile", "9", "--speed", "1", "--out", folder / "x.csv")
     assert failed.returncode == 2
     assert failed.stderr.startswith("ridelog: no vehicle 'rav5'")
     assert failed.stderr.count("\n") == 1
@@ -96,9 +96,9 @@ def test_noise_and_steps_of_the_sensor(folder: Path) -> None:
 
 
 def test_an_obstacle_on_a_flat_road_and_the_road_as_driven(tmp_path: Path) -> None:
-    arguments = ["simulate", "--vehicle", "rav4-2009", "--flat", "60", "--obstacle", BUMP, "--obstacle",
+    arguments = ["simulate", "--vehicle", "rav4-2009", "--profile", "60", "--obstacle", BUMP, "--obstacle",
                  "pothole:start_m=40,depth_m=0.05,length_m=0.6,edge_m=0.1", "--speed", "5"]
-    assert main([*arguments, "--out", str(tmp_path / "drive.csv"), "--profile-out", str(tmp_path / "profile.csv")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "drive.csv"), "--out", str(tmp_path / "profile.csv")]) == 0
     run = read_run(tmp_path)
     x = 0.01 * np.arange(6001)
     assert run.track.spacing_m == pytest.approx(0.01)
@@ -109,8 +109,9 @@ def test_an_obstacle_on_a_flat_road_and_the_road_as_driven(tmp_path: Path) -> No
 
 
 def test_an_obstacle_leaves_the_road_around_it_as_it_was(folder: Path) -> None:
-    path = folder / "with.csv"
-    simulated(folder, "--speed", "9", "--obstacle", "step:start_m=100,height_m=1", "--profile-out", str(path))
+    path = folder / "with" / "profile.csv"
+    path.parent.mkdir()
+    simulated(folder, "--speed", "9", "--obstacle", "step:start_m=100,height_m=1", "--out", str(path))
     distance, elevation = np.loadtxt(path, delimiter=",", skiprows=1).T
     x = 30 + 0.05 * np.arange(len(ROAD.elevation_m))
     assert elevation - (distance >= 100 - 1e-9) == pytest.approx(np.interp(distance, x, ROAD.elevation_m), abs=2e-7)
@@ -182,11 +183,11 @@ def test_an_obstacle_that_would_not_be_met_is_refused(folder: Path, obstacle: st
 
 
 def test_an_obstacle_may_reach_to_the_ends_of_the_road(tmp_path: Path) -> None:
-    assert main(["simulate", "--vehicle", "golden-car", "--flat", "60", "--speed", "20",
+    assert main(["simulate", "--vehicle", "golden-car", "--profile", "60", "--speed", "20",
                  "--obstacle", "bump:start_m=0,height_m=0.08,width_m=3.6",
                  "--obstacle", "bump:start_m=59.98,height_m=0.08,width_m=0.02",
-                 "--out", str(tmp_path / "d.csv"), "--profile-out", str(tmp_path / "p.csv")]) == 0
-    elevation = np.loadtxt(tmp_path / "p.csv", delimiter=",", skiprows=1)[:, 1]
+                 "--out", str(tmp_path / "d.csv"), "--out", str(tmp_path / "profile.csv")]) == 0
+    elevation = np.loadtxt(tmp_path / "profile.csv", delimiter=",", skiprows=1)[:, 1]
     assert elevation[[180, 5999]] == pytest.approx(0.08)
 
 
@@ -202,10 +203,10 @@ def test_files_that_will_not_do(folder: Path) -> None:
     speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
     assert refusal(folder, "--speed", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
     assert "expected another file than those that are read" in refusal(
-        folder, "--speed", "20", "--profile-out", str(folder / "profile.csv"))
+        folder, "--speed", "20", "--out", str(folder / "profile.csv"))
     (folder / "mine.yaml").write_bytes(vehicle_file("rav4-2009").read_bytes())
     assert "expected another file than those that are read" in refusal(
-        folder, "--speed", "20", "--profile-out", str(folder / "mine.yaml"), vehicle=str(folder / "mine.yaml"))
+        folder, "--speed", "20", "--out", str(folder / "mine.yaml"), vehicle=str(folder / "mine.yaml"))
     (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
     assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")
 
@@ -341,9 +342,8 @@ def test_effects_of_the_vehicles_file_that_will_not_do(folder: Path, effect: str
 
 
 def test_where_nothing_can_be_written(folder: Path) -> None:
-    for arguments, words in ((("--out", str(folder / "none" / "drive.csv")), "--out .*in a folder that there is"),
-                             (("--profile-out", str(folder)), "--profile-out .*in a folder that there is")):
-        assert re.match(words, refusal(folder, "--speed", "20", *arguments))
+    for place in (folder / "none" / "drive.csv", folder):
+        assert re.match("--out .*in a folder that there is", refusal(folder, "--speed", "20", "--out", str(place)))
 
 
 def test_an_effect_twice_is_refused(folder: Path) -> None:
@@ -360,20 +360,11 @@ def test_what_a_step_of_a_thousandth_cannot_follow_is_refused(folder: Path) -> N
                   vehicle=str(folder / "car.yaml"))
 
 
-def test_the_effects_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["simulate", "--list-effects", "--json"]) == 0
-    reported = {one["name"]: one for one in json.loads(capsys.readouterr().out)["effects"]}
-    assert list(reported) == sorted(shipped_effects())
-    assert reported["top_mount_compliance"]["parameters"][0]["vanishes_at"] == "infinity"
-    assert reported["sensor_bandwidth"]["parameters"][1]["choices"] == list(range(1, 9))
-    assert main(["simulate", "--list-effects"]) == 0
-    words = capsys.readouterr().out
-    assert "dry_friction: Coulomb friction in each suspension\n  friction_force_n=60  (0 to 2000)  of each" in words
-
-
 def test_what_a_drive_needs_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"expected --profile or --flat, --out"):
-        main(["simulate", "--vehicle", "rav4-2009", "--speed", "3"])
+    with pytest.raises(BadInput, match=r"simulate: expected --profile, --speed$"):
+        main(["simulate", "--vehicle", "rav4-2009", "--out", str(tmp_path / "drive.csv")])
+    with pytest.raises(BadInput, match=r"--profile 0.5: expected 1 to 10000 m"):
+        main(["simulate", "--vehicle", "rav4-2009", "--profile", "0.5", "--speed", "3", "--out", str(tmp_path / "a")])
 
 
 def test_a_road_that_seems_to_be_in_another_unit_is_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -228,7 +228,7 @@ def test_cars_have_their_names_and_for_others_pseudonyms_which_the_owner_can_loo
         return {one["car"] for one in said(capsys)["cars"]}  # type: ignore
 
     assert cars() == names | {"'=van"}  # a spreadsheet opens the table of names
-    hidden = cars("--pseudonyms")
+    hidden = cars("--public", "1")
     assert not hidden & names
     rows = list(csv.reader((tmp_path / "town.cars.csv").read_text("utf-8").splitlines()))
     assert rows[0] == ["car", "name"]

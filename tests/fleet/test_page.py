@@ -90,14 +90,14 @@ def test_the_page_fits_a_phone(report: Path) -> None:
 def test_segments_of_few_cars_are_withheld(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cars = {}
     for least in (1, 3):
-        assert main(["fleet", "summarise", str(dataset), "--json", "--min-cars", str(least)]) == 0
+        assert main(["fleet", "summarise", str(dataset), "--json", "--public", str(least)]) == 0
         found = json.loads(capsys.readouterr().out)
         cars[least] = [one["cars"] for one in found["roads"]]
         assert all(one["last_utc"].endswith("T00:00:00.000Z") for one in found["roads"])
         assert found["withheld_segments"] == len(cars[1]) - len(cars[least])
     assert min(cars[1]) < 3 <= min(cars[3])
     with pytest.raises(BadInput, match="expected a segment that 100 cars have driven, found none"):
-        main(["fleet", "report", str(dataset), "--out", str(tmp_path / "map"), "--min-cars", "100"])
+        main(["fleet", "report", str(dataset), "--out", str(tmp_path / "map"), "--public", "100"])
 
 
 def test_a_folder_with_other_files_is_not_taken(dataset: Path, tmp_path: Path) -> None:

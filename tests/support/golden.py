@@ -24,7 +24,7 @@ MADE = ("road generate --class C --length 200 --seed 3 --out road.csv --json",
 """What the others read."""
 ASKED = ("iri road.csv --window 50 --json", "road classify road.csv --json",
          "comfort drive.csv --json", "comfort drive.csv --weighting wb --daily-hours 2 --json",
-         "modes --vehicle rav4-2009 --json", "simulate --list-effects --json")
+         "modes --vehicle rav4-2009 --json")
 _FEW = 4
 
 

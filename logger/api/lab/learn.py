@@ -98,7 +98,7 @@ class LearnedLaw(CommandResult):
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """How to add the law."""
-        law = next(iter(written.get("--out", ())), None)
+        law = next((one for one in written.get("--out", ()) if one.suffix == ".py"), None)
         if not self.source or law is None:
             return ""
         return "Next: " + question.command(

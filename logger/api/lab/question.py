@@ -154,7 +154,7 @@ class LearnQuestion(LabQuestion):
     """Learn a law (a force characteristic) from runs that no known effect explains.
 
       ridelog learn --vehicle mycar.yaml --out law.py run1 run2
-      ridelog learn --vehicle mycar.yaml --out law.py run1 run2 --page law.html
+      ridelog learn --vehicle mycar.yaml --out law.py --out law.html run1 run2
 
     First learn tries every known effect, as ridelog diagnose does. If these explain the residual, or nothing is
     missing, it learns and writes nothing. Otherwise it tries families of laws (forces by travel and rate, of the tires,
@@ -268,7 +268,7 @@ DIAGNOSE = Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnosed", (PAGE,))
 ADD_EFFECT = Verb(AddEffectQuestion, "logger.api.lab.compare:added", (Out(
     "the new vehicle file", metavar="V2.yaml", others=("*",), many=False, is_drawn=False, required=True),))
 LEARN = Verb(LearnQuestion, "logger.api.lab.learn:law_of", (
-    Out("the law's file", metavar="LAW.py", others=(".py",), many=False, is_drawn=False, required=True),
-    Out("write a page with pictures", "--page", others=(".html",), many=False, is_drawn=False)))
+    Out("the law's file; FILE.html: a page with pictures; may repeat", metavar="LAW.py", others=(".py", ".html"),
+        is_drawn=False, required=True),))
 PLAN = Verb(PlanQuestion, "logger.api.lab.plan:plan_by", (PAGE,))
 LAB = Verb(LabLoopQuestion, "logger.api.lab.loop:story_of")
