@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -166,11 +166,12 @@ def _columns(question: SimulateQuestion, car: Car, effects: Sequence[Chosen], tr
 
 def _motion(question: SimulateQuestion, car: Car, track: Track | Excitation) -> FrontAxleMotion:
     """ValueError for a drive that is too short, too long, or not on the road."""
-    speed = question.speed_mps
+    speed: Any = question.speed_mps    # at the terminal the name of a file
     if isinstance(track, Excitation):
         return standing(track, question.rate_hz)
     if isinstance(speed, tuple | list):
-        knots = _knots(*speed, question.name)
+        times_s, speeds_mps = speed
+        knots = _knots(times_s, speeds_mps, question.name)
     elif isinstance(speed, Path):
         knots = read_speeds(speed)
     else:
@@ -254,10 +255,11 @@ def _outputs(wanted: Sequence[str], vehicle: Vehicle, structure: Structure) -> d
 
 def _road(question: SimulateCommand) -> tuple[Track, str]:
     """The road with its obstacles, and what makes one doubt it. BadInput for files and obstacles that are wrong."""
-    if isinstance(question.profile, float):
-        track, doubt = Track(question.profile, np.zeros(2)), ""
+    given: Any = question.profile    # a file, as this is no rig
+    if isinstance(given, float):
+        track, doubt = Track(given, np.zeros(2)), ""
     else:
-        profile = profile_file.read_profile(Path(question.profile), judged=True)
+        profile = profile_file.read_profile(given, judged=True)
         track, doubt = track_of(profile), doubt_of(profile.elevation_m, profile.spacing_m)
     try:
         return with_obstacles(track, _obstacles(question, "--")), doubt
