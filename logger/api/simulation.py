@@ -160,7 +160,7 @@ def _columns(question: SimulateQuestion, car: Car, effects: Sequence[Chosen], tr
     """What is recorded (n,), by name. ValueError for what no car can do."""
     place = car.vehicle.sensor
     sensor = {SENSOR: body_point(car.structure, place.ahead_m, place.left_m)}
-    return recorded_drive(car, bool(effects), {**sensor, **outputs}, track.begun(float(motion.time_s[0])), motion,
+    return recorded_drive(car, {**sensor, **outputs}, track.begun(float(motion.time_s[0])), motion,
                           question.rate_hz, SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
 
 

@@ -18,8 +18,8 @@ from logger.runs import ACCELERATION, READING, SENSOR, Run, Signal
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
-from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
-from logger.vehicle.structure import Output, Structure, body_point, corner_of, suspension_travel, wheel
+from logger.vehicle.simulate import FINE_RATE_HZ, Passage
+from logger.vehicle.structure import Output, body_point, corner_of, suspension_travel, wheel
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -384,25 +384,10 @@ def standing(excitation: Excitation, rate_hz: float) -> FrontAxleMotion:
 
 
 def response(
-    structure: Structure, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion,
-    rate_hz: float
-) -> dict[str, Array]:
-    """The outputs (n,) of a car without effects, which came to the start on a flat road as fast as it goes there."""
-    pace_m = float(motion.distance_m[1] - motion.distance_m[0])
-    lead = int(np.ceil(structure.contact_patch_m / pace_m)) if pace_m > 0 else 0
-    lead = min(lead, int(rate_hz))
-    before = np.arange(-lead, 0)
-    time_s = np.concatenate([motion.time_s[0] + before / rate_hz, motion.time_s])
-    distance_m = np.concatenate([motion.distance_m[0] + pace_m * before, motion.distance_m])
-    columns = drive(structure, list(outputs.values()), track, time_s, distance_m)[lead:]
-    return dict(zip(outputs, columns.T, strict=True))
-
-
-def response_with_effects(
     car: Car, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion, rate_hz: float
 ) -> tuple[dict[str, Array], FrontAxleMotion]:
-    """The outputs (n,) of a car with effects, that of ``SENSOR`` behind the sensor's own, and the motion as it is
-    recorded.
+    """The outputs (n,) of a car with its effects, that of ``SENSOR`` behind the sensor's own, and the motion as it is
+    recorded. The car came to the start as fast as it goes there.
 
     ValueError for effects under which no such car, or no such motion, is possible.
     """
@@ -432,22 +417,19 @@ def _accelerations(car: Car, passage: Passage) -> Array:
 
 
 def recorded_drive(
-    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion,
-    rate_hz: float, errors: SensorErrors,
+    car: Car, outputs: Mapping[str, Output], track: Track | Excitation, motion: FrontAxleMotion, rate_hz: float,
+    errors: SensorErrors,
 ) -> dict[str, Array]:
     """The columns (n,) of a drive's file, by name: those of the outputs last, but for that of ``SENSOR``.
 
     Problem: what a person asks for (a speed, obstacles, effects, a sensor) has to become what a model needs, and what
     no car can do (a jump of a kilometre, effects that a car's masses cannot follow) is to be refused in words.
     Solution: each step is a function of arrays. ``with_obstacles`` makes the road, ``motion_along`` the way driven over
-    it, ``response`` or ``response_with_effects`` what is felt on the way, ``as_sensed`` what a sensor makes of it.
+    it, ``response`` what is felt on the way, ``as_sensed`` what a sensor makes of it.
 
-    ValueError as ``response_with_effects``.
+    ValueError as ``response``.
     """
-    if has_effects or track.timed:
-        columns, motion = response_with_effects(car, outputs, track, motion, rate_hz)
-    else:
-        columns = response(car.structure, outputs, track, motion, rate_hz)
+    columns, motion = response(car, outputs, track, motion, rate_hz)
     accel_mps2 = as_sensed(columns.pop(SENSOR), errors)
     return {"t_s": motion.time_s, SENSOR: accel_mps2, "speed_mps": motion.speed_mps, "distance_m": motion.distance_m,
             **columns}

@@ -41,11 +41,11 @@ from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import SensorErrors, as_sensed
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
+from logger.vehicle.compose import compose
+from logger.vehicle.compose import recorded as simulated
 from logger.vehicle.linearise import known_vehicle
-from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import free
-from logger.vehicle.simulate import drive
-from logger.vehicle.structure import body_point
+from logger.vehicle.simulate import Passage
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,6 @@ BUMP_MPS, BRIDGE_MPS = 16.1 / 3.6, 48.3 / 3.6
 BUMP_HEIGHT_M, BUMP_WIDTH_M, STEP_M = 0.150, 2.60, 0.0381
 SPACING_M, ROAD_SPACING_M = 0.02, 0.05
 _BEFORE_M, _BEHIND_M = 80.0, 80.0
-_LEAD_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -152,11 +151,7 @@ def _recorded(vehicle: Vehicle | None, track: Track, distance_m: Array, conditio
 def recorded(vehicle: Vehicle, track: Track, distance_m: Array, noise_mps2: float, seed: int,
              step_mps2: float = 0.0) -> Array:
     """What the sensor records; the car has come to the start as fast as it goes there."""
-    lead = np.arange(-_LEAD_S * RATE_HZ, 0)
-    way_m = np.concatenate([distance_m[0] + (distance_m[1] - distance_m[0]) * lead, distance_m])
-    structure = structure_of(vehicle)
-    sensor = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    clean = drive(structure, [sensor], track, np.arange(len(way_m)) / RATE_HZ, way_m)[len(lead):, 0]
+    clean = simulated(compose(vehicle), Passage(track, RATE_HZ, distance_m))
     return as_sensed(clean, SensorErrors(noise_mps2, step_mps2, seed))
 
 

@@ -242,9 +242,14 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
         force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)
         return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
-        return _of_motion(structure, moved(car, passage), inputs, outputs)
+        return _of_motion(structure, moved(car, passage), smooth(inputs, means), outputs)
+    return linear_outputs(structure, passage, outputs)
+
+
+def linear_outputs(structure: Structure, passage: Passage, outputs: Sequence[Output]) -> Array:
+    """Outputs at the fine instants (p, M), of a linear car."""
     observe, direct = structure.output_matrices(outputs)
-    return (in_blocks(structure, passage, observe) + inputs @ direct.T).T
+    return (in_blocks(structure, passage, observe) + smooth(*passage.under_wheels(structure)) @ direct.T).T
 
 
 def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_s: float) -> Array:

@@ -22,10 +22,11 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import FINE_RATE_HZ, Passage, drive
+from logger.vehicle.simulate import FINE_RATE_HZ, Passage
 from logger.vehicle.structure import body_point
 
 from ..support.command import called
+from ..support.drives.linear_drive import drive
 
 BUMP = "bump:start_m=20,height_m=0.08,width_m=3.6"
 ROAD = Track(0.05, iso8608.generate(256, 100, 0.05, 3), 30.0)

@@ -16,8 +16,9 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
+
+from ..support.drives.linear_drive import drive
 
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 SENSOR, SPEED_MPS, SPACING_M = Sensor(0.05, 1.226), 8.94, 0.1524

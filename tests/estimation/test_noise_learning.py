@@ -25,9 +25,9 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
 
+from ..support.drives.linear_drive import drive
 from ..support.slow import slow
 
 STEP = 0.6

@@ -25,8 +25,9 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free
-from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
+
+from ..support.drives.linear_drive import drive
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 ROAD = Track(0.05, iso8608.generate(64.0, 150.0, 0.05, 5))

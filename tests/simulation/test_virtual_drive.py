@@ -17,7 +17,6 @@ from logger.simulation.virtual_drive import (
     at_one_speed,
     motion_along,
     response,
-    response_with_effects,
     with_obstacles,
 )
 from logger.store.formats.effect_file import shipped_effects
@@ -65,9 +64,9 @@ def test_a_motion_is_the_integral_of_its_speed() -> None:
 def test_effects_that_do_next_to_nothing_leave_the_response_as_it_was() -> None:
     road = with_obstacles(FLAT, [Obstacle("bump", BUMP, "")])
     motion = motion_along(*at_one_speed(road, 2.94, 8.0), road.start_m, 100.0)
-    plain = response(STRUCTURE, OUTPUTS, road, motion, 100.0)[SENSOR]
+    plain = response(compose(CAR), OUTPUTS, road, motion, 100.0)[0][SENSOR]
     gain = chosen(shipped_effects()["sensor_gain"], {"gain": 1.0})
-    columns, recorded = response_with_effects(compose(CAR, (gain,)), OUTPUTS, road, motion, 100.0)
+    columns, recorded = response(compose(CAR, (gain,)), OUTPUTS, road, motion, 100.0)
     assert np.abs(columns[SENSOR] - plain).max() < 2e-3 * np.abs(plain).max()
     assert recorded.distance_m == pytest.approx(motion.distance_m)
 
@@ -75,7 +74,7 @@ def test_effects_that_do_next_to_nothing_leave_the_response_as_it_was() -> None:
 def test_a_stretched_distance_comes_with_a_stretched_speed() -> None:
     motion = motion_along(*at_one_speed(FLAT, 2.94, 8.0), 0.0, 100.0)
     scale = chosen(shipped_effects()["speed_scale"], {"scale": 1.05})
-    _, recorded = response_with_effects(compose(CAR, (scale,)), OUTPUTS, FLAT, motion, 100.0)
+    _, recorded = response(compose(CAR, (scale,)), OUTPUTS, FLAT, motion, 100.0)
     assert recorded.speed_mps == pytest.approx(1.05 * motion.speed_mps)
     assert np.diff(recorded.distance_m) == pytest.approx(1.05 * np.diff(motion.distance_m))
 
