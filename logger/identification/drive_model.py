@@ -35,12 +35,12 @@ import numpy.typing as npt
 from logger.identification.unknown_inputs import (
     SPEED_SCALE,
     Obstacle,
+    ObstaclePath,
     RoadInput,
     changed_input,
     check_names,
     is_input,
     read_input,
-    run_and_name,
 )
 from logger.profiles.track import Alterations, Stance, Track, Way, WheelPath, WheelTracks, along_paths, as_it_is
 from logger.roads.iso8608 import displacement_psd
@@ -48,13 +48,7 @@ from logger.runs import READING, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.linear_car import (
-    SensedCar,
-    Sensitivity,
-    body_acceleration_response,
-    sensed_car,
-    sensitivity,
-)
+from logger.vehicle.linear_car import LinearCar, Sensitivity, reading_slope, sensitivity, solved
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, free_parameter_named, read, slope_of, steps_of
 from logger.vehicle.simulate import FINE_RATE_HZ, finer, recorder_gain, recorder_taps, smooth_length
@@ -70,8 +64,7 @@ _APPROACH_S = 3.0
 _RETURN_S = 6.0
 _ROUND_THE_END = 1e-4
 _EVEN = 1e-3
-# Over less than this a car stands, and the road has no slope [m].
-_STANDING_M = 1e-9
+_KEPT_PLACES = 3  # of wheels: of differences by a scale of the speed, and where they are taken
 
 
 class RoadInTime:
@@ -112,63 +105,30 @@ class RoadInTime:
 
     def under_wheels(self, structure: Structure, road: RoadInput) -> Complex:
         """Transforms (f, w) of the elevations under the wheels, counted from where they began [m s]."""
-        under = self._profile(structure, road.speed_scale)
-        for obstacle in road.obstacles.values():
-            path = obstacle.path(structure.contact_patch_m)
-            under = under + self._wheels(structure, road.speed_scale, [path, path])
-        return under
-
-    def by_input(self, structure: Structure, road: RoadInput, name: str) -> Complex:
-        """Derivatives (f, w) of that by a number of the road's input, by its name for all runs."""
-        patch_m = structure.contact_patch_m
-        if name != SPEED_SCALE:
-            part, _, leaf = name.partition(".")
-            path = road.obstacles[part].slopes(patch_m)[leaf]
-            return self._wheels(structure, road.speed_scale, [path, path])
-        assert isinstance(self._track, Track)  # a rig has no speed
-        under = self._wheels(structure, road.speed_scale, self._track.tire_paths(patch_m), by_scale=True)
-        for obstacle in road.obstacles.values():
-            path = obstacle.path(patch_m)
-            under = under + self._wheels(structure, road.speed_scale, [path, path], by_scale=True)
-        return under
-
-    def _profile(self, structure: Structure, speed_scale: float) -> Complex:
-        place = (speed_scale, structure.contact_patch_m, *structure.behind_m, *structure.left_m, structure.actuators)
+        way = Way(self._way_m / road.speed_scale, self._time_s)
+        place = (road.speed_scale, structure.contact_patch_m, *structure.behind_m, *structure.left_m,
+                 structure.actuators)
         if place not in self._known:
-            if len(self._known) > 2:
+            if len(self._known) > _KEPT_PLACES:
                 self._known.clear()
             track = as_it_is(self._track, (), structure.actuators)
-            _, means = track.under_wheels(Way(self._way_m / speed_scale, self._time_s), structure)
-            self._known[place] = np.stack([self._transform(one) for one in means.T], axis=1)
-        return self._known[place]
-
-    def _wheels(self, structure: Structure, speed_scale: float, paths: Sequence[WheelPath],
-                by_scale: bool = False) -> Complex:
-        """Transforms of what the wheels meet on their paths, left and right, or of its derivative by the scale."""
-        wheels = []
-        for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True):
-            way = self._way_m / speed_scale
-            path = paths[-1] if left_m < 0 else paths[0]
-            elevation, means = path.step_means(way - behind_m)
-            if by_scale:
-                step = np.diff(way)
-                slope = np.diff(elevation) / np.where(np.abs(step) < _STANDING_M, np.inf, step)
-                middle, excess = (way[1:] + way[:-1]) / 2, (elevation[1:] + elevation[:-1]) / 2 - means
-                means = -(middle * slope + excess) / speed_scale
-            wheels.append(self._transform(means))
-        return np.stack(wheels, axis=1)
+            self._known[place] = self._transforms(track.under_wheels(way, structure)[1])
+        under = self._known[place]
+        for obstacle in road.obstacles.values():
+            path = ObstaclePath(obstacle, structure.contact_patch_m)
+            under = under + self._transforms(along_paths([path], way, structure)[1])
+        return under
 
     def samples(self, transform: Complex) -> Array:
         """The samples (..., n) of transforms (..., f), without the beginning."""
         return np.fft.irfft(transform, self._count)[..., self._kept] * self._growth
 
-    def _transform(self, means: Array) -> Complex:
-        rise = means - means[0]
-        back = np.zeros(len(self._fading))
-        back[: len(rise)] = rise
-        rest = len(back) - len(rise)
-        back[len(rise):] = rise[-1] * 0.5 * (1 + np.cos(np.pi * np.arange(rest) / rest))
-        return np.fft.rfft(back * self._fading)[: len(self.s)] * self._filter
+    def _transforms(self, means: Array) -> Complex:
+        """Of means over steps (M - 1, w)."""
+        rise = (means - means[0]).T
+        rest = len(self._fading) - rise.shape[1]
+        back = np.hstack([rise, rise[:, -1:] * (0.5 * (1 + np.cos(np.pi * np.arange(rest) / rest)))])
+        return (np.fft.rfft(back * self._fading)[:, : len(self.s)] * self._filter).T
 
 
 # Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
@@ -267,8 +227,7 @@ class DriveModel:
         """What the sensor makes of a road's waves [1/s2], as ``body_acceleration_response``; of a car whose laws are
         bent, what its linear part does."""
         car = self.car_with(values)
-        gain = body_acceleration_response(car.structure, f_hz, speed_mps, car.vehicle.sensor)
-        return np.asarray(gain * car.factor(np.asarray(2j * np.pi * f_hz)))
+        return LinearCar(car.structure, car.output, sensors=car.sensors).response(f_hz, speed_mps)
 
     def road_spectra(self, values: Array, f_hz: Array) -> list[Array]:
         """What the sensor makes of a random road of Gd(n0) = 1 cm3 under the whole of each record: one-sided spectra
@@ -304,71 +263,59 @@ class VehicleModel(DriveModel):
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
-        car = sensed_car(self.vehicle_with(values))
-        return [self.observed(run, road.samples(_response(
-                    car, road.s, road.under_wheels(car.structure, self.road_with(values, run)))))
-                for run, road in enumerate(self._roads)]
+        car = LinearCar.of(self.vehicle_with(values))
+        return [self.observed(run, self._reading(road, *solved(car, road.s, under[:, None])[:1], car))
+                for run, (road, under) in enumerate(zip(self._roads, self._under(car, values), strict=True))]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``DifferentiablePredictor``; derivatives are exact but for those by places and lengths of the car, which
-        shift the road."""
+        """As ``DifferentiablePredictor``; derivatives are exact but for those by places, lengths and what lies on the
+        road, which change what comes under the wheels."""
         vehicle = self.vehicle_with(values)
-        car = sensed_car(vehicle)
-        changes = {index: sensitivity(vehicle, one) for index, one in enumerate(self.parameters)
-                   if not is_input(one.name)}
+        car = LinearCar.of(vehicle)
+        numbers = [None if is_input(one.name) else sensitivity(vehicle, one) for one in self.parameters]
         predictions, slopes = [], []
-        for run, road in enumerate(self._roads):
-            at = self.road_with(values, run)
-            under = road.under_wheels(car.structure, at)
-            q, w = _solved(car, road.s, under)
+        for run, (road, under) in enumerate(zip(self._roads, self._under(car, values), strict=True)):
+            q, w = solved(car, road.s, under[:, None])
             derivatives = np.zeros((len(self.parameters), len(road.s)), dtype=complex)
-            for index, change in changes.items():
-                moved = None
-                if change.shifts_road:
-                    before, after = (road.under_wheels(one.structure, at) for one in (change.before, change.after))
-                    moved = (after - before) / change.apart
-                derivatives[index] = _by_car(car, change, road.s, under, q, w, moved)
-            for index, name in self._inputs_of(run):
-                derivatives[index] = _through(car, w, road.by_input(car.structure, at, name))
-            prediction = road.samples(road.s**2 * (q @ car.row))
+            for index, change in enumerate(numbers):
+                if change is not None:
+                    derivatives[index] = reading_slope(change, road.s, under[:, None], q, w)[:, 0]
+                if (moved := self._moved(road, run, values, index, change)) is not None:
+                    derivatives[index] += (w * (moved @ car.structure.road.T)).sum(axis=1)
+            prediction = self._reading(road, q, car)
             predictions.append(self.observed(run, prediction))
             slopes.append(self.observed_slopes(run, prediction, road.samples(derivatives).T))
         return predictions, slopes
 
-    def _inputs_of(self, run: int) -> list[tuple[int, str]]:
-        """Which free numbers change the road's input in a run: their indices, and their names for all runs."""
-        names = [(index, *run_and_name(one.name)) for index, one in enumerate(self.parameters) if is_input(one.name)]
-        return [(index, name) for index, only, name in names if only in (None, run)]
+    def _under(self, car: LinearCar, values: Array) -> list[Complex]:
+        """Transforms (f, w) of the road under the wheels of each record."""
+        return [road.under_wheels(car.structure, self.road_with(values, run)) for run, road in enumerate(self._roads)]
+
+    @staticmethod
+    def _reading(road: RoadInTime, q: Complex, car: LinearCar) -> Array:
+        return road.samples(road.s**2 * (q[:, 0] @ car.output.row))
+
+    def _moved(self, road: RoadInTime, run: int, values: Array, index: int, change: Sensitivity | None
+               ) -> Complex | None:
+        """Derivative (f, w) of the road under the wheels in a run by a free number; None where it moves nothing."""
+        if change is not None:
+            if not change.shifts_road:
+                return None
+            at = self.road_with(values, run)
+            before, after = (road.under_wheels(one.structure, at) for one in (change.before, change.after))
+            return np.asarray((after - before) / change.apart)
+        one, structure = self.parameters[index], structure_of(self.vehicle_with(values))
+        step = _INPUT_STEP * (1.0 if one.place else values[index]) * (_OF_SPEED if SPEED_SCALE in one.name else 1.0)
+        ends = [self.road_with(values + way * step * (np.arange(len(values)) == index), run) for way in (-1, 1)]
+        if ends[0] == ends[1]:
+            return None
+        before, after = (road.under_wheels(structure, end) for end in ends)
+        return np.asarray((after - before) / (2 * step))
 
 
-def _response(car: SensedCar, s: Complex, under: Complex) -> Complex:
-    """Transform (f,) of the sensor's acceleration, of a road (f, w) under the wheels."""
-    forces = under @ car.structure.road.T
-    return np.asarray(s**2 * (np.linalg.solve(car.dynamic_stiffness(s), forces[..., None])[..., 0] @ car.row))
-
-
-def _solved(car: SensedCar, s: Complex, under: Complex) -> tuple[Complex, Complex]:
-    """q and w (f, n), with D = s2 M + s C + K, D q = R z and D w = s2 r; the sensor reads y = s2 r q."""
-    forces = np.stack([under @ car.structure.road.T, (s * s)[:, None] * car.row], axis=-1)
-    q, w = np.moveaxis(np.linalg.solve(car.dynamic_stiffness(s), forces), -1, 0)
-    return q, w
-
-
-def _through(car: SensedCar, w: Complex, moved: Complex) -> Complex:
-    """What the sensor makes (f,) of a change (f, w) of the road under the wheels: w R dz."""
-    return np.asarray((w * (moved @ car.structure.road.T)).sum(axis=1))
-
-
-def _by_car(car: SensedCar, change: Sensitivity, s: Complex, under: Complex, q: Complex, w: Complex,
-            moved: Complex | None) -> Complex:
-    """Derivative (f,) of the sensor's acceleration by a number of the car: s2 dr q + w (dR z - dD q) + w R dz."""
-    s2 = s * s
-    force = under @ change.road.T - s2[:, None] * (q @ change.mass.T) - s[:, None] * (q @ change.damping.T)
-    force -= q @ change.stiffness.T
-    derivative = (w * force).sum(axis=1) + s2 * (q @ change.row)
-    return np.asarray(derivative if moved is None else derivative + _through(car, w, moved))
-
-
+# Steps of differences by what lies on the road: over places [m], as shares of sizes, of the latter's for a factor of
+# all distances, which moves what lies far away. A bump of a metre is smooth over a ten-thousandth of it.
+_INPUT_STEP, _OF_SPEED = 1e-4, 1e-2
 # Steps of differences, either way: of what moves by factors, and of effects' numbers as shares; of a factor of all
 # distances, which moves what lies far away; of places [m]. What sticks and slips makes a response that is jagged on a
 # fine scale: smaller steps show its teeth, and not where it leads.
@@ -444,7 +391,7 @@ class _TrackWithObstacles:
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""
         patch_m = stance.contact_patch_m
-        obstacles = [one.path(patch_m) for one in self.obstacles]
+        obstacles = [ObstaclePath(one, patch_m) for one in self.obstacles]
         return along_paths([_Sum([path, *obstacles]) for path in self.track.tire_paths(patch_m)], way, stance)
 
 

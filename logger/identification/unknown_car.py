@@ -31,7 +31,7 @@ from logger.estimation.car_response import (
 )
 from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
 from logger.estimation.road_spectrum import PIVOT_CPM
-from logger.vehicle.linear_car import body_acceleration_response, frequency_response
+from logger.vehicle.linear_car import LinearCar, frequency_response
 from logger.vehicle.models import half_car
 from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior, share_of
 from logger.vehicle.structure import body_point
@@ -506,6 +506,5 @@ def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, 
 
 def reading_power(knowledge: CarKnowledge, x: Array, speed_mps: float) -> Array:
     """Squared gain (n,) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4], where recorders pass it."""
-    vehicle = knowledge.car(x, 1.0, "")
-    return np.abs(body_acceleration_response(half_car(vehicle), WAVE_NUMBERS_CPM * speed_mps, speed_mps,
-                                             vehicle.sensor)) ** 2
+    car = LinearCar.of(knowledge.car(x, 1.0, ""))
+    return np.abs(car.response(WAVE_NUMBERS_CPM * speed_mps, speed_mps)) ** 2

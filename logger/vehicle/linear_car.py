@@ -34,7 +34,7 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import Free, changed, read
 from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output, Structure, body_point
-from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, SensorPlace, Vehicle
+from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -62,122 +62,11 @@ def frequency_response(structure: Structure, outputs: Sequence[Output], f_hz: np
     return s[..., None, None] ** orders * (rows @ coordinates) + np.array([output.road_row for output in outputs])
 
 
-def body_acceleration_response(
-    structure: Structure, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike, sensor: SensorPlace = AT_CENTRE_OF_GRAVITY
-) -> Complex:
-    """Body acceleration at the sensor per elevation under the front wheel [1/s2], at constant speed.
-
-    ``f_hz`` [Hz] and ``speed_mps`` [m/s], greater than 0, are broadcast against each other. A moving average over the
-    contact patch is a sinc in the road's wave number f / speed. Left and right wheels see the same road.
-    """
-    f, speed = np.broadcast_arrays(np.asarray(f_hz, float), np.asarray(speed_mps, float))
-    per_wheel = frequency_response(structure, [body_point(structure, sensor.ahead_m, sensor.left_m)], f)[..., 0, :]
-    return at_steady_speed(structure, per_wheel, f / speed)
-
-
 def at_steady_speed(structure: Structure, by_wheel: Complex, wave_number_cpm: Array) -> Complex:
     """Out of a response per elevation under each wheel separately (..., w), that per elevation under the front wheel
     (...), for waves of the road (...) [cycle/m]: each wheel meets them later, over its contact patch."""
     delays = np.exp(-2j * np.pi * wave_number_cpm[..., None] * structure.behind_m)
     return np.asarray((by_wheel * delays).sum(axis=-1) * np.sinc(wave_number_cpm * structure.contact_patch_m))
-
-
-# --- and its derivatives ---
-
-
-@dataclass(frozen=True, eq=False)
-class SensedCar:
-    """A car's matrices and the row of its sensor (n,)."""
-
-    structure: Structure
-    row: Array
-
-    def dynamic_stiffness(self, s: Complex) -> Complex:
-        """D (f, n, n) at s (f,) [1/s]."""
-        return dynamic_stiffness(self.structure.mass, self.structure.damping, self.structure.stiffness, s)
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
-    """Derivatives of a car's matrices by one number; and, for one that moves the wheels or their patches, the cars a
-    little before and after, ``apart`` apart in it."""
-
-    mass: Array
-    damping: Array
-    stiffness: Array
-    road: Array
-    row: Array
-    before: SensedCar
-    after: SensedCar
-    apart: float
-
-    @property
-    def shifts_road(self) -> bool:
-        """Whether the road comes under the wheels at other times, or over other patches."""
-        before, after = self.before.structure, self.after.structure
-        return before.contact_patch_m != after.contact_patch_m or bool((before.behind_m != after.behind_m).any())
-
-
-def sensed_car(vehicle: Vehicle) -> SensedCar:
-    """The car with its sensor where its file says. ValueError if it lacks what its model needs."""
-    structure = structure_of(vehicle)
-    return SensedCar(structure, body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row)
-
-
-def sensitivity(vehicle: Vehicle, one: Free) -> Sensitivity:
-    """How a car depends on one of its numbers, where it is now. ValueError as ``named_parameters.read``."""
-    value = read(vehicle, one.name)
-    step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
-    before, after = (sensed_car(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
-    low, high, apart = before.structure, after.structure, 2 * step
-    return Sensitivity((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
-                       (high.stiffness - low.stiffness) / apart, (high.road - low.road) / apart,
-                       (after.row - before.row) / apart, before, after, apart)
-
-
-class AxleResponse:
-    """What the sensor reads per elevation under each axle, at a recorder's rate; left and right see the same road.
-
-    behind_m           (x,) how far behind the front one each axle stands [m]
-    contact_patch_m    [m]
-
-    ValueError for a number that the vehicle does not have, or one that moves axles or the contact patch.
-    """
-
-    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], rate_hz: float) -> None:
-        self.vehicle, self.parameters, self._rate_hz = vehicle, list(parameters), rate_hz
-        for one in parameters:
-            read(vehicle, one.name)
-            if one.name.endswith("cg_distance_m") or one.name == "contact_patch_m":
-                raise ValueError(f"{one.name} cannot be found where the road is not known: expected it to be measured")
-        structure = sensed_car(vehicle).structure
-        self.contact_patch_m = structure.contact_patch_m
-        self.behind_m, self._axle = np.unique(structure.behind_m, return_inverse=True)
-
-    def vehicle_with(self, values: Array) -> Vehicle:
-        """The vehicle with these values of its free numbers."""
-        return changed(self.vehicle, dict(zip([one.name for one in self.parameters], map(float, values), strict=True)))
-
-    def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
-        """Gains (x, f) [1/s2] behind the recorder's filter with these values (p,), and their derivatives (p, x, f)."""
-        vehicle = self.vehicle_with(values)
-        car, s = sensed_car(vehicle), np.asarray(2j * np.pi * f_hz)
-        structure = car.structure
-        axles = np.eye(len(self.behind_m))[self._axle]
-        dynamic = car.dynamic_stiffness(s)
-        forces = np.broadcast_to(structure.road @ axles, (len(s), len(structure.road), axles.shape[1]))
-        q = np.linalg.solve(dynamic, forces.astype(complex))
-        w = np.linalg.solve(dynamic, np.broadcast_to(car.row.astype(complex)[:, None], (len(s), len(car.row), 1)))
-        w = (s * s)[:, None] * w[..., 0]
-        filtered = recorder_gain(f_hz / self._rate_hz)
-        gains = filtered * (s * s) * np.einsum("n,fnx->xf", car.row, q)
-        derivatives = np.empty((len(self.parameters), *gains.shape), dtype=complex)
-        for index, one in enumerate(self.parameters):
-            change = sensitivity(vehicle, one)
-            moved = dynamic_stiffness(change.mass, change.damping, change.stiffness, s) @ q
-            by_forces = np.einsum("fn,fnx->xf", w, change.road @ axles - moved)
-            derivatives[index] = filtered * (by_forces + s * s * np.einsum("n,fnx->xf", change.row, q))
-        return gains, derivatives
 
 
 MOTIONS = 5
@@ -287,6 +176,12 @@ class LinearCar:
     corners: tuple[CornerSlopes, ...] = ()
     sensors: tuple[Chosen, ...] = ()
 
+    @staticmethod
+    def of(vehicle: Vehicle) -> LinearCar:
+        """A vehicle without effects, read by its sensor. ValueError if it lacks what its model needs."""
+        structure = structure_of(vehicle)
+        return LinearCar(structure, body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m))
+
     @property
     def depends_on_motion(self) -> bool:
         """Whether it is another car where the road or the speed is another one: never."""
@@ -354,7 +249,7 @@ class LinearCar:
         return np.asarray(np.linalg.solve(dynamic, self.structure.road + pressed))
 
     @cached_property
-    def _matrices(self) -> tuple[Array, Array]:
+    def matrices(self) -> tuple[Array, Array]:
         """Damping and stiffness (n, n) with the laws of the corners, as far as these are springs and dampers; of a
         damper behind a mount as if that were rigid."""
         structure, corners = self.structure, self.corners
@@ -375,7 +270,7 @@ class LinearCar:
     def _dynamic(self, s: Complex) -> tuple[Complex, Complex]:
         """What q is multiplied by (..., n, n), and what the laws of the tires add to the road's force (..., n, w)."""
         structure = self.structure
-        dynamic = dynamic_stiffness(structure.mass, *self._matrices, s)
+        dynamic = dynamic_stiffness(structure.mass, *self.matrices, s)
         tire = np.stack([one.tire(s, own) for one, own in zip(self.corners, structure.tires, strict=True)], axis=-1)
         pressed = structure.wheels.T * tire[..., None, :]
         for i, one in enumerate(self.corners):
@@ -397,3 +292,96 @@ def moved_by(per_motion: Complex, s: Complex, travel: Array, wheel: Array) -> tu
     by_road = by_deflection + s * by_deflection_rate
     by_q = (by_travel + s * by_rate)[..., None] * travel + (by_road + s * by_wheel)[..., None] * wheel
     return np.asarray(by_q), np.asarray(by_road)
+
+
+# --- and its derivatives ---
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of a car's matrices by one number; and, for one that moves the wheels or their patches, the cars a
+    little before and after, ``apart`` apart in it."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    road: Array
+    row: Array
+    before: LinearCar
+    after: LinearCar
+    apart: float
+
+    @property
+    def shifts_road(self) -> bool:
+        """Whether the road comes under the wheels at other times, or over other patches."""
+        before, after = self.before.structure, self.after.structure
+        return before.contact_patch_m != after.contact_patch_m or bool((before.behind_m != after.behind_m).any())
+
+
+def sensitivity(vehicle: Vehicle, one: Free) -> Sensitivity:
+    """How a car depends on one of its numbers, where it is now. ValueError as ``named_parameters.read``."""
+    value = read(vehicle, one.name)
+    step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
+    before, after = (LinearCar.of(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
+    low, high, apart = before.structure, after.structure, 2 * step
+    return Sensitivity((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
+                       (high.stiffness - low.stiffness) / apart, (high.road - low.road) / apart,
+                       (after.output.row - before.output.row) / apart, before, after, apart)
+
+
+def solved(car: LinearCar, s: Complex, under: Complex) -> tuple[Complex, Complex]:
+    """q (f, x, n) and w (f, n) of a car whose matrices hold all, with D q = R z and D w = s2 r, for roads z (f, x, w),
+    or (1, x, w), under its wheels, at s (f,); its sensor reads s2 r q."""
+    structure = car.structure
+    dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
+    forces = np.broadcast_to(_times(under, structure.road), (len(s), under.shape[1], len(structure.mass)))
+    columns = np.concatenate([forces, ((s * s)[:, None] * car.output.row)[:, None]], axis=1)
+    found = np.asarray(np.linalg.solve(dynamic, columns.swapaxes(1, 2)), np.complex128).swapaxes(1, 2)
+    return found[:, :-1], found[:, -1]
+
+
+def reading_slope(change: Sensitivity, s: Complex, under: Complex, q: Complex, w: Complex) -> Complex:
+    """Derivatives (f, x) of what the sensor reads by a number of the car, the road under its wheels staying what it is:
+    s2 dr q + w (dR z - dD q); arguments as of ``solved``, and its results."""
+    at = s[:, None, None]
+    force = _times(under, change.road) - at * (at * _times(q, change.mass) + _times(q, change.damping))
+    force = force - _times(q, change.stiffness)
+    return np.asarray((w[:, None] * force).sum(axis=2) + (s * s)[:, None] * (q @ change.row))
+
+
+def _times(rows: Complex, matrix: Array) -> Complex:
+    return np.asarray(np.tensordot(rows, matrix, (-1, 1)))
+
+
+class AxleResponse:
+    """What the sensor reads per elevation under each axle, at a recorder's rate; left and right see the same road.
+
+    behind_m           (x,) how far behind the front one each axle stands [m]
+    contact_patch_m    [m]
+
+    ValueError for a number that the vehicle does not have, or one that moves axles or the contact patch.
+    """
+
+    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], rate_hz: float) -> None:
+        self.vehicle, self.parameters, self._rate_hz = vehicle, list(parameters), rate_hz
+        for one in parameters:
+            read(vehicle, one.name)
+            if one.name.endswith("cg_distance_m") or one.name == "contact_patch_m":
+                raise ValueError(f"{one.name} cannot be found where the road is not known: expected it to be measured")
+        structure = structure_of(vehicle)
+        self.contact_patch_m = structure.contact_patch_m
+        self.behind_m, self._axle = np.unique(structure.behind_m, return_inverse=True)
+
+    def vehicle_with(self, values: Array) -> Vehicle:
+        """The vehicle with these values of its free numbers."""
+        return changed(self.vehicle, dict(zip([one.name for one in self.parameters], map(float, values), strict=True)))
+
+    def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
+        """Gains (x, f) [1/s2] behind the recorder's filter with these values (p,), and their derivatives (p, x, f)."""
+        vehicle, s = self.vehicle_with(values), np.asarray(2j * np.pi * f_hz)
+        car, axles = LinearCar.of(vehicle), np.eye(len(self.behind_m), dtype=np.complex128)[None, :, self._axle]
+        q, w = solved(car, s, axles)
+        filtered = recorder_gain(f_hz / self._rate_hz)
+        slopes = [reading_slope(sensitivity(vehicle, one), s, axles, q, w).T for one in self.parameters]
+        gains = filtered * (s * s) * (q @ car.output.row).T
+        return gains, filtered * np.array(slopes).reshape(-1, *gains.shape)

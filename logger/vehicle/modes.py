@@ -57,22 +57,14 @@ def modes_of_car(car: LinearCar) -> list[Mode]:
     structure, corners = car.structure, car.corners
     n, travel, wheels = len(structure.mass), structure.travel, structure.wheels
     mounted = [i for i, one in enumerate(corners) if np.isfinite(one.mount_n_per_m) and one.damper_n_s_per_m > 0]
-    mounts = np.array([corners[i].mount_n_per_m for i in mounted])
-    beside = np.array([one.beside_n_s_per_m + (0.0 if i in mounted else one.damper_n_s_per_m)
-                       for i, one in enumerate(corners)])
-    springs = np.array([one.spring_n_per_m for one in corners])
-    tires = np.array([one.contact * (own + one.tire_n_per_m) - own
-                      for one, own in zip(corners, structure.tires, strict=True)])
-    tire_dampers = np.array([one.contact * one.tire_damping_n_s_per_m for one in corners])
-    beyond = beside - structure.dampers
-    damping = structure.damping + (travel.T * beyond) @ travel + (wheels.T * tire_dampers) @ wheels
-    stiffness = structure.stiffness + (travel.T * springs) @ travel + (wheels.T * tires) @ wheels
-    inverse, pressed = np.linalg.inv(structure.mass), travel[mounted]
-    slip = np.array([corners[i].mount_n_per_m / corners[i].damper_n_s_per_m for i in mounted])
+    mounts, dampers = (np.array([getattr(corners[i], name) for i in mounted]) for name in (
+        "mount_n_per_m", "damper_n_s_per_m"))
+    (damping, stiffness), pressed = car.matrices, travel[mounted]
+    damping = damping - (pressed.T * dampers) @ pressed  # which is that of rigid mounts
+    inverse, slip = np.linalg.inv(structure.mass), mounts / dampers
     pulls, by_place, by_rate, own = pressed.T * mounts, np.zeros((len(mounted), n)), pressed, -np.diag(slip)
     for i, one in enumerate(corners):
         j, u = travel[i], wheels[i]
-        damping = damping + one.wheel_n_s_per_m * np.outer(u, u) + one.body_n_s_per_m * np.outer(j + u, j + u)
         places, rates = np.stack([j, 0 * j, u, 0 * u, 0 * u]), np.stack([0 * j, j, 0 * u, u, u])
         for law in one.motions:
             along, count = law.along(j, u)[:, None], len(law.own)

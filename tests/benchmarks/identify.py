@@ -31,12 +31,13 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
 from logger.vehicle.effect import chosen
-from logger.vehicle.linear_car import AxleResponse, body_acceleration_response
+from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free, free_number, free_parameter_named, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from ..support.drives.bumps import bump_record, road_record
+from ..support.drives.linear_drive import body_acceleration_response
 from ..support.drives.rubbing import FRICTION_N, rubbing_run
 from .figures import Figures
 

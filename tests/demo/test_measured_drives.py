@@ -9,10 +9,10 @@ from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
-from logger.vehicle.linear_car import body_acceleration_response
 from logger.vehicle.models import half_car
 from logger.vehicle.vehicle import Vehicle
 
+from ..support.drives.linear_drive import body_acceleration_response
 from ..support.drives.measured import (
     SPACING_M,
     Accelerometer,

@@ -14,12 +14,14 @@ from logger.estimation.car_response import (
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import LinearCar, body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace
+
+from ..support.drives.linear_drive import body_acceleration_response
 
 
 @pytest.mark.parametrize("name", ["golden-car", "rav4-2009", "rav4-2009-full"])

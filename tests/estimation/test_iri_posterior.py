@@ -17,9 +17,11 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import LinearCar, body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
+
+from ..support.drives.linear_drive import body_acceleration_response
 
 SPACING_M, POINTS, COUNT = 0.1524, 50, 50 * 2560
 WINDOW_M = SPACING_M * POINTS

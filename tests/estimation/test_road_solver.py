@@ -12,10 +12,11 @@ from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, quick_fft_le
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import LinearCar, body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure, body_point
 
+from ..support.drives.linear_drive import body_acceleration_response
 from ..support.slow import slow
 
 RATE_HZ, SPACING_M, ALIGN_M = 100.0, 0.1524, 7.62

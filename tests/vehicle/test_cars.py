@@ -5,9 +5,10 @@ import pytest
 
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import body_acceleration_response
 from logger.vehicle.models import GOLDEN_CAR, half_car, quarter_car
 from logger.vehicle.vehicle import Axle, Vehicle
+
+from ..support.drives.linear_drive import body_acceleration_response
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 LOPSIDED = Vehicle(

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import body_acceleration_response, frequency_response
+from logger.vehicle.linear_car import frequency_response
 from logger.vehicle.models import GOLDEN_CAR, full_car, half_car, quarter_car, structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle, with_load
+
+from ..support.drives.linear_drive import body_acceleration_response
 
 HALF = Vehicle(
     "lopsided", "half_car", 700.0, 1200.0,

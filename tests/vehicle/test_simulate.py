@@ -14,13 +14,12 @@ from logger.roads import iso8608
 from logger.roads.obstacles import pothole, speed_bump, step
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.linear_car import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import Passage, recorder_taps
 from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
 
-from ..support.drives.linear_drive import drive
+from ..support.drives.linear_drive import body_acceleration_response, drive
 from ..support.drives.newton_car import Told, judge, road_under
 from ..support.slow import slow
 

@@ -1,4 +1,4 @@
-"""What a recorder keeps of the motions of a linear car that is given by its matrices."""
+"""What is read of a linear car that is given by its matrices: drive by drive, and wave by wave."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 
 from logger.profiles.track import WheelTracks
 from logger.vehicle.compose import linear_outputs
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.structure import Output, Structure, body_point
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, SensorPlace
 
 
 def drive(structure: Structure, outputs: Sequence[Output], track: WheelTracks, time_s: np.ndarray,
@@ -17,3 +19,10 @@ def drive(structure: Structure, outputs: Sequence[Output], track: WheelTracks, t
     """Outputs (N, p) at the instants (N,), evenly spaced, at which the front tires stand at these places (N,)."""
     passage = Passage(track, (len(time_s) - 1) / float(time_s[-1] - time_s[0]), distance_m, fine_hz)
     return np.stack([passage.recorded(one, np.ones_like) for one in linear_outputs(structure, passage, outputs)], 1)
+
+
+def body_acceleration_response(structure: Structure, f_hz: object, speed_mps: object,
+                               sensor: SensorPlace = AT_CENTRE_OF_GRAVITY) -> np.ndarray:
+    """Body acceleration at the sensor per elevation under the front wheel [1/s2], at constant speeds."""
+    car = LinearCar(structure, body_point(structure, sensor.ahead_m, sensor.left_m))
+    return car.response(f_hz, speed_mps)  # type: ignore[arg-type]
