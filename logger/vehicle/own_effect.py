@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
+from copy import copy
 from dataclasses import fields, is_dataclass, replace
 from numbers import Real
 from types import SimpleNamespace
@@ -53,131 +54,92 @@ Blame = Callable[[], AbstractContextManager[object]]
 """Something to ask the effect in, which turns what is raised there into a complaint about its file."""
 
 
+KINDS: dict[type[Effect], str] = {
+    RoadEffect: "road", ActuatorEffect: "force", DriveEffect: "driven", VehicleEffect: "vehicle",
+    BodyEffect: "structure", ForceEffect: "laws", SensorEffect: "factor", RecordEffect: "record"}
+"""The one function of each kind of effect."""
+
+
 def watched(effect: Effect, blame: Blame) -> Effect:
     """The effect, every answer of which is looked at. ValueError, raised in ``blame``, for one that is no answer; what
     the effect itself raises is raised there too."""
-    kind = next(watched for kind, watched in _WATCHED.items() if isinstance(effect, kind))
-    return kind(effect, blame)
+    name = next(name for kind, name in KINDS.items() if isinstance(effect, kind))
+    found, own = copy(effect), getattr(effect, name)
 
+    def asked(p: SimpleNamespace, *given: Any) -> Any:
+        with blame(), np.errstate(all="ignore"):
+            return _looked_at(name, own(p, *map(_copied, given)), given[-1], blame)
 
-class _Watched(Effect):
-    """What all kinds are asked."""
-
-    def __init__(self, own: Any, blame: Blame) -> None:
-        self._own, self._blame = own, blame
-        self.name, self.title, self.parameters = own.name, own.title, own.parameters
-        self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
-        self.realigns, self.reshapes, self.replaces = own.realigns, own.reshapes, own.replaces
-        self.sought, self.needs_road, self.stage = own.sought, own.needs_road, own.stage
-
-    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
-        with self._blame():
-            why = self._own.obstacle(vehicle, two_tracks)
+    def obstacle(vehicle: Vehicle, two_tracks: bool) -> str | None:
+        with blame():
+            why = effect.obstacle(vehicle, two_tracks)
             if why is not None and not (isinstance(why, str) and why.strip()):
                 raise ValueError(f"expected obstacle to answer with words or None, found {why!r}")
         return why
 
-    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        with self._blame():
-            found = self._own.trials(seen)
-            if not isinstance(found, list) or not found or not all(isinstance(one, Mapping) for one in found):
+    def trials(seen: Misalignment | None = None) -> list[dict[str, float]]:
+        with blame():
+            some: object = effect.trials(seen)
+            if not isinstance(some, list) or not some or not all(isinstance(one, Mapping) for one in some):
                 raise ValueError("expected trials to answer with a list of values by the names of the parameters, as "
-                                 f"in [{{...}}], found {found!r}")
-            for name, value in (pair for one in found for pair in one.items()):
+                                 f"in [{{...}}], found {some!r}")
+            for number, value in (pair for one in some for pair in one.items()):
                 if not isinstance(value, Real):
-                    raise ValueError(f"expected trials to answer with a number as {name}, found {value!r}")
-            return [self.checked(one) for one in found]
+                    raise ValueError(f"expected trials to answer with a number as {number}, found {value!r}")
+            return [effect.checked(one) for one in some]
+
+    vars(found).update({name: asked, "obstacle": obstacle, "trials": trials})
+    return found
 
 
-class _WatchedRoad(_Watched, RoadEffect):
-    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
-        with self._blame(), np.errstate(all="ignore"):
-            return _numbers("road", self._own.road(p, spacing_m, elevation_m.copy()), elevation_m)
+def _copied(given: Any) -> Any:
+    """What an effect may write into without harm."""
+    if isinstance(given, Recording):
+        return Recording(*(_copied(getattr(given, one.name)) for one in fields(given)))
+    return given.copy() if isinstance(given, np.ndarray) else given
 
 
-class _WatchedActuator(_Watched, ActuatorEffect):
-    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
-        with self._blame(), np.errstate(all="ignore"):
-            return _numbers("force", self._own.force(p, rate_hz, force_n.copy()), force_n)
-
-
-class _WatchedDrive(_Watched, DriveEffect):
-    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
-        with self._blame(), np.errstate(all="ignore"):
-            return _numbers("driven", self._own.driven(p, distance_m.copy()), distance_m)
-
-
-class _WatchedVehicle(_Watched, VehicleEffect):
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
-        with self._blame():
-            found: Vehicle = _kept("vehicle", self._own.vehicle(p, vehicle), Vehicle)
-            for name, value in _plain_numbers(found):
-                if not np.isfinite(value):
-                    raise ValueError(f"expected vehicle to answer with finite numbers, found {name} {value}")
-            _check_stands(structure_of(found), "vehicle")
+def _looked_at(name: str, found: Any, given: Any, blame: Blame) -> Any:
+    """An answer of the function of this name, to what was given last."""
+    if isinstance(given, Vehicle):
+        for number, value in _plain_numbers(_kept(name, found, Vehicle)):
+            if not np.isfinite(value):
+                raise ValueError(f"expected {name} to answer with finite numbers, found {number} {value}")
+        _check_stands(structure_of(found), name)
         return found
-
-
-class _WatchedBody(_Watched, BodyEffect):
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
-        with self._blame():
-            found: Structure = _kept("structure", self._own.structure(p, structure), Structure)
-            n, w = len(found.mass), len(structure.wheels)
-            shapes = {"mass": (n, n), "damping": (n, n), "stiffness": (n, n), "road": (n, w), "behind_m": (w,),
-                      "left_m": (w,), "contact_patch_m": (), "body": (n, 3), "wheels": (w, n), "travel": (w, n),
-                      "springs": (w,), "dampers": (w,), "tires": (w,)}
-            for name, shape in shapes.items():
-                _numbers(f"structure, in {name},", getattr(found, name), np.zeros(shape))
-            _check_stands(found, "structure")
+    if isinstance(given, Structure):
+        n, w = len(_kept(name, found, Structure).mass), len(given.wheels)
+        shapes = {"mass": (n, n), "damping": (n, n), "stiffness": (n, n), "road": (n, w), "behind_m": (w,),
+                  "left_m": (w,), "contact_patch_m": (), "body": (n, 3), "wheels": (w, n), "travel": (w, n),
+                  "springs": (w,), "dampers": (w,), "tires": (w,)}
+        for part, shape in shapes.items():
+            _numbers(f"{name}, in {part},", getattr(found, part), np.zeros(shape))
+        _check_stands(found, name)
         return found
+    if isinstance(given, CornerLaws):
+        return _watched_laws(_kept(name, found, CornerLaws), given, blame)
+    return _numbers(name, found, given.accel_z_mps2 if isinstance(given, Recording) else given)
 
 
-class _WatchedForce(_Watched, ForceEffect):
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
-        with self._blame():
-            found: CornerLaws = _kept("laws", self._own.laws(p, laws), CornerLaws)
-            _check_numbers(found, laws)
-            for one in found.motions:
-                if one not in laws.motions:
-                    _check_motion(one)
-        known = {id(law) for law in (laws.damper, *laws.springs, *laws.others, *laws.tires)}
+def _watched_laws(found: CornerLaws, before: CornerLaws, blame: Blame) -> CornerLaws:
+    """Laws, those of which that were not there before are watched."""
+    _check_numbers(found, before)
+    for one in found.motions:
+        if one not in before.motions:
+            _check_motion(one)
+    known = {id(law) for law in (before.damper, *before.springs, *before.others, *before.tires)}
 
-        def own(name: str, law: Callable[..., Array]) -> Callable[..., Array]:
-            return law if id(law) in known else self._watched_law(name, law)
-
-        return replace(
-            found, damper=own("the damper", found.damper), springs=tuple(own("a spring", law) for law in found.springs),
-            others=tuple(own("a force", law) for law in found.others),
-            tires=tuple(own("a tire", law) for law in found.tires),
-        )
-
-    def _watched_law(self, name: str, law: Callable[..., Array]) -> Callable[..., Array]:
+    def own(name: str, law: Callable[..., Array]) -> Callable[..., Array]:
         def asked(*at: Array) -> Array:
-            with self._blame(), np.errstate(all="ignore"):
-                return _numbers(name, law(*(one.copy() for one in at)), at[0])
+            with blame(), np.errstate(all="ignore"):
+                return _numbers(name, law(*map(_copied, at)), at[0])
 
-        return asked
+        return law if id(law) in known else asked
 
-
-class _WatchedSensor(_Watched, SensorEffect):
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
-        with self._blame(), np.errstate(all="ignore"):
-            return _numbers("factor", self._own.factor(p, s.copy()), s)
-
-
-class _WatchedRecord(_Watched, RecordEffect):
-    def record(self, p: SimpleNamespace, recording: Recording) -> Array:
-        with self._blame(), np.errstate(all="ignore"):
-            own = Recording(recording.time_s.copy(), recording.distance_m.copy(), recording.speed_mps.copy(),
-                            recording.accel_z_mps2.copy(), recording.run)
-            return _numbers("record", self._own.record(p, own), recording.accel_z_mps2)
-
-
-_WATCHED: dict[type[Effect], type[_Watched]] = {
-    RoadEffect: _WatchedRoad, ActuatorEffect: _WatchedActuator, DriveEffect: _WatchedDrive,
-    VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody, ForceEffect: _WatchedForce,
-    SensorEffect: _WatchedSensor, RecordEffect: _WatchedRecord,
-}
+    return replace(
+        found, damper=own("the damper", found.damper), springs=tuple(own("a spring", law) for law in found.springs),
+        others=tuple(own("a force", law) for law in found.others),
+        tires=tuple(own("a tire", law) for law in found.tires))
 
 
 # --- what an answer has to be ---
@@ -283,7 +245,6 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
-KINDS = tuple(_WATCHED)
 WORDS = ("name", "title", "source", "signature", "shown_by")
 # What a vehicle's file says of an effect beside its parameters.
 KEYS = ("name", "file", "standard_errors")
@@ -349,27 +310,22 @@ def _look_through(one: Parameter) -> None:
 
 def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
     """Ask a watched effect once on a car, as far as a simulation does."""
-    if isinstance(effect, RoadEffect):
-        effect.road(p, 0.1, 0.01 * np.sin(np.arange(0.0, 100.0, 0.1)))
-    elif isinstance(effect, ActuatorEffect):
-        effect.force(p, 100.0, 10.0 * np.sin(np.arange(0.0, 10.0, 0.01)))
-    elif isinstance(effect, DriveEffect):
-        effect.driven(p, np.linspace(0.0, 1000.0, 11))
-    elif isinstance(effect, VehicleEffect):
-        effect.vehicle(p, vehicle)
-    elif isinstance(effect, BodyEffect):
-        effect.structure(p, structure_of(vehicle))
-    elif isinstance(effect, ForceEffect):
-        for rear in (False, True)[: 1 + (vehicle.rear is not None)]:
-            axle = vehicle.front
-            laws = effect.laws(p, linear(axle.suspension_damping_n_s_per_m, rear, axle.suspension_stiffness_n_per_m))
-            laws.damper(_RATE_MPS)
-            for law in (*laws.springs, *laws.tires):
-                law(_TRAVEL_M)
-            for force in laws.others:
-                force(*np.meshgrid(_TRAVEL_M, _RATE_MPS, indexing="ij"))
-    elif isinstance(effect, SensorEffect):
-        effect.factor(p, np.asarray(2j * np.pi * np.arange(0.0, 50.0), dtype=np.complex128))
-    elif isinstance(effect, RecordEffect):
-        time_s = np.arange(0.0, 60.0, 0.1)
-        effect.record(p, Recording(time_s, 10.0 * time_s, np.full_like(time_s, 10.0), np.sin(time_s)))
+    name = next(name for kind, name in KINDS.items() if isinstance(effect, kind))
+    time_s = np.arange(0.0, 60.0, 0.1)
+    wave = np.sin(time_s)
+    asked = {"road": (0.1, 0.01 * wave), "force": (100.0, 10.0 * wave), "driven": (10.0 * time_s,),
+             "vehicle": (vehicle,), "structure": (structure_of(vehicle),),
+             "factor": (np.asarray(2j * np.pi * np.arange(0.0, 50.0), np.complex128),),
+             "record": (Recording(time_s, 10.0 * time_s, np.full_like(time_s, 10.0), wave),)}
+    if name in asked:
+        getattr(effect, name)(p, *asked[name])
+        return
+    assert isinstance(effect, ForceEffect)
+    for rear in (False, True)[: 1 + (vehicle.rear is not None)]:
+        axle = vehicle.front
+        laws = effect.laws(p, linear(axle.suspension_damping_n_s_per_m, rear, axle.suspension_stiffness_n_per_m))
+        laws.damper(_RATE_MPS)
+        for law in (*laws.springs, *laws.tires):
+            law(_TRAVEL_M)
+        for force in laws.others:
+            force(*np.meshgrid(_TRAVEL_M, _RATE_MPS, indexing="ij"))
