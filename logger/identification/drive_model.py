@@ -149,6 +149,8 @@ class DriveModel:
     measured    (n,) per record, without its beginning [m/s2]
     """
 
+    exact: bool
+
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
                  road: RoadInput | None = None, effects: Sequence[Chosen] = ()) -> None:
         self.vehicle, self.parameters, self.records = vehicle, list(parameters), list(records)
@@ -169,6 +171,10 @@ class DriveModel:
 
     def predict(self, values: Array) -> list[Array]:
         """Accelerations (n,) per record without its beginning, with these values (p,) [m/s2]."""
+        raise NotImplementedError
+
+    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
+        """As ``Predictor``."""
         raise NotImplementedError
 
     def observed(self, run: int, prediction: Array) -> Array:
@@ -268,7 +274,7 @@ class VehicleModel(DriveModel):
                 for run, (road, under) in enumerate(zip(self._roads, self._under(car, values), strict=True))]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``DifferentiablePredictor``; derivatives are exact but for those by places, lengths and what lies on the
+        """As ``Predictor``; derivatives are exact but for those by places, lengths and what lies on the
         road, which change what comes under the wheels."""
         vehicle = self.vehicle_with(values)
         car = LinearCar.of(vehicle)
@@ -344,7 +350,7 @@ class SimulatedModel(DriveModel):
         return [self.observed(run, one[self.records[run].first:]) for run, one in enumerate(predictions)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``DifferentiablePredictor``: differences, to both sides of a number unless it is at a bound."""
+        """As ``Predictor``: differences, to both sides of a number unless it is at a bound."""
         columns = []
         for index, one in enumerate(self.parameters):
             step = self._step(one, float(values[index]))

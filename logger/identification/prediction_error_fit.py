@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +50,6 @@ _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
 _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
 _MOST_NOISE_ROUNDS = 20
-_DIFFERENCE = 1e-4
 _NUDGE = 0.03
 _AT_BOUND = 1e-6
 _FAR = 3.0
@@ -58,21 +57,17 @@ _ROOT_STEPS = 60
 
 
 class Predictor(Protocol):
-    """What can be fitted: numbers in, one prediction per record out, as long as what was measured."""
+    """What can be fitted: numbers in, one prediction per record out, as long as what was measured; and its derivatives,
+    exact ones at the price of a prediction, or differences of predictions."""
 
     @property
     def parameters(self) -> Sequence[Free]: ...
 
-    def predict(self, values: Array) -> list[Array]:
-        """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
-
-
-@runtime_checkable
-class DifferentiablePredictor(Predictor, Protocol):
-    """A model that knows its derivatives: exact ones, at the price of a prediction, or differences of predictions."""
-
     @property
     def exact(self) -> bool: ...
+
+    def predict(self, values: Array) -> list[Array]:
+        """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
         """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
@@ -80,7 +75,7 @@ class DifferentiablePredictor(Predictor, Protocol):
 
 def least_share(model: Predictor) -> float:
     """The residual is taken for no less than this share of the measurement, as predictions are no better."""
-    return LEAST_SHARE_SIMULATED if isinstance(model, DifferentiablePredictor) and not model.exact else LEAST_SHARE
+    return LEAST_SHARE if model.exact else LEAST_SHARE_SIMULATED
 
 
 @dataclass(frozen=True)
@@ -228,8 +223,7 @@ class _FitProblem:
         self.low_pass = DecimatingLowPass(self.options.rate_hz, self.options.low_pass_hz)
         self.coordinates = Coordinates(self.free)
         self.low, self.high = self.coordinates.low, self.coordinates.high
-        self.exact = isinstance(self.model, DifferentiablePredictor) and self.model.exact
-        self.simulated = isinstance(self.model, DifferentiablePredictor) and not self.model.exact
+        self.exact = self.model.exact
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         if not any(one.any() for one in self.measured):
             raise ValueError("expected measurements that move, found nothing but 0")
@@ -258,11 +252,8 @@ class _FitProblem:
         known = self._linearised
         if known is None or not np.array_equal(known.x, x):
             values = self.coordinates.values(x)
-            if isinstance(self.model, DifferentiablePredictor):
-                predictions, slopes = self.model.linearised(values)
-                self._check(predictions)
-            else:
-                predictions, slopes = self._predicted(x), self._by_differences(x)
+            predictions, slopes = self.model.linearised(values)
+            self._check(predictions)
             scale = self.coordinates.slopes(values)
             known = _Linearised(x, self._behind(predictions), [self.low_pass.apply(one) * scale for one in slopes])
             self._linearised = known
@@ -279,15 +270,6 @@ class _FitProblem:
 
     def _behind(self, parts: Sequence[Array]) -> list[Array]:
         return [self.low_pass.apply(one) for one in parts]
-
-    def _by_differences(self, x: Array) -> list[Array]:
-        """Derivatives [(n, p), ...] of the predictions by the values."""
-        values = self.coordinates.values(x)
-        columns = []
-        for index, step in enumerate(_DIFFERENCE * self.coordinates.slopes(values)):
-            ends = [self.model.predict(values + sign * step * (np.arange(len(values)) == index)) for sign in (-1, 1)]
-            columns.append([(high - low) / (2 * step) for low, high in zip(*ends, strict=True)])
-        return [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
     def beside(self, start: Array) -> Array:
         """A point near a start, where no symmetry of the start hides a dependence."""
@@ -316,10 +298,10 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_P
         return slopes.T @ point.white, slopes.T @ slopes
 
     # A step of so small a share of a standard error gains half its square in units of the residuals' variance.
-    close = _CLOSE_SIMULATED if problem.simulated else _CLOSE
+    close = _CLOSE if problem.exact else _CLOSE_SIMULATED
     return minimise(start, lambda x: problem.at(x, noise), normal_equations,
                     small_gain=lambda point: close**2 * point.cost / len(point.white),
-                    most_rounds=problem.options.most_steps, keep_derivatives=problem.simulated,
+                    most_rounds=problem.options.most_steps, keep_derivatives=not problem.exact,
                     low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
