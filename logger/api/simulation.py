@@ -65,7 +65,7 @@ def simulated(question: SimulateQuestion) -> Run:
     try:
         track = with_obstacles(track_of(road), _obstacles(question, ""))
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
-        columns = _columns(question, car, model.effects, track, _motion(question, car, track), {})
+        columns = _columns(question, car, track, _motion(question, car, track), {})
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
     return _run(Path(name), question, columns, _profile_of(track))
@@ -125,7 +125,7 @@ def simulation(question: SimulateCommand) -> Simulation:
     except ValueError as error:
         raise BadInput(str(error)) from None
     try:
-        columns = _columns(question, car, effects, track, motion, outputs)
+        columns = _columns(question, car, track, motion, outputs)
     except ValueError as error:
         raise BadInput(f"{car.vehicle.name}: {error}") from None
     run = _run(Path("drive.csv"), question, columns, None)
@@ -155,7 +155,7 @@ def simulation(question: SimulateCommand) -> Simulation:
         (doubt,) if doubt else ())
 
 
-def _columns(question: SimulateQuestion, car: Car, effects: Sequence[Chosen], track: Track | Excitation,
+def _columns(question: SimulateQuestion, car: Car, track: Track | Excitation,
              motion: FrontAxleMotion, outputs: Mapping[str, Output]) -> dict[str, Array]:
     """What is recorded (n,), by name. ValueError for what no car can do."""
     place = car.vehicle.sensor
