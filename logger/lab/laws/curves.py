@@ -62,7 +62,6 @@ class CurveFamily(Family):
 
     motion               that it depends on
     force                what it is in words: "damper force"
-    source, signature    of its drafts
     usual_share          of the time that the motion stays within where the force is what its number says
     reach_share          of the time; beyond twice what this gives, the force stays as it is there
     powers               to be tried; ``power_ends``: what they may be
@@ -72,8 +71,6 @@ class CurveFamily(Family):
 
     motion: LawMotion
     force: str
-    source: str
-    signature: str
     usual_share: float = 0.98
     reach_share: float = 0.9999
     powers: tuple[float, ...] = (2.0, 3.0)
@@ -123,7 +120,7 @@ def force_n(p, at):
         parameters = (_strength("force_n", size_n, f"at {reference:g} {self.motion.unit}"),
                       Parameter("power_ratio", self.powers[0], *self.power_ends, None, Scale.LOG, self.powers,
                                 "exponent"))
-        return self._draft("power", "grows with a power of", parameters, functions, reference)
+        return self._draft("power", "grows with a power of", parameters, functions, reference, ())
 
     def _free(self, variant: str, knots: Sequence[float], size_n: float) -> Draft:
         """A force that follows a smooth curve through points on either side of rest."""
@@ -141,16 +138,13 @@ def force_n(p, at):
 """
         parameters = tuple(_strength(name, size_n, f"at {one:g} {self.motion.unit}", (0.1,))
                            for one, name in names.items())
-        return self._draft(variant, "follows a curve of", parameters, functions, places[-1],
-                           ("from scipy.interpolate import PchipInterpolator",), tuple(places))
+        return self._draft(variant, "follows a curve of", parameters, functions, places[-1], tuple(places))
 
     def _draft(self, variant: str, does: str, parameters: tuple[Parameter, ...], functions: str, reference: float,
-               imports: tuple[str, ...] = (), places: tuple[float, ...] = ()) -> Draft:
-        return Draft(
-            family=self.name, kind="ForceEffect", title=f"a force that {does} the {self.motion.name}",
-            parameters=parameters, source=self.source, signature=self.signature, shown_by=self.shown_by,
-            method=f"def laws(self, p, laws):\n    return laws.{self.motion.method}", functions=functions,
-            imports=imports, variant=variant, at=self.motion.at, reference=reference, places=places)
+               places: tuple[float, ...]) -> Draft:
+        return self.draft(parameters, f"def laws(self, p, laws):\n    return laws.{self.motion.method}", functions,
+                          title=f"a force that {does} the {self.motion.name}", variant=variant, at=self.motion.at,
+                          reference=reference, places=places)
 
 
 def _strength(name: str, size_n: float, meaning: str, trials: Sequence[float] = (0.1, -0.1)) -> Parameter:

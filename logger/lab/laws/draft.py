@@ -15,8 +15,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from re import findall
 from textwrap import fill, indent
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +34,9 @@ Array = npt.NDArray[np.float64]
 LEARNED = "learned_"
 """What the names of learned effects begin with."""
 _WIDTH = 118
+_IMPORTED = {"PchipInterpolator": "scipy.interpolate", "SimpleNamespace": "types", "hung": "logger.vehicle.structure",
+             "replace": "dataclasses"}
+"""What a law may use besides numpy and its class, and where it is from."""
 _AXLES = {"front": "if laws.rear:", "rear": "if not laws.rear:"}
 
 
@@ -48,7 +53,6 @@ class Draft:
     shown_by     the drive that would show it best
     method       the function of its class, as its lines stand in the class without their indentation
     functions    what stands before the class: constants, and functions that the method hands on
-    imports      lines other than those of numpy and of the class
     axle         "front" or "rear": a force at this axle alone; "": at every wheel
     variant      distinguishes laws of one family
     at           what a picture draws its force over: "rate", "travel" or "deflection"; "loop": over the travel as it
@@ -67,7 +71,6 @@ class Draft:
     shown_by: str
     method: str
     functions: str = ""
-    imports: tuple[str, ...] = ()
     axle: str = ""
     variant: str = ""
     at: str = ""
@@ -96,8 +99,10 @@ class Draft:
         guard = f"{_AXLES[self.axle]}\n    return laws\n" if self.axle else ""
         signature, body = self.method.strip("\n").split("\n", 1)
         method = f"{signature}\n{indent(guard, '    ')}{body}"
-        lines = ["from ridelog.effects import " + ", ".join(sorted({self.kind, "Parameter", "Scale"})),
-                 *self.imports]
+        used = set(findall(r"\w+", self.functions + self.method))
+        effects = sorted({self.kind, "Parameter", "Scale"} | (used & {"Between"}))
+        lines = [f"from ridelog.effects import {', '.join(effects)}",
+                 *(f"from {place} import {name}" for name, place in _IMPORTED.items() if name in used)]
         return "\n".join([
             f'"""{head}\n"""', "", "import numpy as np", "", *sorted(lines), "",
             *([self.functions.strip("\n"), ""] if self.functions else []), "",
@@ -219,6 +224,7 @@ class Family(ABC):
     name               as the file's
     title              in a few words
     related_effects    names of effects of the list that one of its laws may nearly be
+    kind, source, signature    of its laws, as ``Draft`` has them, unless these say something else
     shown_by           the drive that shows it best, as an instruction
     straight_at        the exponent at which its laws are straight lines, which are numbers of the car; None: at none
     stands_out         whether its laws are loud at few frequencies and drafted only where those stand out of the noise:
@@ -228,6 +234,9 @@ class Family(ABC):
     name: str
     title: str
     related_effects: tuple[str, ...] = ()
+    kind: str = "ForceEffect"
+    source: str = ""
+    signature: str = ""
     shown_by: str
     straight_at: float | None = None
     stands_out: bool = False
@@ -235,6 +244,11 @@ class Family(ABC):
     @abstractmethod
     def drafts(self, context: LawContext) -> list[Draft]:
         """Laws to be tried, simple ones first; none where such a law cannot be there."""
+
+    def draft(self, parameters: tuple[Parameter, ...], method: str, functions: str = "", **more: Any) -> Draft:
+        """A law of this family; ``more`` as of ``Draft``, what is not said is the family's."""
+        said = {name: getattr(self, name) for name in ("kind", "title", "source", "signature", "shown_by")}
+        return Draft(family=self.name, parameters=parameters, method=method, functions=functions, **{**said, **more})
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         """Variations of a law that promises something: a force at one axle alone."""

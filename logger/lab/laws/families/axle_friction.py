@@ -10,19 +10,16 @@ class AxleFriction(Family):
     name = "axle_friction"
     title = "dry friction in the suspensions of one axle"
     related_effects = ("dry_friction", "hysteresis")
+    source = "C. A. Coulomb; B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083"
+    signature = "small motions of one axle die away at once: it sticks"
     shown_by = "drive a smooth road slowly, so that the suspension of one axle sticks and that of the other does not"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        one = Draft(
-            family=self.name, kind="ForceEffect", title="dry friction", shown_by=self.shown_by,
-            parameters=(Parameter("friction_force_n", 60.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (25.0, 100.0),
-                                  "in each suspension of this axle"),),
-            source="C. A. Coulomb; B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083",
-            signature="small motions of one axle die away at once: it sticks",
-            imports=("from dataclasses import replace",),
-            method="def laws(self, p, laws):\n"
-                   "    return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n)",
-            at="loop")
+        force = Parameter("friction_force_n", 60.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (25.0, 100.0),
+                          "in each suspension of this axle")
+        one = self.draft((force,), "def laws(self, p, laws):\n"
+                         "    return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n)",
+                         title="dry friction", at="loop")
         return [one.of_axle(axle) for axle in context.axles]  # at both it is dry_friction of the list
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
@@ -16,6 +14,9 @@ class ChangingGain(Family):
     name = "changing_gain"
     title = "a gain that changes as a run goes on"
     related_effects = ("sensor_gain",)
+    kind = "RecordEffect"
+    source = "data sheets of accelerometers give a change of sensitivity with temperature"
+    signature = "the residual is in proportion to the model, more so the longer a run lasts"
     shown_by = "drive one road at the beginning and at the end of a long run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -24,14 +25,9 @@ class ChangingGain(Family):
                            f"what is added to the gain over {lasts_s:g} s", step=0.01)
         first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "the gain as a run begins",
                           default=1.0)
-        common: dict[str, Any] = {
-            "family": self.name, "kind": "RecordEffect", "title": self.title, "shown_by": self.shown_by,
-            "source": "data sheets of accelerometers give a change of sensitivity with temperature",
-            "signature": "the residual is in proportion to the model, more so the longer a run lasts",
-        }
-        from_one = _METHOD.format(lasts_s=lasts_s).replace("p.gain_at_first_ratio", "1.0")
-        return [Draft(parameters=(change,), method=from_one, variant="from_one", **common),
-                Draft(parameters=(change, first), method=_METHOD.format(lasts_s=lasts_s), variant="from_any", **common)]
+        method = _METHOD.format(lasts_s=lasts_s)
+        return [self.draft((change,), method.replace("p.gain_at_first_ratio", "1.0"), variant="from_one"),
+                self.draft((change, first), method, variant="from_any")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         begins = f", from {say('gain_at_first_ratio')} on" if draft.variant == "from_any" else ""

@@ -26,6 +26,7 @@ _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
 class ChangingStiffness(Family):
     name = "changing_stiffness"
     title = "a stiffness that changes as a run goes on"
+    source = "a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -45,17 +46,14 @@ def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
     motion, between, what = _OF[of]
     times = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
     size, lost, most = (rounded(share * stiffness_n_per_m) for share in (_TRIED, _MOST_LOST, _MOST))
-    return Draft(
-        family=FAMILY.name, kind="ForceEffect", title=f"{of} whose stiffness changes as a run goes on",
-        parameters=(
-            Parameter("changed_n_per_m", size, -lost, most, 0.0, Scale.LINEAR, (size, -size),
-                      f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),
-            Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
-                      "after which most of it is there")),
-        source="a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1",
-        signature=f"{what} faster, or slower, as a run goes on", shown_by=FAMILY.shown_by,
-        method=_METHOD.format(between=between), functions=_FUNCTIONS.format(motion=motion), variant=of,
-        imports=("from types import SimpleNamespace", "from ridelog.effects import Between"))
+    parameters = (
+        Parameter("changed_n_per_m", size, -lost, most, 0.0, Scale.LINEAR, (size, -size),
+                  f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),
+        Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
+                  "after which most of it is there"))
+    return FAMILY.draft(parameters, _METHOD.format(between=between), _FUNCTIONS.format(motion=motion), variant=of,
+                        title=f"{of} whose stiffness changes as a run goes on",
+                        signature=f"{what} faster, or slower, as a run goes on")
 
 
 FAMILY = ChangingStiffness()

@@ -44,6 +44,7 @@ _DAMPERS = "dampers whose damping changes with the driving speed"
 class ChangingWithSpeed(Family):
     name = "changing_with_speed"
     title = "a damping or a stiffness that changes with the driving speed"
+    signature = "runs at different speeds ask for different numbers of one car"
     shown_by = "drive one road slowly and fast"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -94,15 +95,10 @@ class ChangingWithSpeed(Family):
 
     def _draft(self, title: str, variant: str, parameters: tuple[Parameter, ...], functions: str, method: str,
                places: tuple[float, ...] = ()) -> Draft:
-        damps = title is _DAMPERS
-        return Draft(
-            family=self.name, kind="ForceEffect", title=title, parameters=parameters,
-            source="S. M. Savaresi et al., Semi-Active Suspension Control Design for Vehicles (2010), chapter 2"
-            if damps else "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9",
-            signature="runs at different speeds ask for different numbers of one car", shown_by=self.shown_by,
-            method=method, variant=variant, functions=functions, places=places, words=("needs_road = True",),
-            imports=(*(("from types import SimpleNamespace",) if damps else ()),
-                     "from ridelog.effects import Between"))
+        source = ("S. M. Savaresi et al., Semi-Active Suspension Control Design for Vehicles (2010), chapter 2"
+                  if title is _DAMPERS else "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9")
+        return self.draft(parameters, method, functions, title=title, variant=variant, source=source, places=places,
+                          words=("needs_road = True",))
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.places:

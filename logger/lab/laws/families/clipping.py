@@ -8,8 +8,6 @@ it is, limited there, and what was lost goes through such a filter.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
@@ -41,6 +39,9 @@ _AT_LIMIT = (0.98, 0.8)  # of the greatest reading
 class Clipping(Family):
     name = "clipping"
     title = "a record that goes no farther than a limit"
+    kind = "RecordEffect"
+    source = "data sheets of accelerometers give a range that they do not leave"
+    signature = "strong motions are cut off at one acceleration, up and down alike"
     shown_by = "drive a rougher road: the strongest readings stay where they are"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -54,13 +55,9 @@ class Clipping(Family):
                           "no reading is stronger")
         sharpness = Parameter("sharpness_ratio", 2.0, 1.0, 20.0, None, Scale.LOG, (2.0,),
                               "the higher, the later it bends")
-        common: dict[str, Any] = {
-            "family": self.name, "kind": "RecordEffect", "title": self.title, "method": _METHOD,
-            "source": "data sheets of accelerometers give a range that they do not leave", "shown_by": self.shown_by}
-        return [Draft(parameters=(limit,), functions=_CUT_OFF, variant="both",
-                      signature="strong motions are cut off at one acceleration, up and down alike", **common),
-                Draft(parameters=(limit, sharpness), functions=_BENT, variant=_SMOOTHLY,
-                      signature="the stronger a motion, the less of it is recorded, up and down alike", **common)]
+        return [self.draft((limit,), _METHOD, _CUT_OFF, variant="both"),
+                self.draft((limit, sharpness), _METHOD, _BENT, variant=_SMOOTHLY,
+                           signature="the stronger a motion, the less of it is recorded, up and down alike")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == _SMOOTHLY:

@@ -8,7 +8,6 @@ away, g the gap either way.
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
-from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -39,17 +38,14 @@ class DamperBacklash(Family):
     name = "damper_backlash"
     title = "play in the mounts of the dampers"
     related_effects = ("top_mount_compliance",)
+    source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash"
+    signature = "small motions are hardly damped; larger ones are, but late"
     shown_by = "drive a smooth road, so that the suspension moves by little more than the play"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        return [Draft(
-            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
-            parameters=(Parameter("gap_m", 0.001, 0.0, 0.05, 0.0, Scale.LINEAR, (0.0003, 0.001, 0.003),
-                                  "either way, within which the damper does not answer"),),
-            source="M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash",
-            signature="small motions are hardly damped; larger ones are, but late",
-            functions=_FUNCTIONS,
-            method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"), at="loop")]
+        gap = Parameter("gap_m", 0.001, 0.0, 0.05, 0.0, Scale.LINEAR, (0.0003, 0.001, 0.003),
+                        "either way, within which the damper does not answer")
+        return [self.draft((gap,), _METHOD, _FUNCTIONS, at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"play in the dampers' mounts, {say('gap_m', 1000.0, 'mm')} either way"

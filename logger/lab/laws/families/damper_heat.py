@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
-from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -36,6 +35,9 @@ class DamperHeat(Family):
     name = "damper_heat"
     title = "dampers that fade as they grow hot"
     related_effects = ("damper_blow_off",)
+    source = ("O. Reynolds, Phil. Trans. Royal Society 177 (1886) 157: viscosity by temperature; J. C. Dixon, The "
+              "Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot")
+    signature = "the damping falls while a rough road is driven"
     shown_by = "drive a rough road for some minutes without a pause, and again after one"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -48,17 +50,12 @@ class DamperHeat(Family):
             "p.rear_lost_per_j if laws.rear else p.front_lost_per_j")]
 
     def _draft(self, variant: str, losses: Mapping[str, str], trials: tuple[float, ...], lost: str) -> Draft:
-        return Draft(
-            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by, variant=variant,
-            parameters=(
-                *(Parameter(name, 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, trials,
-                            f"what the logarithm of {of} loses by what it takes up") for name, of in losses.items()),
-                Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
-                          "in which what was lost comes back to 37 %")),
-            source="O. Reynolds, Phil. Trans. Royal Society 177 (1886) 157: viscosity by temperature; J. C. Dixon, The "
-                   "Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot",
-            signature="the damping falls while a rough road is driven", functions=_FUNCTIONS,
-            method=_METHOD.format(lost=lost), imports=(*BETWEEN, "from types import SimpleNamespace"))
+        parameters = (
+            *(Parameter(name, 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, trials,
+                        f"what the logarithm of {of} loses by what it takes up") for name, of in losses.items()),
+            Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
+                      "in which what was lost comes back to 37 %"))
+        return self.draft(parameters, _METHOD.format(lost=lost), _FUNCTIONS, variant=variant)
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         return super().narrower(draft, context) if draft.variant == "alike" else []

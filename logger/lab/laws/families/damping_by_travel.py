@@ -12,6 +12,8 @@ class DampingByTravel(Family):
     name = "damping_by_travel"
     title = "a damping that goes with the travel of the suspensions"
     related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
+    source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 3: position-dependent damping"
+    signature = "the damping is larger far from rest than near it"
     shown_by = "drive a rough road slowly, so that the suspension travels far at different rates"
     straight_at = 0.0
 
@@ -23,17 +25,13 @@ def force_n(p, travel_m, rate_mps):
     way = np.minimum(np.abs(travel_m), {rounded(2 * context.reach('travel_m', 0.9999))!r}) / {travel_m!r}
     return p.force_n * way**p.power_ratio * rate_mps / {rate_mps!r}
 """
-        return [Draft(
-            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
-            parameters=(
-                Parameter("force_n", size_n, 0.0, 100 * size_n, 0.0, Scale.LINEAR, (size_n,),
-                          f"at {1000 * travel_m:g} mm and {rate_mps:g} m/s"),
-                Parameter("power_ratio", 1.0, 0.3, 6.0, None, Scale.LOG, (1.0, 2.0), "exponent of the travel")),
-            source="J. C. Dixon, The Shock Absorber Handbook (2007), chapter 3: position-dependent damping",
-            signature="the damping is larger far from rest than near it", functions=functions,
-            method="def laws(self, p, laws):\n"
-                   "    return laws.with_force(lambda travel_m, rate_mps: force_n(p, travel_m, rate_mps))",
-            at="loop", reference=travel_m)]
+        parameters = (
+            Parameter("force_n", size_n, 0.0, 100 * size_n, 0.0, Scale.LINEAR, (size_n,),
+                      f"at {1000 * travel_m:g} mm and {rate_mps:g} m/s"),
+            Parameter("power_ratio", 1.0, 0.3, 6.0, None, Scale.LOG, (1.0, 2.0), "exponent of the travel"))
+        return [self.draft(parameters, "def laws(self, p, laws):\n"
+                           "    return laws.with_force(lambda travel_m, rate_mps: force_n(p, travel_m, rate_mps))",
+                           functions, at="loop", reference=travel_m)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a damping that grows with the travel to the power {say('power_ratio')}: "

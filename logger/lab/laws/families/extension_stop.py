@@ -7,7 +7,6 @@ Beyond a clearance it answers with k (x - d) + c x', and lets go where that woul
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _STIFFER = 3.0  # than the suspension's own spring: what is tried
@@ -27,23 +26,21 @@ class ExtensionStop(Family):
     name = "extension_stop"
     title = "a stop in the suspensions' extension"
     related_effects = ("bump_stop", "progressive_spring")
+    source = "K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42 (1975) 440: contact with damping"
+    signature = "large motions are cut short in extension"
     shown_by = "drive over a crest or a wide hole so fast that the wheels hang"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         stiffness = rounded(_STIFFER * context.vehicle.front.suspension_stiffness_n_per_m)
         clear_m = tuple(sorted({context.reach("travel_m", share) for share in _SHARES}))
-        return [Draft(
-            family=self.name, kind="ForceEffect", title="a stop in extension", shown_by=self.shown_by,
-            parameters=(
-                Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                          "of the stop"),
-                Parameter("clearance_m", clear_m[len(clear_m) // 2], rounded(0.05 * clear_m[0]),
-                          context.reach("travel_m", 1.0), None, Scale.LOG, clear_m, "extension until it is met"),
-                Parameter("damping_time_s", 0.01, 0.0, 1.0, None, Scale.LINEAR, (0.01,),
-                          "its damping over its stiffness", step=0.001)),
-            source="K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42 (1975) 440: contact with damping",
-            signature="large motions are cut short in extension", functions=_FUNCTIONS, method=_METHOD, imports=BETWEEN,
-            at="loop")]
+        parameters = (
+            Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
+                      "of the stop"),
+            Parameter("clearance_m", clear_m[len(clear_m) // 2], rounded(0.05 * clear_m[0]),
+                      context.reach("travel_m", 1.0), None, Scale.LOG, clear_m, "extension until it is met"),
+            Parameter("damping_time_s", 0.01, 0.0, 1.0, None, Scale.LINEAR, (0.01,), "its damping over its stiffness",
+                      step=0.001))
+        return [self.draft(parameters, _METHOD, _FUNCTIONS, title="a stop in extension", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a stop in extension of {say('stiffness_n_per_m', 0.001, 'N/mm')} beyond "

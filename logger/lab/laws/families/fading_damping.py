@@ -22,6 +22,8 @@ _METHOD = """def laws(self, p, laws):
 class FadingDamping(Family):
     name = "fading_damping"
     title = "a damping that changes as a run goes on"
+    source = "J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7"
+    signature = "the body and the wheels ring longer, or less long, as a run goes on"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -31,11 +33,7 @@ class FadingDamping(Family):
                          "lost in the end", step=0.02)
         time = Parameter("time_s", trials[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, trials,
                          "after which most of it is lost")
-        return [Draft(family=self.name, kind="ForceEffect", title=self.title, parameters=(lost, time),
-                      source="J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7",
-                      signature="the body and the wheels ring longer, or less long, as a run goes on",
-                      shown_by=self.shown_by, method=_METHOD, functions=_FUNCTIONS, variant="settling",
-                      imports=("from types import SimpleNamespace", "from ridelog.effects import Between"))]
+        return [self.draft((lost, time), _METHOD, _FUNCTIONS, variant="settling")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"

@@ -35,6 +35,9 @@ _SHARE = 0.01  # of what its stiffness answers to its length: tried
 class FlatSpot(Family):
     name = "flat_spot"
     title = "a flat spot of a tire"
+    source = ("P. W. A. Zegelaar, The Dynamic Response of Tyres to Brake Torque Variations and Road Unevennesses "
+              "(Delft, 1998)")
+    signature = "short blows, once in each turn of a wheel, whatever the speed"
     shown_by = "drive a smooth road slowly, and look at the tires"
     stands_out = True
 
@@ -71,22 +74,17 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
     last = len(runs) - 1
     places = " + ".join(f"p.{name} * (seen.run {'>=' if number == last else '=='} {number})"
                         for number, name in enumerate(names)) if last else f"p.{names[0]}"
-    draft = Draft(
-        family=FlatSpot.name, kind="ForceEffect", title=FlatSpot.title, shown_by=FlatSpot.shown_by,
-        parameters=(
-            Parameter("force_n", usual_n, -100 * usual_n, 100 * usual_n, 0.0, Scale.LINEAR, (usual_n,),
-                      "that the tire pushes less by, in the middle of it", step=0.1 * usual_n),
-            Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of it, along the tread"),
-            Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
-                      "of a wheel that turns once for each", step=1e-5),
-            *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
-                        f"along the way, where it is on the ground{of_run(run)}", step=0.005)
-              for name, place_m, run in zip(names, places_m, runs, strict=True))),
-        source="P. W. A. Zegelaar, The Dynamic Response of Tyres to Brake Torque Variations and Road Unevennesses "
-               "(Delft, 1998)",
-        signature="short blows, once in each turn of a wheel, whatever the speed",
-        method=_METHOD, functions=_FUNCTIONS.format(place=places), variant="spot" + EACH * (last > 0),
-        imports=("from ridelog.effects import Between",), words=("needs_road = True",))
+    parameters = (
+        Parameter("force_n", usual_n, -100 * usual_n, 100 * usual_n, 0.0, Scale.LINEAR, (usual_n,),
+                  "that the tire pushes less by, in the middle of it", step=0.1 * usual_n),
+        Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of it, along the tread"),
+        Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
+                  "of a wheel that turns once for each", step=1e-5),
+        *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
+                    f"along the way, where it is on the ground{of_run(run)}", step=0.005)
+          for name, place_m, run in zip(names, places_m, runs, strict=True)))
+    draft = FAMILY.draft(parameters, _METHOD, _FUNCTIONS.format(place=places), variant="spot" + EACH * (last > 0),
+                         words=("needs_road = True",))
     return draft.of_axle(axle) if axle else draft
 
 

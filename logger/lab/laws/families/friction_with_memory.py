@@ -17,29 +17,26 @@ def rates(p, seen):
 """
 HANDED_ON = ("def laws(self, p, laws):\n"
              "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))")
-BETWEEN = ("from ridelog.effects import Between",)
 
 
 class FrictionWithMemory(Family):
     name = "friction_with_memory"
     title = "friction with memory in the suspensions"
     related_effects = ("hysteresis", "dry_friction")
+    source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
+              "ASCE 102 (1976) 249")
+    signature = "small motions meet a stiffer spring, larger ones friction"
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        return [Draft(
-            family=self.name, kind="ForceEffect", title="friction that gives before it slides", shown_by=self.shown_by,
-            parameters=(
-                Parameter("yield_force_n", 100.0, 0.0, 20000.0, 0.0, Scale.LINEAR, (100.0,),
-                          "at which each suspension slides"),
-                Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
-                          "over which it would come to that at its first stiffness"),
-                Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
-                          "exponent of the law: the higher, the sharper the yield", default=1.0)),
-            source="R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. "
-                   "Div. ASCE 102 (1976) 249",
-            signature="small motions meet a stiffer spring, larger ones friction",
-            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
+        parameters = (
+            Parameter("yield_force_n", 100.0, 0.0, 20000.0, 0.0, Scale.LINEAR, (100.0,),
+                      "at which each suspension slides"),
+            Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
+                      "over which it would come to that at its first stiffness"),
+            Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
+                      "exponent of the law: the higher, the sharper the yield", default=1.0))
+        return [self.draft(parameters, HANDED_ON, _FUNCTIONS, title="friction that gives before it slides", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"friction with memory, {say('yield_force_n')} over {say('yield_travel_m', 1000.0, 'mm')}"

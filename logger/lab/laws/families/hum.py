@@ -36,6 +36,8 @@ _STEP, _STEP_S = 1e-5, 1e-4
 class Hum(Family):
     name = "hum"
     title = "a hum that the road does not cause"
+    kind = "RecordEffect"
+    source = "orders of engines and machines (ISO 20816-1:2016)"
     shown_by = "stand with the engine running, and drive one road in two gears"
     stands_out = True
 
@@ -75,10 +77,8 @@ class Hum(Family):
                          for run in runs for part, words in (("cos", "even part"), ("sin", "odd part"))]
             pairs = ", ".join(f"(p.{in_run('cos', run, 'mps2')}, p.{in_run('sin', run, 'mps2')})" for run in runs)
             pick = pairs if len(runs) == 1 else f"(\n        {pairs},\n    )[min(recording.run, {len(runs) - 1})]"
-            return Draft(family=self.name, kind="RecordEffect", title=self.title, parameters=(*strengths, *numbers),
-                         source="orders of engines and machines (ISO 20816-1:2016)", signature=signature,
-                         shown_by=self.shown_by, method=_METHOD.format(cycles=cycles, pick=pick), variant=variant,
-                         **more)
+            return self.draft((*strengths, *numbers), _METHOD.format(cycles=cycles, pick=pick), signature=signature,
+                              variant=variant, **more)
 
         ways = ((ALL_ALIKE, variant), (each_run(context), f"{variant}{EACH}"))
         return [draft(runs, name) for runs, name in ways if runs]

@@ -35,6 +35,9 @@ class HungMass(Family):
     name = "hung_mass"
     title = "a mass on a spring on the body or the wheels"
     related_effects = ("occupant", "body_bending", "payload", "cg_shift")
+    kind = "BodyEffect"
+    source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: a mass on a spring on a mass"
+    signature = "around its own frequency what carries it moves less than the model says, and beside it more"
     shown_by = "drive with it and without it, or put a second sensor where it hangs"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -54,16 +57,12 @@ class HungMass(Family):
 
     def _draft(self, variant: str, title: str, mass_kg: float, most_kg: float, where: str, trials_hz: tuple[float, ...],
                more: tuple[Parameter, ...], method: str) -> Draft:
-        return Draft(
-            family=self.name, kind="BodyEffect", title=title, shown_by=self.shown_by, variant=variant,
-            parameters=(
-                Parameter("mass_kg", mass_kg, 0.0, most_kg, 0.0, Scale.LINEAR, (mass_kg,), where),
-                Parameter("frequency_hz", trials_hz[len(trials_hz) // 2], 0.8, 30.0, None, Scale.LOG, trials_hz,
-                          "of that mass on its spring"),
-                Parameter("damping_ratio", 0.15, 0.005, 2.0, None, Scale.LOG, (0.15,), "of its spring"), *more),
-            source="J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: a mass on a spring on a mass",
-            signature="around its own frequency what carries it moves less than the model says, and beside it more",
-            imports=("from logger.vehicle.structure import hung",), method=method)
+        parameters = (
+            Parameter("mass_kg", mass_kg, 0.0, most_kg, 0.0, Scale.LINEAR, (mass_kg,), where),
+            Parameter("frequency_hz", trials_hz[len(trials_hz) // 2], 0.8, 30.0, None, Scale.LOG, trials_hz,
+                      "of that mass on its spring"),
+            Parameter("damping_ratio", 0.15, 0.005, 2.0, None, Scale.LOG, (0.15,), "of its spring"), *more)
+        return self.draft(parameters, method, title=title, variant=variant)
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         said = (f"a mass of {say('mass_kg')} on a spring, {say('frequency_hz')} with a damping ratio of "

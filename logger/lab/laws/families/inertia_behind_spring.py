@@ -10,10 +10,7 @@ rigidly it is a mass that only the travel moves: the force is b x''.
 
 from __future__ import annotations
 
-from typing import Any
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import BETWEEN
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.5  # of the suspension's own stiffness, and of the mass of a wheel where there is no spring
@@ -43,6 +40,9 @@ class InertiaBehindSpring(Family):
     name = "inertia_behind_spring"
     title = "inertia in the suspensions, maybe behind a spring"
     related_effects = ("top_mount_compliance", "hysteresis")
+    source = ("M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "
+              "(1985): hydraulic mounts")
+    signature = "the suspension is softer below a frequency, and stiffer above it"
     shown_by = "drive a rough road, on which the suspensions move at all frequencies up to that of the wheels"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -56,22 +56,14 @@ class InertiaBehindSpring(Family):
             Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, _RATIOS, "of its motion", step=0.01),
             Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
                       "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
-        common: dict[str, Any] = {
-            "family": self.name, "shown_by": self.shown_by,
-            "source": "M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE "
-                      "850975 (1985): hydraulic mounts",
-        }
         wheel_kg = rounded(_SHARE * front.unsprung_mass_kg)
-        rigid = Draft(
-            kind="BodyEffect", title="inertia that moves with the suspensions' travel", variant="rigid",
-            parameters=(Parameter("inertance_kg", wheel_kg, 0.0, 100 * wheel_kg, 0.0, Scale.LINEAR, (wheel_kg,),
-                                  "the mass that a suspension's ends feel against each other"),),
-            signature="the wheels hop at a lower frequency, and the body feels it",
-            method=_RIGID, imports=("from dataclasses import replace",), **common)
-        return [rigid, Draft(
-            kind="ForceEffect", title="inertia behind a spring in the suspensions", variant="sprung", parameters=sprung,
-            functions=_FUNCTIONS, method=_METHOD, signature="the suspension is softer below a frequency, and stiffer "
-            "above it", imports=BETWEEN, at="loop", **common)]
+        inertance = Parameter("inertance_kg", wheel_kg, 0.0, 100 * wheel_kg, 0.0, Scale.LINEAR, (wheel_kg,),
+                              "the mass that a suspension's ends feel against each other")
+        return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",
+                           title="inertia that moves with the suspensions' travel",
+                           signature="the wheels hop at a lower frequency, and the body feels it"),
+                self.draft(sprung, _METHOD, _FUNCTIONS, title="inertia behind a spring in the suspensions",
+                           variant="sprung", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "rigid":

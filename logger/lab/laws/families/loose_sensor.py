@@ -68,6 +68,9 @@ class LooseSensor(Family):
     name = "loose_sensor"
     title = "a sensor that lies loose on the body"
     related_effects = ("sensor_mount_resonance", "sensor_gain")
+    kind = "RecordEffect"
+    source = "B. Brogliato, Nonsmooth Mechanics (2016), chapter 1: unilateral contact, impact without a bounce"
+    signature = "downwards the record goes no farther than a limit, and blows upwards follow"
     shown_by = "screw the sensor down, and drive the same road again"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -91,11 +94,7 @@ class LooseSensor(Family):
         number = Parameter("held_mps2", held_mps2, rounded(0.01 * greatest_mps2), rounded(5 * greatest_mps2),
                            float("inf"), Scale.RECIPROCAL, (held_mps2,),
                            "the sensor leaves its seat where the body falls faster", step=0.002 / held_mps2)
-        return Draft(
-            family=self.name, kind="RecordEffect", title=self.title, shown_by=self.shown_by, parameters=(number,),
-            source="B. Brogliato, Nonsmooth Mechanics (2016), chapter 1: unilateral contact, impact without a bounce",
-            signature="downwards the record goes no farther than a limit, and blows upwards follow",
-            functions=_FUNCTIONS, method=_METHOD)
+        return self.draft((number,), _METHOD, _FUNCTIONS)
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"a sensor that lies loose, and leaves its seat where the body falls faster than {say('held_mps2')}"

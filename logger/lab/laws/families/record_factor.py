@@ -8,7 +8,6 @@ as they are, and raises or lowers quick ones.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
@@ -31,6 +30,9 @@ class RecordFactor(Family):
     name = "record_factor"
     title = "a correction between body and record"
     related_effects = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
+    kind = "SensorEffect"
+    source = "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)"
+    signature = "the measurement is the model times one function of frequency, whatever the road"
     shown_by = "shake the sensor, in its place, beside another one"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -40,16 +42,11 @@ class RecordFactor(Family):
                          step=0.01)
         frequency = Parameter("frequency_hz", 10.0, 0.5, 60.0, None, Scale.LOG, _HZ, "of the pole")
         damping = Parameter("damping_ratio", 0.2, 0.02, 2.0, None, Scale.LOG, (0.2,), "of the pair of poles")
-        common: dict[str, Any] = {
-            "family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
-            "source": "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)",
-            "signature": "the measurement is the model times one function of frequency, whatever the road",
-        }
-        return [Draft(parameters=(added, frequency), method=_POLE, variant="pole", **common),
-                Draft(parameters=(replace(added, meaning="what is added to quick motions"), frequency), method=_RISING,
-                      variant="rising", **common),
-                *(Draft(parameters=(added, rate, _begun(frequency, one), damping), method=_PAIR,
-                        variant=f"pair_{one:g}", **common) for one in _HZ)]
+        rising = replace(added, meaning="what is added to quick motions")
+        return [self.draft((added, frequency), _POLE, variant="pole"),
+                self.draft((rising, frequency), _RISING, variant="rising"),
+                *(self.draft((added, rate, replace(frequency, start=one, trials=(one,)), damping), _PAIR,
+                             variant=f"pair_{one:g}") for one in _HZ)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "pole":
@@ -58,10 +55,6 @@ class RecordFactor(Family):
             return f"a record to which {say('added_ratio')} of it is added above {say('frequency_hz')}"
         return (f"a record that something rings into at {say('frequency_hz')} with a damping of "
                 f"{say('damping_ratio')}, by {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
-
-
-def _begun(frequency: Parameter, at_hz: float) -> Parameter:
-    return replace(frequency, start=at_hz, trials=(at_hz,))
 
 
 FAMILY = RecordFactor()

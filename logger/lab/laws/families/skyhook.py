@@ -30,6 +30,8 @@ class Skyhook(Family):
     name = "skyhook"
     title = "dampers that resist how fast the body moves against the ground"
     related_effects = ("damper_asymmetry", "damper_blow_off")
+    source = "D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)"
+    signature = "the body bounces less, and the wheels hop no less"
     shown_by = "drive a road with long waves, on which the body bounces, and a short rough one, on which the wheels hop"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -39,14 +41,9 @@ class Skyhook(Family):
                         "force by the speed of the body's end of the suspension")
         firmest = Parameter("firmest_n_s_per_m", tried[1], rounded(0.01 * own), most, None, Scale.LOG, tried,
                             "force by the suspension's rate, at most")
-        return [self._draft(ACTIVE, (sky,), _ACTIVE), self._draft(SEMI_ACTIVE, (sky, firmest), _SEMI_ACTIVE)]
-
-    def _draft(self, variant: str, parameters: tuple[Parameter, ...], functions: str) -> Draft:
-        return Draft(
-            family=self.name, kind="ForceEffect", title=f"{variant} {self.title}", parameters=parameters,
-            source="D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)",
-            signature="the body bounces less, and the wheels hop no less", shown_by=self.shown_by, method=_METHOD,
-            functions=functions, variant=variant, imports=("from ridelog.effects import Between",))
+        return [self.draft(parameters, _METHOD, functions, title=f"{variant} {self.title}", variant=variant)
+                for variant, parameters, functions in ((ACTIVE, (sky,), _ACTIVE),
+                                                       (SEMI_ACTIVE, (sky, firmest), _SEMI_ACTIVE))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         said = f"{draft.variant} dampers that resist the body's own speed against the ground, {say('sky_n_s_per_m')}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
+from logger.lab.laws.families.friction_with_memory import HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.3  # of the forces of the part's own spring and damper
@@ -37,6 +37,9 @@ class SlidingBehindSpring(Family):
     name = "sliding_behind_spring"
     title = "what slides behind a spring in a part on its bench"
     related_effects = ("hysteresis", "top_mount_compliance", "dry_friction")
+    source = ("F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied Mechanics "
+              "9 (1966) 243")
+    signature = "small motions meet a spring, larger ones a force that hardly grows"
     shown_by = "move the part by little and by much, slowly and fast"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -62,17 +65,10 @@ class SlidingBehindSpring(Family):
                       "either way, within which it has no force"))
         one_way = replace(ratio, low=1.0, high=1.0, default=1.0)
         tight = replace(play, start=0.0, high=0.0, trials=(0.0,), default=0.0)
-        return [self._draft(variant, (force, over, power, rate, *more)) for variant, more in (
-            ("alike", (one_way, tight)), ("by direction", (ratio, tight)), ("with play", (one_way, play)))]
-
-    def _draft(self, variant: str, parameters: tuple[Parameter, ...]) -> Draft:
-        return Draft(
-            family=self.name, kind="ForceEffect", title="a part slides behind a spring", shown_by=self.shown_by,
-            parameters=parameters, variant=variant, at="loop",
-            source="F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied "
-                   "Mechanics 9 (1966) 243",
-            signature="small motions meet a spring, larger ones a force that hardly grows",
-            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN)
+        return [self.draft((force, over, power, rate, *more), HANDED_ON, _FUNCTIONS, variant=variant, at="loop",
+                           title="a part slides behind a spring")
+                for variant, more in (("alike", (one_way, tight)), ("by direction", (ratio, tight)),
+                                      ("with play", (one_way, play)))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         more = {"by direction": f", {say('lengthening_ratio')} times that of lengthening",

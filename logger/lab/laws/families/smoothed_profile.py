@@ -8,8 +8,6 @@ micrometre, and their rounding would be a tenth of a millimetre beyond.
 
 from __future__ import annotations
 
-from typing import Any
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
@@ -43,19 +41,18 @@ class SmoothedProfile(Family):
     name = "smoothed_profile"
     title = "a profile that lacks short waves"
     related_effects = ("tire_enveloping", "sensor_mount_resonance", "sensor_bandwidth")
+    kind = "RoadEffect"
+    source = "profilers take means over a base (ASTM E950; EN 13036-6)"
+    signature = "the car is shaken more than by its profile, by short waves the more, at any speed alike"
     shown_by = "drive one road slowly and fast: what is missing stays at one length of wave"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         if not context.is_driven:
             return []
-        common: dict[str, Any] = {
-            "family": self.name, "kind": "RoadEffect", "title": self.title, "shown_by": self.shown_by,
-            "method": _METHOD, "source": "profilers take means over a base (ASTM E950; EN 13036-6)",
-            "signature": "the car is shaken more than by its profile, by short waves the more, at any speed alike"}
-        return [Draft(parameters=(_length("spread_m", 1.0, "standard deviation of the bell that smoothed it"),),
-                      functions=_FUNCTIONS.format(share=_BELL), variant="bell", **common),
-                Draft(parameters=(_length("base_m", 12**0.5, "base of the mean that smoothed it"),),
-                      functions=_FUNCTIONS.format(share=_MEAN), variant="mean", **common)]
+        spread = _length("spread_m", 1.0, "standard deviation of the bell that smoothed it")
+        base = _length("base_m", 12**0.5, "base of the mean that smoothed it")
+        return [self.draft((one,), _METHOD, _FUNCTIONS.format(share=share), variant=variant)
+                for variant, one, share in (("bell", spread, _BELL), ("mean", base, _MEAN))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "mean":

@@ -4,7 +4,7 @@ branch)."""
 from __future__ import annotations
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
+from logger.lab.laws.families.friction_with_memory import HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _SHARE = 0.5  # of the suspension's own stiffness
@@ -23,22 +23,20 @@ class SpringWithMemory(Family):
     name = "spring_with_memory"
     title = "a spring with memory in the suspensions: rubber that creeps"
     related_effects = ("top_mount_compliance", "hysteresis")
+    source = ("J. C. Maxwell, Phil. Trans. R. Soc. 157 (1867) 49; for rubber: M. Berg, Vehicle System Dynamics 30 "
+              "(1998) 197")
+    signature = "the suspension is stiffer for quick motions than for slow ones"
     shown_by = "drive the same road slowly and fast: quick motions meet a stiffer spring than slow ones"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         stiffness = rounded(_SHARE * context.vehicle.front.suspension_stiffness_n_per_m)
-        return [Draft(
-            family=self.name, kind="ForceEffect", title="rubber parallel to the springs that creeps",
-            shown_by=self.shown_by,
-            parameters=(
-                Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                          "of the rubber where it has no time to creep"),
-                Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
-                          "in which its force falls to 37 %")),
-            source="J. C. Maxwell, Phil. Trans. R. Soc. 157 (1867) 49; for rubber: M. Berg, Vehicle System Dynamics 30 "
-                   "(1998) 197",
-            signature="the suspension is stiffer for quick motions than for slow ones",
-            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
+        parameters = (
+            Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
+                      "of the rubber where it has no time to creep"),
+            Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
+                      "in which its force falls to 37 %"))
+        return [self.draft(parameters, HANDED_ON, _FUNCTIONS, title="rubber parallel to the springs that creeps",
+                           at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a spring with memory, {say('stiffness_n_per_m', 0.001, 'N/mm')} that creeps within "

@@ -36,6 +36,8 @@ _RADII_M = (0.1, 0.5)
 class WheelTurns(Family):
     name = "wheel_turns"
     title = "a force that comes round with the wheels' turns"
+    source = "a mass that turns beside its axle (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
+    signature = "it repeats along the way, whatever the speed, and grows with the square of the speed"
     shown_by = "drive a smooth road at two steady speeds"
     stands_out = True
 
@@ -60,14 +62,9 @@ class WheelTurns(Family):
             for part, words in (("cos", "down where the way is 0"), ("sin", "a quarter turn later"))]
         radius = Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
                            "of a wheel that turns once for each of its pulls", step=1e-5)
-        return Draft(
-            family=self.name, kind="ForceEffect", title=self.title, parameters=(*strengths, radius),
-            source="a mass that turns beside its axle (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)",
-            signature="it repeats along the way, whatever the speed, and grows with the square of the speed",
-            shown_by=self.shown_by, method=_METHOD.format(pick=_pick(axles, runs)),
-            functions=_FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs)), variant=variant,
-            imports=("from types import SimpleNamespace", "from ridelog.effects import Between"),
-            words=("needs_road = True",))
+        functions = _FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs))
+        return self.draft((*strengths, radius), _METHOD.format(pick=_pick(axles, runs)), functions, variant=variant,
+                          words=("needs_road = True",))
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         return []
