@@ -572,8 +572,8 @@ def limit_of(text: str) -> float:
 
 
 Localized = Annotated[float | None, Option(
-    "list where the IRI over 25 ft, which slides along, is above this, in m/km, or at a terminal as 160in/mi (AASHTO "
-    "R 54)", LIMIT, "IRI", read=limit_of)]
+    "list areas of localized roughness (AASHTO R 54): where the IRI over a sliding base of 25 ft exceeds this, in "
+    "m/km, or at a terminal as 160in/mi", LIMIT, "IRI", read=limit_of)]
 Unit = Annotated[str | None, Option(
     "unit of the accelerations, whatever they look like (default: m/s2, and a record that is plainly in g is refused)",
     choices=("mps2", "g"))]

@@ -32,7 +32,7 @@ from logger.roads.iri import (
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, iri_from_gd_n0
 from logger.roads.sections import ride_words, road_kinds
 from logger.store.formats import drive_file, profile_file
-from logger.units import INCH_PER_MILE_M_PER_KM, WINDOW_M
+from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, WINDOW_M
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -260,12 +260,18 @@ def _cut_short(result: ProfileIri) -> list[str]:
         all(window.partial for window in result.windows)) else []
 
 
+def _of_profile(profile: Profile, name: str) -> str:
+    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
+    return (f"{name}: {length_m:.2f} m ({length_m / FOOT_M:.1f} ft), one sample every "
+            f"{profile.spacing_m * 1000:.4g} mm ({profile.spacing_m / FOOT_M * 12:.4g} in)")
+
+
 def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
     whole = result.row(0)
-    roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
-    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
-    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    first = "mri_m_per_km" if "mri_m_per_km" in whole else "iri_m_per_km"
+    roughness = whole[first]
+    printed = [_of_profile(profile, name)]
     if doubt := unit_doubt(_roughest(result)):
         printed.append(doubt)
     if profile.widest_step_m is not None:
@@ -275,12 +281,14 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
                       for key, value in whole.items()),
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
         f"Ride: {ride_words(roughness)}", "", *_cut_short(result),
-        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + "  m/km",
+        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + f" m/km {'in/mi':>9}",
     ]
     for number, window in enumerate(result.windows, start=1):
         start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))
-        values = "".join(f" {value:10.3f}" for value in result.row(number).values())
-        printed.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
+        row = result.row(number)
+        values = "".join(f" {value:10.3f}" for value in row.values())
+        printed.append(f"{start_m:10.2f} {end_m:10.2f}{values} {row[first] / INCH_PER_MILE_M_PER_KM:14.1f}"
+                       + ("   partial" if window.partial else ""))
     return printed
 
 
@@ -304,8 +312,7 @@ def _track_json(track: TrackClass) -> dict[str, Any]:
 
 def class_lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
-    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
-    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    printed = [_of_profile(profile, name)]
     if doubt := unit_doubt(max(track.iri_m_per_km for track in tracks)):
         printed.append(doubt)
     for side, track in zip(("left track", "right track") if len(tracks) > 1 else ("",), tracks, strict=True):

@@ -146,11 +146,11 @@ def enumerated(names: Sequence[str], last: str) -> str:
 def area_lines(found: Sequence[Area], limit_m_per_km: float, units: DisplayUnits = UNITS["si"]) -> Iterator[str]:
     """A table, or a sentence where there is none."""
     (place, place_m), (iri, scale), decimals = units.place, units.iri, units.iri_decimals
-    limit = f"{limit_m_per_km / scale:.{decimals}f}" if scale != 1 else f"{limit_m_per_km:g}"
+    limit = f"{limit_m_per_km:.4g} m/km ({limit_m_per_km / INCH_PER_MILE_M_PER_KM:.0f} in/mi)"
     if not found:
-        yield f"Localized roughness: nowhere is the IRI over 25 ft above {limit} {iri}."
+        yield f"Areas of localized roughness: none. The IRI over a sliding base of 25 ft stays below {limit}."
         return
-    yield f"Localized roughness: where the IRI over 25 ft, which slides along, is above {limit} {iri}"
+    yield f"Areas of localized roughness: where the IRI over a sliding base of 25 ft exceeds {limit}"
     yield f"{'from ' + place:>10} {'to ' + place:>10} {'length ' + place:>9} {'worst ' + iri:>14} {'at ' + place:>10}"
     for one in found:
         error = known(one.worst_std_m_per_km)

@@ -118,11 +118,11 @@ def test_localized_roughness_slides_along_each_drive(logs: Path, capsys: pytest.
     worst = max(section["worst_m_per_km"] or 0 for drive in drives for section in drive["sections"])
     assert max(one["worst_m_per_km"] for one in found) == pytest.approx(worst)
     assert main(["sections", str(logs), "--localized", "45"]) == 0
-    assert "nowhere is the IRI over 25 ft above 45 m/km" in capsys.readouterr().out
+    assert "The IRI over a sliding base of 25 ft stays below 45 m/km (2851 in/mi)" in capsys.readouterr().out
     assert main(["sections", str(logs), "--localized", "2", "--units", "us"]) == 0
     words = capsys.readouterr().out
-    assert "above 127 in/mi" in words
-    head, first = words[words.index("Localized"):].splitlines()[1:3]
+    assert "exceeds 2 m/km (127 in/mi)" in words
+    head, first = words[words.index("Areas of localized"):].splitlines()[1:3]
     assert head.split() == ["from", "ft", "to", "ft", "length", "ft", "worst", "in/mi", "at", "ft"]
     assert float(first.split()[0]) == pytest.approx(found[0]["distance_start_m"] / 0.3048, abs=0.051)
     assert float(first.split()[3]) == pytest.approx(found[0]["worst_m_per_km"] * 63.36, abs=0.51)
