@@ -542,10 +542,10 @@ class LearnCarQuestion(LongQuestion):
       ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
 
     It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
-    wheels; the roads' levels and waviness are found with them. Each drive is kept back in turn, to show the error on
-    a drive that no fit saw; what is written comes from all drives. Masses, springs and dampers share a scale that the
-    IRI does not need: without --mass it is a convention. What does not fit is refused in words (exit status 1): a
-    wrong wheelbase, drives of two cars, readings of another axis. A worn damper, friction and a trailer are named.
+    wheels, together with the level and waviness of each road. It holds out each drive in turn to show the error on a
+    drive that no fit saw; the file comes from all drives. Masses, springs and dampers share a scale that the IRI does
+    not need: without --mass it is a convention. learn-car refuses what does not fit (exit status 1): a wrong wheelbase,
+    drives of two cars, readings of another axis. It names a worn damper, friction and a trailer.
 
     In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
     """

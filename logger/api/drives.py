@@ -493,4 +493,4 @@ def _table(summary: dict[str, Any]) -> Iterator[str]:
                      f"{found['within_two']:6.2f}")
         yield line
     if compared:
-        yield "R2 against the profile; in 1, in 2: windows within one and two standard errors (right: 0.68, 0.95)."
+        yield "R2 against the profile; in 1, in 2: windows within one and two standard errors (ideal: 0.68, 0.95)."

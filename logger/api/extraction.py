@@ -388,7 +388,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
         LeftOut(seconds["parked"], "s", "of a parked car"),
         LeftOut(max(0.0, seconds["driven"] - laid_s), "s", "off the profile" if measured else "between two runs"),
         LeftOut(laid_s - long_s, "s", f"in stretches of less than {LEAST_S:g} s or {LEAST_M:g} m"),
-        LeftOut(long_s - kept_s, "s", "of which no reading is sure: none was taken, or the sensor stood at its end")))
+        LeftOut(long_s - kept_s, "s", "without a good reading: none was taken, or the sensor was clipped")))
 
 
 def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:

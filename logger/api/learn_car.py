@@ -393,7 +393,7 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     far = (car.x - problem.knowledge.mean)[kept]
     if far @ np.linalg.solve(problem.knowledge.covariance[np.ix_(kept, kept)], far) > _NO_CAR:
         most = max(kept, key=lambda at: abs(off[at]))
-        raise CheckFailed(f"learn-car: no car answers roads like these drives: {_words_of(NUMBERS[most])} would be "
+        raise CheckFailed(f"learn-car: no car responds to roads like these drives: {_words_of(NUMBERS[most])} would be "
                           f"{abs(off[most]):.1f} standard deviations from that of published cars. Is vertical_axis the "
                           "one that points up, is the sensor bolted to the body, were they driven without a trailer?")
 
@@ -524,9 +524,9 @@ def _iri_lines(now: Mapping[float, float], ever: Mapping[float, float]) -> Itera
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
     if not errors["drives"]:
-        yield "One drive: none could be kept back to check the car on."
+        yield "One drive: none could be held out to check the car."
         return
-    yield (f"Each drive kept back in turn: its spectra differ {errors['misfit_before']:.1f} times as much as by chance "
+    yield (f"Each drive held out in turn: its spectra differ {errors['misfit_before']:.1f} times as much as by chance "
            f"from any car of this wheelbase, {errors['misfit_after']:.1f} times from a car learnt from the others.")
 
 

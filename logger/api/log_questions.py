@@ -80,7 +80,7 @@ class SectionsQuestion(LogsQuestion):
     Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its
     windows by length, over as much of it as has an IRI, which is said beside it. Its standard error counts what its
     windows' errors share; where the logs of an older version do not say what that is, neighbours count as sharing all.
-    Rows flagged ``unsettled`` stand in no mean.
+    No mean includes rows flagged ``unsettled``.
 
     With --route they count by the measures of a line, for each pass over it and in either direction. The line may say
     begin_km and end_km; points with a number km are its kilometre posts.

@@ -439,9 +439,9 @@ def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
                   for number, mode in enumerate(result.modes, start=1)]
         shown += ["", f"± is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
     else:
-        shown.append("No mode: nothing in this record stands out of what noise would do.")
+        shown.append("No mode: nothing in this record exceeds noise.")
     if result.rejected:
-        shown += ["", "Found and not believed:"]
+        shown += ["", "Rejected:"]
         shown += [f"  {one.frequency_hz:9.4g} Hz  {one.reason}" for one in result.rejected[:_REJECTED_SHOWN]]
         if len(result.rejected) > _REJECTED_SHOWN:
             shown.append(f"  and {len(result.rejected) - _REJECTED_SHOWN} more")

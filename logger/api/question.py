@@ -547,13 +547,13 @@ Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
 VehicleName = Annotated[Vehicle, Option(
     "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
     metavar="NAME|FILE", read=str)]
-Anyway = Annotated[bool, Option("go on where a run does not seem to be of this road or this car, or in these units")]
+Anyway = Annotated[bool, Option("go on although a run seems to be of another road or car, or in other units")]
 TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
-    "how far off the vehicle's masses, springs and dampers may well be, where its file does not say it of one, as a "
-    f"share (default: {USUAL_TOLERANCE:g}); lengths are taken to be known to 2 %, one standard deviation. {UNKNOWN}: "
-    "nothing is known of any number", metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
+    "how well the vehicle's masses, springs and dampers are known where its file does not say: one standard "
+    f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: nothing is known of any",
+    metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 EffectFiles = Annotated[Sequence[Path | str], Option(
@@ -575,7 +575,7 @@ Localized = Annotated[float | None, Option(
     "list areas of localized roughness (AASHTO R 54): where the IRI over a sliding base of 25 ft exceeds this, in "
     "m/km, or at a terminal as 160in/mi", LIMIT, "IRI", read=limit_of)]
 Unit = Annotated[str | None, Option(
-    "unit of the accelerations, whatever they look like (default: m/s2, and a record that is plainly in g is refused)",
+    "unit of the accelerations (default: m/s2; a record that is plainly in g is then refused)",
     choices=("mps2", "g"))]
 
 
@@ -587,12 +587,12 @@ def _rate_hz(text: str) -> float:
 
 
 ResampleHz = Annotated[float | None, Option(
-    "for a record whose times are uneven, come in bursts, or whose samples repeat: drop the repeats and lay it on an "
-    "even grid of HZ through an anti-alias filter; without HZ (in Python 0): of the record's own rate, 100 Hz at "
-    "least. The result says that it was done", metavar="HZ", read=_rate_hz, bare=0.0)]
+    "for a record with uneven times, bursts or repeated samples: drop the repeats and resample it evenly at HZ, "
+    "through an anti-alias filter. Without HZ (in Python 0): at its own rate, 100 Hz at least. The result says so",
+    metavar="HZ", read=_rate_hz, bare=0.0)]
 ResampleM = Annotated[float | None, Option(
-    "for an unevenly spaced profile: lay straight lines between its samples and take a sample every M metres; this "
-    "changes the IRI, and the result says that it was done; what was between wide samples stays unknown",
+    "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the IRI, and "
+    "the result says so",
     metavar="M")]
 
 

@@ -136,7 +136,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
 
     said = f"{option} {out}".lstrip()
     if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE, EXCITATION, RUN)}:
-        raise BadInput(f"{said}: expected a file that is none of a run's")
+        raise BadInput(f"{said}: expected a file that does not belong to a run")
     if out.resolve() in {path.resolve() for path in read}:
         raise BadInput(f"{said}: expected another file than those that are read")
     if not out.parent.is_dir() or out.is_dir():

@@ -4,8 +4,8 @@
   sudo ridelog export --to /media/RIDELOG --dumps
 
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-already is read and left alone. Where the settings pair the logger with its sticks, only a copy on one of those counts
-as an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
+already is read and left alone. If the settings pair the logger with sticks, only a copy to a paired one counts as an
+export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Make runs for the lab out of what the box in the car recorded, or a phone.
 
 Each continuous drive of a dump becomes a folder DIR/NAME, DIR/NAME-2, ... with drive.csv and run.yaml. With --profile,
-a measured line with lat_deg,lon_deg, only what was driven on it is kept, laid on the line's own distance: first by the
-positions, then by the road as the car felt it; profile.csv lies beside it then.
+a measured line with lat_deg,lon_deg, a run holds only what was driven on that line, by the line's own distance: first
+from the GPS positions, then from the road as the car felt it. profile.csv then lies beside drive.csv.
 
   ridelog extract drive.dump.gz --out runs --profile line.csv
   ridelog diagnose --vehicle mycar.yaml runs/*
@@ -45,11 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the runs")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings of those drives")
     parser.add_argument("--profile", type=Path, metavar="PROFILE.csv",
-                        help="the measured line that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,"
+                        help="profile of the road that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,"
                              "lon_deg; places may be empty in most rows")
     parser.add_argument("--vehicle", metavar="NAME|FILE",
-                        help="the car by whose model the road is recognised, instead of the one that the settings or "
-                             "the recording name")
+                        help="the car whose model recognises the road (default: the one that the settings or the "
+                             "recording name)")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
     group = parser.add_argument_group("recordings of phones and other loggers")
     group.add_argument("--csv", nargs="+", type=Path, default=[], metavar="FILE|FOLDER",

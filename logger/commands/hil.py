@@ -38,7 +38,7 @@ from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
 from logger.service.learning import DELAY, NOISE, KnownNoise, read_delay
 
 LATE_MS = 50.0
-LATE_WHY = "the service reads its ports as often"
+LATE_WHY = "the service reads its ports that often"
 WRITTEN_S = 2.0
 _MOVED_M = 1.0
 

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog install`` and ``ridelog uninstall``."""
     parser.add_argument("--dry-run", action="store_true", help="print each step and take none")
     parser.add_argument("--root", metavar="DIR", type=Path, default=_THIS_MACHINE,
-                        help="a folder that is to become the root of a machine, instead of this machine")
+                        help="install into this folder instead, such as the mounted image of a card")
 
 
 def run(args: argparse.Namespace) -> int:

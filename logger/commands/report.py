@@ -1,4 +1,4 @@
-"""Make one web page of segment logs: a map, curves and tables that answer to the pointer. It opens with no network.
+"""Make one web page of segment logs: an interactive map, curves and tables. It opens without a network.
 
   ridelog report ridelog-demo --out drive.html
   ridelog report /media/RIDELOG --out all.html --base roads.geojson

@@ -3,7 +3,7 @@
   ridelog run
   ridelog run --config ridelog.yaml
 
-Exit status 0: stopped as asked; 1: the system failed it; 2: wrong settings (nothing will run until they are mended).
+Exit status 0: you stopped it; 1: the system failed; 2: the settings are wrong (correct them first).
 systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.
 """
 

@@ -1,11 +1,11 @@
-"""Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
-is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
+"""Check segment logs and recorded dumps: count good, torn and corrupt records, and gaps. A stick that 'ridelog export'
+filled is also compared with its manifest. There each file is a record, and each file missing or not listed is a gap.
 
   ridelog verify /var/lib/ridelog
   ridelog verify /media/RIDELOG --json
 
-Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong,
-nor is the silence of a sensor in a dump, which counts as a gap.
+Exit status 0: nothing is wrong; 1: something is, and it is listed. Two things are not wrong: the torn end of a log
+that is still open, and a sensor that is silent in a dump (a gap).
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         if len(shares) == 1:
             (name, error), = errors.items()
             words = (f"this drive says nothing about {name}: its standard error would be {error} of it. Hold it fixed, "
-                     "or add runs that feel it.")
+                     "or add runs that excite it.")
         else:
             why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
                 f"{_moves(shares)} drowns in the noise")
@@ -123,7 +123,7 @@ def unexplained(error: float) -> list[Finding]:
     """Whether a model explains anything: ``error`` is the rms of what it leaves over that of what was measured."""
     if error < _EXPLAINS_NOTHING:
         return []
-    return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (error "
+    return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (NRMSE "
                     f"{error:.2f}): was it another road, or place on it, another excitation or another vehicle?")]
 
 
@@ -132,9 +132,8 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
     as ``unexplained``."""
     if turned_error > _CLEARLY_LESS * error:
         return []
-    return [Finding(TURNED, {}, f"the acceleration is upside down: turned over, what was measured is explained but for "
-                    f"an error of {turned_error:.2f}, and as it is of {error:.2f}. Up is positive; a step has the "
-                    "other sign then, or the sensor does, or it lies elsewhere than was said.")]
+    return [Finding(TURNED, {}, f"the acceleration is upside down: the NRMSE is {error:.2f}, turned over {turned_error:.2f}. "
+                    "Up is positive. Otherwise a step has the other sign, or lies at another place.")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:

@@ -557,7 +557,7 @@ def test_what_a_file_calls_unknown_is_found_where_a_force_is_measured_and_said_t
         "name: mass\nmodel: single_mass\nmass_kg: 1\nstiffness_n_per_m: 3000\ndamping_n_s_per_m: unknown\n")
     with pytest.raises(CheckFailed):  # this record is of no mass
         main(["identify", "--vehicle", str(tmp_path / "mass.yaml"), "--free", "stiffness_n_per_m", str(shaken)])
-    assert "held, although the file calls them unknown: damping_n_s_per_m" in capsys.readouterr().err
+    assert "identify holds them fixed: damping_n_s_per_m" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("rate_hz", [100, 200, 240, 1000])

@@ -80,7 +80,7 @@ def test_braking_that_is_read_as_up_and_down_is_refused(runs: list[Path], tmp_pa
         turned.append(folder)
     found = called("learn-car", *turned, "--wheelbase", 2.66)
     assert found.returncode == 1
-    assert "no car answers roads like these drives" in found.stderr
+    assert "no car responds to roads like these drives" in found.stderr
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_one_speed_says_what_to_add(tmp_path: Path) -> None:
     runs = written(tmp_path, mixed(CAR, 4, 2 * SECONDS, speeds_mps=(30 * MPH,)))
     found = called("learn-car", *runs, "--wheelbase", 2.66)
     assert found.returncode == 0 and "add one at 30 and one at 90 km/h" in found.stdout
-    assert "none could be kept back" in found.stdout
+    assert "none could be held out" in found.stdout
 
 
 def test_what_is_no_drive_is_refused_in_one_line(tmp_path: Path, runs: list[Path]) -> None:

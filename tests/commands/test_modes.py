@@ -56,7 +56,7 @@ def test_a_table_for_a_person(decay: Path, capsys: pytest.CaptureFixture[str]) -
     assert "decay.csv: 10 s at 100 Hz, 2 channels" in text
     assert "free decay" in text
     assert "± is one standard deviation" in text
-    assert "Found and not believed:" in text
+    assert "Rejected:" in text
 
 
 def test_the_decrement(decay: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,7 +71,7 @@ def test_noise_has_no_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     with pytest.raises(BadInput, match="expected a free decay for --method era, found a motion that goes on"):
         main(["modes", str(path), "--method", "era"])
     assert main(["modes", str(path)]) == 0
-    assert "No mode: nothing in this record stands out" in capsys.readouterr().out
+    assert "No mode: nothing in this record exceeds noise" in capsys.readouterr().out
 
 
 def test_an_input_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

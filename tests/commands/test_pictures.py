@@ -130,7 +130,7 @@ def test_a_fit_has_its_residuals_and_correlations(tmp_path: Path) -> None:
                  "--out", str(vehicle)]) == 0
     text = out.read_text("utf-8")
     assert "Autocorrelation of the residuals" in text
-    assert "Numbers that err together" in text
+    assert "Correlated estimates" in text
     assert names.replace(",", ", ") in text
     assert "fitted by ridelog identify" in vehicle.read_text("utf-8")
 

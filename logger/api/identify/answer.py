@@ -99,7 +99,7 @@ class Identification(CommandResult):
         return EXIT_DONE if self.converged else EXIT_CHECK_FAILED
 
     def charts(self) -> Sequence[Chart]:
-        """Of the residuals, and of numbers that err together."""
+        """Of the residuals, and of correlated estimates."""
         return charts(self.fit)
 
     def write(self, path: Path, option: str = "--out") -> None:
@@ -229,7 +229,7 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequ
     if all(record.pushed or record.facts.main.measures == "force" for record in records):
         return replace(question, free=(*question.free, *unknown))
     held = ", ".join(f"{name} {read(given.vehicle, name):.4g}" for name in unknown)
-    question.warn(f"{word}: held, although the file calls them unknown: {held}; with --free they are found too")
+    question.warn(f"{word}: the file calls these unknown, but identify holds them fixed: {held}; name them in --free")
     return question
 
 
@@ -498,7 +498,8 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     if not fit.converged:
         yield "the fit did not converge."
     if fit.at_bound:
-        yield f"{', '.join(fit.at_bound)} ended at a bound, which is where it was stopped and not what was measured."
+        yield (f"{', '.join(fit.at_bound)} ended at a bound: the bound stopped the fit there; it is not a measured "
+               "value.")
     if not white.passed:
         yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
                "errors are a guide only.")
@@ -527,7 +528,7 @@ def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
            f"NOT CONVERGED in {steps}: do not use these values; try other starts (--start) or fewer numbers.")
     if len(fit.ends) > 1:
         yield _ends(fit)
-    yield (f"Error, rms of measured minus model over rms of measured: {fit.error_before:.4f} before, "
+    yield (f"NRMSE, rms(measured - model) / rms(measured): {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
     yield ""
     yield from _table(fit)
@@ -553,7 +554,7 @@ def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
 def record_words(found: ReadingsFit) -> Iterator[str]:
     """What of the records was used in addition to their samples."""
     if found.rounded:
-        yield "Readings are rounded: each says in which step it was, and no more (step_mps2 in run.yaml)."
+        yield "Readings are rounded: each is known to within one step (step_mps2 in run.yaml)."
     if found.moved_m:
         yield (f"Places are uncertain (place_std_m in run.yaml): they were corrected by up to {found.moved_m:.2g} m, "
                "and the standard errors include that uncertainty.")
@@ -592,7 +593,7 @@ def _measured_correlations(fit: Fit) -> Iterator[str]:
              for j in range(len(names)) for i in range(j)]
     large = sorted((pair for pair in pairs if pair[0] > _MENTIONED), reverse=True)
     if large:
-        yield f"Estimates that err together (correlation beyond {_MENTIONED:g}): " + "; ".join(
+        yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): " + "; ".join(
             f"{first} and {second} {value:+.2f}" for _, value, first, second in large) + "."
 
 
@@ -611,8 +612,8 @@ def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
 
 def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
     if fit.at_bound:
-        yield (f"At a bound: {', '.join(fit.at_bound)}. That is where it was stopped, not what was measured; its "
-               "standard error means nothing. Widen --bounds, or ask what the model lacks.")
+        yield (f"At a bound: {', '.join(fit.at_bound)}. The bound stopped the fit there; it is not a measured "
+               "value, and its standard error means nothing. Widen --bounds, or ask what the model lacks.")
         if fit.noise.name != "white":
             yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
                    "at a time: try --noise white.")
@@ -642,7 +643,7 @@ def _least_known(fit: Fit) -> str:
         large = sorted(zip(-np.abs(shares), names, shares, strict=True))[:4]
         along = ", ".join(f"{name} {share:+.2f}" for size, name, share in large if -size > 0.1)
         said.append(f"{along} ({np.sqrt(max(power, 0.0)):.2%})")
-    return f"Known best in the combination {said[0]}, worst in {said[1]}."
+    return f"Best determined combination: {said[0]}; worst: {said[1]}."
 
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
@@ -666,7 +667,7 @@ def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     """What a person reads."""
     yield (f"Converged in {fit.iterations} steps." if fit.converged else
            f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start) or free less.")
-    yield (f"Residual over the most probable road, rms over that of the readings: {fit.error_before:.4f} before, "
+    yield (f"NRMSE over the most probable road, rms(residual) / rms(measured): {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
     yield ""
     width = max(map(len, [*fit.parameters, *fit.roads]))
@@ -692,7 +693,7 @@ def _unmeasured_limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     pairs = sorted(((abs(correlation[i, j]), correlation[i, j], fit.names[i], fit.names[j])
                     for j in range(len(fit.names)) for i in range(j)), reverse=True)
     if large := [f"{first} and {second} {value:+.2f}" for size, value, first, second in pairs if size > _MENTIONED]:
-        yield f"Estimates that err together (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
+        yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in free if one.by_factors]
@@ -741,4 +742,4 @@ def _fit_correlations(fit: Fit | RoadFit) -> Bars:
     correlation = fit.covariance / np.outer(errors, errors)
     pairs = [(f"{names[i]}, {names[j]}", float(correlation[i, j])) for i, j in combinations(range(len(names)), 2)]
     pairs.sort(key=lambda pair: -abs(pair[1]))
-    return Bars("Numbers that err together", "correlation of their errors", tuple(pairs[:_MOST_PAIRS]))
+    return Bars("Correlated estimates", "correlation of their errors", tuple(pairs[:_MOST_PAIRS]))

@@ -87,9 +87,9 @@ class IdentifyQuestion(LongQuestion):
       ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
       ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
 
-    Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
-    that leave no trace at the sensor, and numbers of which only a combination can be estimated; masses, springs and
-    dampers share one scale, so one of them has to be known.
+    Every estimate comes with its standard error. identify refuses what the runs do not determine (exit status 1):
+    parameters that the sensor does not feel, and parameters of which only a combination can be estimated. Masses,
+    springs and dampers share one scale, so one of them has to be known.
 
     In Python: raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not
     determine. Source: L. Ljung, System Identification (1999), chapters 7 and 9.

@@ -389,7 +389,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
         why = ("the others explain the same" if found.verdict else
-               "it ended at the end of its range, or where it does nothing")
+               "its parameter ended at a bound, or where the effect vanishes")
         lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}).")
     return lines
 

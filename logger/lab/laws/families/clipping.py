@@ -38,7 +38,7 @@ _AT_LIMIT = (0.98, 0.8)  # of the greatest reading
 
 class Clipping(Family):
     name = "clipping"
-    title = "a record that goes no farther than a limit"
+    title = "a record that is clipped"
     kind = "RecordEffect"
     source = "data sheets of accelerometers give a range that they do not leave"
     signature = "strong motions are cut off at one acceleration, up and down alike"
