@@ -132,8 +132,8 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
     as ``unexplained``."""
     if turned_error > _CLEARLY_LESS * error:
         return []
-    return [Finding(TURNED, {}, f"the acceleration is upside down: the NRMSE is {error:.2f}, turned over {turned_error:.2f}. "
-                    "Up is positive. Otherwise a step has the other sign, or lies at another place.")]
+    return [Finding(TURNED, {}, f"the acceleration is upside down: the NRMSE is {error:.2f}, turned over "
+                    f"{turned_error:.2f}. Up is positive. Otherwise a step has the other sign, or lies at another place.")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:
