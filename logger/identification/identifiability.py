@@ -133,7 +133,7 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
     if turned_error > _CLEARLY_LESS * error:
         return []
     return [Finding(TURNED, {}, f"the acceleration is upside down: the NRMSE is {error:.2f}, turned over "
-                    f"{turned_error:.2f}. Up is positive. Otherwise a step has the other sign, or lies at another place.")]
+                    f"{turned_error:.2f}. Up is positive. Otherwise a step has the other sign, or another place.")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:
