@@ -325,7 +325,7 @@ class SimulateQuestion(Question):
     vehicle: VehicleName
     profile: Annotated[Union["Wheelpaths", Path, str], "the road [m]; of two tracks a full car uses both, others the "
                                                          "left"]
-    speed_mps: Annotated[float | tuple[Any, Any], "the same all the way, 0.1 to 100 m/s; or times (k,) [s], growing, "
+    speed_mps: Annotated[float | tuple[Any, Any], "constant, 0.1 to 100 m/s; or times (k,) [s], growing, "
                                                   "and speeds (k,) [m/s] with straight lines between them"]
     _: KW_ONLY
     obstacles: Annotated[Mapping[str, Mapping[str, float]] | Sequence[str] | None, Option(
@@ -367,7 +367,7 @@ class SimulateCommand(SimulateQuestion):
         f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M",
         read=_file_or("m"))] = None  # type: ignore[assignment]
     speed_mps: Annotated[float | Path | None, Option(
-        f"the same all the way, {SPEED.words}; or a CSV with t_s,speed_mps, straight lines between them: the drive "
+        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, straight lines between them: the drive "
         "then lasts as long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
     _: KW_ONLY
     excitation: Annotated[Path | None, Option(

@@ -471,9 +471,9 @@ def _unanswered(summary: dict[str, Any]) -> str:
 def _range_words(found: Assessment) -> str:
     road = found.road
     if road is None:
-        return f"none over {RESOLVED_SHARE:.0%} of the way."
+        return f"none over {RESOLVED_SHARE:.0%} of the drive."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); "
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the drive); "
             f"a profile holds these{left_out}.")
 
 

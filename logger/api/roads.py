@@ -61,7 +61,8 @@ class Profile(profile_file.Wheelpaths, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The elevation of each track."""
-        tracks = {"left": self.elevation_m, "right": self.elevation_right_m}
+        right = self.elevation_right_m
+        tracks = {"elevation" if right is None else "left": self.elevation_m, "right": right}
         return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
             line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
 

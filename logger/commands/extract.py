@@ -26,7 +26,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.options import add_number
+from logger.api.question import Range
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import printable
@@ -65,9 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--sign", choices=("+", "-"),
                        help="-: turn the acceleration upside down, for a program that counts gravity and "
                             "accelerations in opposite ways (write --sign=-)")
-    add_number(group, "--range", 0.5, 1000, "g", metavar="G",
-               help="range of the sensor: what reaches it is marked as clipped (default: where it is plain to see)")
-    add_number(group, "--speed", 0.5, 100, "m/s", metavar="MPS", help="the speed all the way, if none was recorded")
+    group.add_argument("--range", type=float, metavar="G",
+                       help="range of the sensor: readings there are marked as clipped (default: where it shows)")
+    group.add_argument("--speed", type=float, metavar="MPS", help="the constant speed of a recording that has none")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,6 +75,9 @@ def run(args: argparse.Namespace) -> int:
     from drivers.errors import DriverError
     from logger.commands.options import wipe
 
+    for option, within in (("range", Range(0.5, 1000, "g")), ("speed", Range(0.5, 100, "m/s"))):
+        if (value := getattr(args, option)) is not None:
+            within.check(f"--{option}", value)
     extract_one = _of_csv(args) if args.csv else _of_dumps(args)
     sources = args.csv or args.dumps
     done: list[Extracted] = []

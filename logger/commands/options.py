@@ -1,7 +1,6 @@
 """Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed.
 
-Beside them: pages and pictures of results with charts, progress on the screen, and numbers of the verbs that are
-declared by hand.
+Beside them: pages and pictures of results with charts, and progress on the screen.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from logger.api.question import (
     Option,
     Out,
     Question,
-    Range,
     Switches,
     Verb,
     Verbs,
@@ -260,29 +258,11 @@ def parted(asked: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return [path for path in asked if is_picture(path)], [path for path in asked if not is_picture(path)]
 
 
-def write_pictures(paths: Sequence[Path], title: str, of: str, text: str, charts_of: Callable[[], Sequence[Chart]]
-                   ) -> None:
-    """Write those that were asked for, all of them or none.
-
-    of           what it is a result of, such as a file
-    text         what the command prints
-    charts_of    makes the charts
-    """
-    from logger.report.charts import page
-
-    if paths:
-        charts = charts_of()
-        _write(paths, lambda: page(title, of, text, charts), charts)
-
-
 def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
-    """The same of a result, whose page may be its own."""
-    if paths:
-        _write(paths, lambda: found.as_page(of), found.charts())
-
-
-def _write(paths: Sequence[Path], page: Callable[[], str], charts: Sequence[Chart]) -> None:
-    made = [page().encode() if path.suffix.lower() == PAGE else _drawn(path, charts) for path in paths]
+    """Write the page and pictures of a result that were asked for, all of them or none; ``of``: what it is a result of,
+    such as a file."""
+    charts = found.charts() if paths else ()
+    made = [found.as_page(of).encode() if path.suffix.lower() == PAGE else _drawn(path, charts) for path in paths]
     with together():
         for path, content in zip(paths, made, strict=True):
             write_file(path, [content])
@@ -327,22 +307,3 @@ def _show(words: str) -> None:
 
 def _show_nothing(_words: str) -> None:
     pass
-
-
-def add_number(
-    parser: argparse.ArgumentParser | argparse._ArgumentGroup, option: str, low: float, high: float, unit: str = "",
-    *, kind: type[float] | type[int] = float, **rest: Any,
-) -> None:
-    """Add an option whose number lies from ``low`` to ``high`` (infinity: no end). BadInput, which names the option,
-    for another one; ``rest`` as ``add_argument`` takes it."""
-    def number(text: str) -> float:
-        try:
-            value = kind(text)
-        except ValueError:
-            what = ("a whole number" if kind is int else "a number") + (f" in {unit}" if unit else "")
-            without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""
-            raise BadInput(f"{option} {text}: expected {what}{without}") from None
-        Range(low, high, unit).check(option, value)
-        return value
-
-    parser.add_argument(option, type=number, **rest)

@@ -125,8 +125,8 @@ def not_known(figures: FleetFigures) -> str:
     """Why figures are empty that too few drives show; nothing where there are enough."""
     if isfinite(figures.biases.pass_std):
         return ""
-    return ("Not known yet: how far one drive is off another, and so the error of an IRI, its change a year, and what "
-            f"each car reads too high. It takes {figures.biases.needed} drives over roads that the same car has driven "
+    return ("Not known yet: how drives differ, and therefore the standard error of an IRI, its change a year and the "
+            f"bias of each car. This takes {figures.biases.needed} drives over roads that the same car has driven "
             f"before; there {'is' if figures.biases.repeats == 1 else 'are'} {figures.biases.repeats}. Drive the same "
             "roads again.")
 
@@ -143,7 +143,7 @@ def _words_cars(figures: FleetFigures) -> list[str]:
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
     sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > _SURE * std[one]]
     alone = int((~biases.known).sum())
-    lines = [f"Cars that read otherwise than the mean car ({len(sure)} of {len(bias)})"]
+    lines = [f"Cars that differ from the mean car ({len(sure)} of {len(bias)})"]
     width = max((len(figures.names[one]) for one in sure[:_SHOWN_CARS]), default=0)
     lines += [f"  {figures.names[one]:{width}}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
               f"{int(figures.car_passes[one]):,} passes" for one in sure[:_SHOWN_CARS]]
@@ -169,7 +169,7 @@ def _changes(roads: RoadTable) -> list[str]:
     worse = np.flatnonzero(roads.worse)
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
     limit = change_found(roads)
-    power = ([f"A change of {limit:.2f} m/km a year would be found on every second {roads.by} with 80 % certainty"]
+    power = ([f"A change of {limit:.2f} m/km a year would be found on half of the {roads.by}s with a power of 80 %"]
             if isfinite(limit) else [])
     if not roads.changes_known:
         return [f"Whether a {roads.by} has become worse is not known"]
@@ -437,8 +437,8 @@ def _cars(figures: FleetFigures) -> Html:
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]
     return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(not_known(figures) or (
-        "What a car reads of the roads that it shares with others, against the mean car; the figures above are free of "
-        "it. The cars that read otherwise come first.")))
+        "Bias of a car on the roads that it shares with others, relative to the mean car; the figures above are "
+        "corrected for it. Cars that differ from the mean car come first.")))
 
 
 INDEX = "index.html"

@@ -309,7 +309,7 @@ def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[l
         if significance[k] < threshold:
             reason = "no stronger than the noise around it"
         elif frequency_std > _LARGEST_ERROR * frequency or damping_std > _LARGEST_ERROR:
-            reason = "the record cannot tell its frequency or damping"
+            reason = "the record does not determine its frequency or damping"
         elif ratio < -2 * damping_std:
             reason = "it grows instead of decaying: a hum, not a mode"
         if reason:

@@ -171,7 +171,7 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
     starts = model.start, np.append(x[:-1], model.start[-1])
     x, spectrum, information, _, settled = min((_descend(model, one) for one in starts), key=lambda found: found[3])
     if not settled:
-        raise UnlikeCar("the numbers of this car do not settle on those of the reading")
+        raise UnlikeCar("the fit of this car's parameters to the record does not converge")
     bands_hz, share = _shares(pieces, spectrum)
     covariance = np.asarray(np.linalg.inv(information)[:-2, :-2], dtype=np.float64)
     return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance,

@@ -79,10 +79,10 @@ _A_W = Html("a<sub>w</sub> [m/s²]")
 FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
     "gap": "samples of the accelerometer are missing",
-    "clipped": "the accelerometer stood at the end of its range: the road is at least this rough",
+    "clipped": "the accelerometer clipped, at the end of its range: the road is at least this rough",
     "frozen": "the readings of the accelerometer had not changed for half a minute of driving: no figures",
     "repeated": "the accelerometer, or what brings its samples, gave each more than once: no figures",
-    "gps_late": "the fixes waited on a full line, nobody knows how long: place, speed and time may be seconds late",
+    "gps_late": "the GPS line was full and the fixes waited: place, speed and time may be seconds late",
     "speed_doubtful": "the speed and the places of the GPS disagree: no IRI",
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
@@ -304,7 +304,7 @@ def _different(contents: Iterable[Any]) -> list[Any]:
 
 
 _MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
-_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that stands in no mean"))
+_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that no mean includes"))
 
 
 def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
@@ -367,7 +367,7 @@ def _curves_view() -> Html:
                 "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
                 'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
                 "</div>") + hint(
-        "The shaded band is the IRI plus and minus its standard error. Where many windows share a place of the "
+        "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel of the "
         "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey stroke "
         "reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort (fairly, very, "
         "extreme). The strip at the bottom: orange where a window carries a flag, grey where it has no value that "

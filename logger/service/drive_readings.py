@@ -73,14 +73,14 @@ class RangeUse:
             return ""
         clipped, hidden = self._clipped / self._windows, self._hidden / self._windows
         if clipped > CLIPPED_SHARE:
-            return self._said(f"in {clipped:.0%} of this drive's windows it stood at an end of its range",
+            return self._said(f"it clipped in {clipped:.0%} of this drive's windows",
                               self._others.wider)
         for (setting, _), beyond in zip(self._others.finer, self._beyond / max(self._blocks, 1), strict=True):
             if beyond < CLIPPED_SHARE:
                 seldom = f"only {beyond:.1%} of this drive" if beyond else "nothing of this drive"
                 return self._said(f"{seldom} would have been beyond a smaller range, and its steps are finer", setting)
         if hidden > HIDDEN_SHARE:
-            return self._said(f"{hidden:.0%} of this drive's windows hide below one of its steps", self._others.oftener)
+            return self._said(f"{hidden:.0%} of this drive's windows move by less than one of its steps", self._others.oftener)
         return ""
 
     @staticmethod

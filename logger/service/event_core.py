@@ -185,7 +185,7 @@ class EventCore:
                     "baud rate, in the receiver and in the settings, or have it send less: RMC and GGA are enough")
         if timebase.unsure_until_us is not None or timebase.late_us <= JUMP_US:
             return ""
-        return f"{late}: something on the way keeps them. Have it send less: RMC and GGA are enough"
+        return f"{late}: something delays them. Have it send less: RMC and GGA are enough"
 
     def _take_block(self) -> AccelerationBlock:
         block = self._accelerometer.take()

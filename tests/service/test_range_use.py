@@ -44,7 +44,7 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
 
 @pytest.mark.parametrize(("range_g", "reads", "clipped", "hidden", "beyond", "said"), [
     (2, 4, 0.08, 0.0, 1.0, ""),  # as measured: 2 g was still better
-    (2, 4, 0.30, 0.0, 1.0, "in 30% of this drive's windows it stood at an end of its range: set range_g: 4"),
+    (2, 4, 0.30, 0.0, 1.0, "it clipped in 30% of this drive's windows: set range_g: 4"),
     (4, 4, 0.30, 0.0, 1.0, "set range_g: 8"),
     (8, 4, 0.9, 0.0, 1.0, ""),  # steps at 16 g say nothing
     (4, 4, 0.0, 0.0, 0.0, "nothing of this drive would have been beyond a smaller range, and its steps are finer: set "
@@ -52,7 +52,7 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
     (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive would have been beyond a smaller range, and its steps are finer: "
                            "set range_g: 4"),
     (4, 4, 0.0, 0.02, 0.4, ""),
-    (4, 4, 0.0, 0.10, 0.4, "10% of this drive's windows hide below one of its steps: set oversample: 8 (and the bus"),
+    (4, 4, 0.0, 0.10, 0.4, "10% of this drive's windows move by less than one of its steps: set oversample: 8 (and the bus"),
     (2, 1, 0.0, 0.05, 0.0, "set oversample: 4"),
     (2, 8, 0.0, 0.5, 0.0, ""),
 ])

@@ -201,7 +201,7 @@ class Curves {
     const inMetres = span < 1000, unit = inMetres ? 1 : 1000;
     const step = niceStep(span / unit / Math.max((this.right - this.left) / 90, 2));
     ink.font = "12px system-ui";
-    const name = inMetres ? "m along the way" : "km along the way";
+    const name = inMetres ? "distance [m]" : "distance [km]";
     for (let tick = Math.ceil(this.from / unit / step) * step; tick <= this.to / unit; tick += step) {
       const x = this.px(tick * unit), last = tick + step > this.to / unit;
       write(ink, String(Number(tick.toPrecision(7))), x, bottom - AXIS_PX + 15, {align: "center", halo: colours.ground});

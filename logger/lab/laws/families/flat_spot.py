@@ -81,7 +81,7 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
         Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
                   "of a wheel that turns once for each", step=1e-5),
         *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
-                    f"along the way, where it is on the ground{of_run(run)}", step=0.005)
+                    f"along the road, where it is on the ground{of_run(run)}", step=0.005)
           for name, place_m, run in zip(names, places_m, runs, strict=True)))
     draft = FAMILY.draft(parameters, _METHOD, _FUNCTIONS.format(place=places), variant="spot" + EACH * (last > 0),
                          words=("needs_road = True",))

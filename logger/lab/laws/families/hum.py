@@ -61,7 +61,7 @@ class Hum(Family):
                                    "a tone that is there whatever the speed and the road")
         per_m = spatial_frequency(context, _PER_M) if context.is_driven else None
         if per_m is not None:
-            drafts += self._drafts(context, [_shape("cycles_per_m", per_m, "cycles in a metre of the way", step=_STEP)],
+            drafts += self._drafts(context, [_shape("cycles_per_m", per_m, "cycles per metre of road", step=_STEP)],
                                    _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
                                    words=("needs_road = True",))
         return drafts

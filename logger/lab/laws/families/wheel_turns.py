@@ -37,7 +37,7 @@ class WheelTurns(Family):
     name = "wheel_turns"
     title = "a force that comes round with the wheels' turns"
     source = "a mass that turns beside its axle (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
-    signature = "it repeats along the way, whatever the speed, and grows with the square of the speed"
+    signature = "it repeats along the road, whatever the speed, and grows with the square of the speed"
     shown_by = "drive a smooth road at two steady speeds"
     stands_out = True
 
@@ -79,7 +79,7 @@ class WheelTurns(Family):
             parts = "(even and odd part) by " + " and ".join(
                 f"{say(_name(axle, 'cos'))} and {say(_name(axle, 'sin'))}{f' at the {axle}' * bool(axle)}"
                 for axle in axles)
-        return (f"a force that comes round once in each {each_m:.2f} m of the way, as a wheel of {radius} turns, and "
+        return (f"a force that comes round once in each {each_m:.2f} m of road, as a wheel of {radius} turns, and "
                 f"grows with the square of the speed: out of balance {parts}")
 
 
