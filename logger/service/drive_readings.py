@@ -80,7 +80,8 @@ class RangeUse:
                 seldom = f"only {beyond:.1%} of this drive" if beyond else "nothing of this drive"
                 return self._said(f"{seldom} would have been beyond a smaller range, and its steps are finer", setting)
         if hidden > HIDDEN_SHARE:
-            return self._said(f"{hidden:.0%} of this drive's windows move by less than one of its steps", self._others.oftener)
+            return self._said(f"{hidden:.0%} of this drive's windows move by less than one of its steps",
+                              self._others.oftener)
         return ""
 
     @staticmethod

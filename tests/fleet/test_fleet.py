@@ -249,7 +249,7 @@ def test_two_cars_with_a_drive_each_are_not_judged(tmp_path: Path, capsys: pytes
     capsys.readouterr()
     assert main(["fleet", "summarise", str(dataset)]) == 0
     text = capsys.readouterr().out
-    assert "It takes 6 drives over roads that the same car has driven before; there are 0." in text
+    assert "This takes 6 drives over roads that the same car has driven before; there are 0." in text
     assert "Cars: car000, car001" in text and "Whether a segment has become worse is not known" in text
     assert not {sign for sign in ("±", "%") if sign in text}
     assert main(["fleet", "summarise", str(dataset), "--json"]) == 0

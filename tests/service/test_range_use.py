@@ -52,7 +52,8 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
     (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive would have been beyond a smaller range, and its steps are finer: "
                            "set range_g: 4"),
     (4, 4, 0.0, 0.02, 0.4, ""),
-    (4, 4, 0.0, 0.10, 0.4, "10% of this drive's windows move by less than one of its steps: set oversample: 8 (and the bus"),
+    (4, 4, 0.0, 0.10, 0.4,
+     "10% of this drive's windows move by less than one of its steps: set oversample: 8 (and the bus"),
     (2, 1, 0.0, 0.05, 0.0, "set oversample: 4"),
     (2, 8, 0.0, 0.5, 0.0, ""),
 ])
