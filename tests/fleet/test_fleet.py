@@ -254,10 +254,10 @@ def test_two_cars_with_a_drive_each_are_not_judged(tmp_path: Path, capsys: pytes
     assert not {sign for sign in ("±", "%") if sign in text}
     assert main(["fleet", "summarise", str(dataset), "--json"]) == 0
     figures = said(capsys)
-    assert "It takes 6 drives" in str(figures["not_known"])
+    assert "This takes 6 drives" in str(figures["not_known"])
     assert [figures[name] for name in ("pass_std", "session_std", "growth_per_year")] == [None] * 3
     assert {(one["bias"], one["bias_std"]) for one in figures["cars"]} == {(None, None)}  # type: ignore
     assert {(one["iri_std_m_per_km"], one["trend_m_per_km_per_year"], one["p_value"])
             for one in figures["roads"]} == {(None, None, None)}  # type: ignore
     assert main(["fleet", "report", str(dataset), "--out", str(page)]) == 0
-    assert "It takes 6 drives" in (page / "index.html").read_text("utf-8")
+    assert "This takes 6 drives" in (page / "index.html").read_text("utf-8")
