@@ -326,6 +326,7 @@ _INPUT_STEP, _OF_SPEED = 1e-4, 1e-2
 # distances, which moves what lies far away; of places [m]. What sticks and slips makes a response that is jagged on a
 # fine scale: smaller steps show its teeth, and not where it leads.
 _STEP, _SHARE_STEP, _SPEED_STEP, _PLACE_STEP_M = 5e-3, 1e-2, 1e-6, 5e-3
+_SMOOTH_STEP = 1e-4  # of a car of straight laws: a mode of quality Q bends over a step h by (Q h)^2 / 6
 _KEPT_TRACKS = 4
 
 
@@ -338,6 +339,7 @@ class SimulatedModel(DriveModel):
                  road: RoadInput | None = None, effects: Sequence[Chosen] = ()) -> None:
         super().__init__(vehicle, parameters, records, road, effects)
         self._runs = SimulatedRuns(records, steps_hz(vehicle))
+        self._share = _STEP if compose(vehicle, self.effects).bends_laws else _SMOOTH_STEP
         self._tracks: dict[tuple[int, tuple[Obstacle, ...]], WheelTracks] = {}
 
     def predict(self, values: Array) -> list[Array]:
@@ -368,8 +370,8 @@ class SimulatedModel(DriveModel):
             step = float(steps_of([*self.effects[: free.effect], here], [free], _STEP, _SHARE_STEP)[0])
             return step / slope_of(parameter, value)
         if one.by_factors:
-            return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _STEP)
-        return _PLACE_STEP_M
+            return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else self._share)
+        return _PLACE_STEP_M if one.usual is None else self._share * one.usual
 
     def _track(self, run: int, road: RoadInput) -> WheelTracks:
         """The road of a run with what lies on it; the same object as long as nothing changes."""

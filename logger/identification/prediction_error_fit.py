@@ -120,6 +120,7 @@ class Fit:
     cost               half the sum of squares of ``white``
     at_bound           names that ended at a bound
     ends               where each start had come to before the noise model: (starts, p)
+    prior              what was known before any run, by coordinates: its information (p,), and its pull from there (p,)
     """
 
     free: list[Free]
@@ -140,6 +141,18 @@ class Fit:
     cost: float
     at_bound: list[str]
     ends: Array
+    prior: tuple[Array, Array]
+
+    @property
+    def information(self) -> Array:
+        """Of the coordinates (p, p): that of the records and what was known before."""
+        return np.asarray(self.sensitivities.T @ self.sensitivities + np.diag(self.prior[0]))
+
+    @property
+    def near_0(self) -> list[str]:
+        """Names of sizes that may be 0 and are within twice their error of it, or as small as their bound lets them."""
+        return [one.name for one in self.free if one.may_be_0 and self.parameters[one.name] < (
+            one.start if one.name in self.at_bound else 2 * self.standard_errors[one.name])]
 
 
 def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None = None) -> Fit:
@@ -230,6 +243,14 @@ class _FitProblem:
         self.floor = least_share(self.model) * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
         self._linearised: _Linearised | None = None
+        known = [one.known or (one.start or 1.0, np.inf) for one in self.free]
+        values, shares = (np.array(column) for column in zip(*known, strict=True))
+        self.mean = self.coordinates.of(values)
+        self.precision = (self.coordinates.slopes(values) / (values * shares))**2
+
+    def pull(self, x: Array) -> Array:
+        """Of what was known before (p,), at a place: minus the derivative of its cost."""
+        return self.precision * (self.mean - x)
 
     def starts(self) -> list[Array]:
         first = {one.name: one.start for one in self.free}
@@ -245,7 +266,8 @@ class _FitProblem:
         predictions = self.linearised(x).predictions if self.exact else self._behind(self._predicted(x))
         plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
-        return _Point(x, 0.5 * float(white @ white), white, plain)
+        cost = 0.5 * float(white @ white + self.pull(x) @ (self.mean - x))
+        return _Point(x, cost, white, plain)
 
     def linearised(self, x: Array) -> _Linearised:
         """Predictions and derivatives at a place; of the one that was asked for last they are known."""
@@ -280,7 +302,8 @@ class _FitProblem:
         """What no such data could determine at a place."""
         here = self.linearised(x)
         size = float(np.sqrt(sum((one**2).sum() for one in here.predictions)))
-        return structural([one.name for one in self.free], np.concatenate(here.slopes), size,
+        known = size * np.diag(self.precision > 0)
+        return structural([one.name for one in self.free], np.concatenate([*here.slopes, known]), size,
                           NOTHING_EXACT if self.exact else NOTHING_BY_DIFFERENCES)
 
 
@@ -295,7 +318,7 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_P
         nonlocal slopes
         if fresh:
             slopes = noise(problem.linearised(x).slopes)
-        return slopes.T @ point.white, slopes.T @ slopes
+        return slopes.T @ point.white + problem.pull(x), slopes.T @ slopes + np.diag(problem.precision)
 
     # A step of so small a share of a standard error gains half its square in units of the residuals' variance.
     close = _CLOSE if problem.exact else _CLOSE_SIMULATED
@@ -333,8 +356,8 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: lis
     names = [one.name for one in problem.free]
     slopes = noise(problem.linearised(point.x).slopes)
     relative = _covariance(problem, point, slopes)
-    at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
-                if x - low < _AT_BOUND or high - x < _AT_BOUND]
+    at_bound = [one.name for one, x, low, high in zip(problem.free, point.x, problem.low, problem.high, strict=True)
+                if (x - low < _AT_BOUND and not (one.may_be_0 and one.low == 0)) or high - x < _AT_BOUND]
     values = problem.coordinates.values(point.x)
     if not findings:
         weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
@@ -359,14 +382,15 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: lis
         white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
         sensitivities=slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
         iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
+        prior=(problem.precision, problem.pull(point.x)),
     )
 
 
 def _covariance(problem: _FitProblem, point: _Point, slopes: Array) -> Array:
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
     count, p = slopes.shape
-    information = slopes.T @ slopes
+    variance = float(point.white @ point.white) / max(count - p, 1)
+    information = slopes.T @ slopes + variance * np.diag(problem.precision)
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15, hermitian=True) * np.outer(scale, scale)
-    variance = float(point.white @ point.white) / max(count - p, 1)
     return np.asarray(inverse * variance)

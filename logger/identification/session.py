@@ -20,7 +20,7 @@ import numpy.typing as npt
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel, SimulatedModel, VehicleModel
-from logger.identification.identifiability import NotIdentifiable, upside_down
+from logger.identification.identifiability import WEAK, NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
@@ -181,6 +181,23 @@ def likely_starts(model: DriveModel, draws: int = 60, best: int = 2) -> list[dic
     return sorted(spread_starts(model.parameters, draws), key=error)[:best]
 
 
+def fit_down_to_0(model: DriveModel, options: FitOptions) -> Fit:
+    """The fit of a model, where a damper that is hardly there is fitted once more by differences, as there may be none.
+    NotIdentifiable and ValueError as ``fit``."""
+    try:
+        found = fit(model, model.measured, options)
+        if not (near_0 := found.near_0):
+            return found
+        ends = [found.parameters]
+    except NotIdentifiable as refusal:
+        weak = {name for one in refusal.findings if one.kind == WEAK for name in one.direction}
+        if not (near_0 := [one.name for one in model.parameters if one.may_be_0 and one.name in weak]):
+            raise
+        ends = []
+    model.parameters = [one.as_strength() if one.name in near_0 else one for one in model.parameters]
+    return fit(model, model.measured, replace(options, starts=ends))
+
+
 def upright_fit(
     model_of: Callable[[list[Run]], DriveModel], records: list[Run], options: Callable[[DriveModel], FitOptions]
 ) -> Fit:
@@ -188,7 +205,7 @@ def upright_fit(
     turned over; ValueError as ``fit``."""
     def fitted(of: list[Run]) -> Fit:
         model = model_of(of)
-        return fit(model, model.measured, options(model))
+        return fit_down_to_0(model, options(model))
 
     try:
         found: Fit | NotIdentifiable = fitted(records)

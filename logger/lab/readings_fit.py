@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.drive_model import DriveModel
-from logger.identification.prediction_error_fit import Fit, FitOptions, fit
-from logger.identification.session import upright_fit
+from logger.identification.prediction_error_fit import Fit, FitOptions
+from logger.identification.session import fit_down_to_0, upright_fit
 from logger.lab.likelihood.distance_error import USUAL, RecordError
 from logger.lab.likelihood.lag import offset_by_lag_m
 from logger.lab.likelihood.priors import Tolerance
@@ -123,7 +123,7 @@ def _shift(model: DriveModel, found: Fit, errors: Sequence[RecordError | None], 
     """The distance errors after a fit, by one Gauss-Newton step together with the free numbers."""
     predictions, white = _whole_predictions(model, _values(found)), found.white
     parts = np.split(found.sensitivities, np.cumsum([len(one) for one in white])[:-1])
-    information, pull = found.sensitivities.T @ found.sensitivities, np.zeros(found.sensitivities.shape[1])
+    information, pull = found.information, found.prior[1].copy()
     lost = np.zeros_like(information)
     freedom = 0.0
     solved: list[Array | None] = []
@@ -160,7 +160,7 @@ def _refit(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOp
     """The fit started from the values of another one."""
     model.parameters = [replace(one, start=min(max(before.parameters[one.name], one.low), one.high))
                         for one in model.parameters]
-    return fit(model, model.measured, replace(options(model), starts=()))
+    return fit_down_to_0(model, replace(options(model), starts=()))
 
 
 def _has_converged(before: Fit, found: Fit, share: float = 0.1) -> bool:
@@ -171,7 +171,7 @@ def _has_converged(before: Fit, found: Fit, share: float = 0.1) -> bool:
 
 def _with_covariance(found: Fit, places: _Shift) -> Fit:
     """A fit with its covariance after the distance errors are integrated out."""
-    information = found.sensitivities.T @ found.sensitivities
+    information = found.information
     alone = np.linalg.pinv(information, rcond=1e-15, hermitian=True)
     count = len(found.sensitivities)
     own = found.covariance * count / max(count - places.freedom, 1.0)  # what was fitted to places leaves less

@@ -321,7 +321,7 @@ class Sensitivity:
 def sensitivity(vehicle: Vehicle, one: Free) -> Sensitivity:
     """How a car depends on one of its numbers, where it is now. ValueError as ``named_parameters.read``."""
     value = read(vehicle, one.name)
-    step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
+    step = _RELATIVE_STEP * (abs(value) if one.by_factors else one.usual or 1.0)
     before, after = (LinearCar.of(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
     low, high, apart = before.structure, after.structure, 2 * step
     return Sensitivity((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,

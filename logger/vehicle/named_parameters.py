@@ -23,6 +23,7 @@ _BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_w
 _AXLE = ("cg_distance_m", "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
          "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
 _OF_ROLL = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
+_DAMPING = "damping_n_s_per_m"
 _PLACE = {"half_car": ("ahead_m",), "full_car": ("ahead_m", "left_m")}
 WEAKEST = 0.5
 """A number whose standard error is larger than this share of it has not been measured."""
@@ -49,6 +50,8 @@ class Free:
     weakest     the largest standard error of what is still an estimate, as a share of its size or, of a place, of half
                 the width of its bounds
     usual       of a strength that may be 0, as that of an effect: how large it usually is; it moves by differences
+    known       its value and the standard deviation of that value's logarithm, before any run; None: nothing is known
+    may_be_0    of a size that moves by factors: there may be none of it
 
     ValueError unless low < high and the start lies between them.
     """
@@ -60,6 +63,8 @@ class Free:
     place: bool = False
     weakest: float = WEAKEST
     usual: float | None = None
+    known: tuple[float, float] | None = None
+    may_be_0: bool = False
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -81,8 +86,16 @@ class Free:
         return (self.high - self.low) / 2 if self.usual is None else self.usual
 
     def weakest_at(self, value: float) -> float:
-        """The largest standard error of what is still an estimate there, as a share of its size or in units."""
+        """The largest standard error of what is still an estimate there, as a share of its size or in units. What was
+        known before is one."""
+        if self.known is not None:
+            return float("inf")
         return self.weakest if self.usual is None else self.weakest * max(1.0, abs(value) / self.usual)
+
+
+    def as_strength(self) -> Free:
+        """The same number down to 0, which moves by differences; an error within its bounds is an estimate."""
+        return replace(self, low=0.0, usual=self.start, weakest=self.weakest * self.high / self.start)
 
 
 class Coordinates:
@@ -164,9 +177,11 @@ def changed(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
 
 
 def free(
-    vehicle: Vehicle, name: str, start: float | None = None, bounds: tuple[float, float] | None = None
+    vehicle: Vehicle, name: str, start: float | None = None, bounds: tuple[float, float] | None = None,
+    known: tuple[float, float] | None = None
 ) -> Free:
     """A free number of a vehicle: from its present value, within a factor of 20, unless something else is said.
+    A damper may not be there, and nor may the spring of a part, which is then a damper.
 
     Lengths along the car stay within a factor of 3, the sensor within 3 m of the centre of gravity. ValueError as
     ``read`` and ``Free``, and for a size whose start or bounds are not above 0: what fits best may be none at all then.
@@ -176,7 +191,8 @@ def free(
     is_place = name == PRELOAD or name.startswith(f"{SENSOR}.")
     if not is_place and not (low > 0 and value > 0):
         raise ValueError(f"{name}: expected a start and bounds above 0, found {value:g} and {low:g} to {high:g}")
-    return Free(name, value, low, high, is_place)
+    may_be_0 = name.endswith(_DAMPING) or (vehicle.model == "component" and name in OWN_NAMES["single_mass"])
+    return Free(name, value, low, high, is_place, known=known, may_be_0=bounds is None and may_be_0)
 
 
 def bounds_of(name: str, value: float) -> tuple[float, float]:

@@ -31,7 +31,7 @@ class Known:
     """How well a number of a vehicle was known before any run.
 
     value        the number: its best guess, or of a range the middle by factors
-    deviation    standard deviation of its logarithm
+    deviation    standard deviation of its logarithm; infinite of a preload, which has either sign
     words        as a file says it: ``875 +- 5%``, ``[700, 1000]``, ``unknown``
     """
 
@@ -59,6 +59,17 @@ class Known:
         """Nothing is known; the value is where a search begins. A fit stays within the same factor of it either way as
         where no bounds are said."""
         return replace(cls.within(*bounds_of(name, value)), value=value, words=UNKNOWN)
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether it is a size with a standard deviation."""
+        return "+-" in self.words and self.deviation <= 1
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Of a range."""
+        low, _, high = self.words.strip("[]").partition(", ")
+        return (float(low), float(high)) if high else None
 
 
 UNKNOWN = "unknown"

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 
 import ridelog
 from logger.commands.main import main
-from logger.errors import BadInput, CheckFailed
+from logger.errors import BadInput
 
 from ..support.drives.course import Course, integrated
 from ..support.slow import slow
@@ -540,24 +540,45 @@ def test_a_force_that_was_not_measured_rightly_is_refused_in_one_line(
             main([verb, "--vehicle", str(tmp_path / "part.yaml"), str(run), *more])
 
 
-def test_what_a_file_calls_unknown_is_found_where_a_force_is_measured_and_said_to_be_held_elsewhere(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def identified(capsys: pytest.CaptureFixture[str], vehicle: Path, run: Path, *more: str) -> dict[str, Any]:
+    assert main(["identify", "--vehicle", str(vehicle), str(run), "--json", *more]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a spring with 37 N of preload, and of no damper at all: none within its standard error."""
     way = noise(8.0, 0.004, 6)
-    force_n = 2e4 * way(TIME_S) + 800.0 * way(TIME_S, 1) + np.random.default_rng(1).normal(0.0, 0.5, len(TIME_S))
+    force_n = 2e4 * way(TIME_S) + 37.0 + np.random.default_rng(1).normal(0.0, 0.5, len(TIME_S))
     run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
-    (tmp_path / "part.yaml").write_text(
-        "name: part\nmodel: component\ndamping_n_s_per_m: 600\nstiffness_n_per_m: unknown\n")
-    assert main(["identify", "--vehicle", str(tmp_path / "part.yaml"), "--free", "damping_n_s_per_m", str(run),
-                 "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["parameters"]
-    assert found == pytest.approx({"damping_n_s_per_m": 800.0, "stiffness_n_per_m": 2e4}, rel=0.01)
-    shaken = written(tmp_path / "shaken", {"accel_z_mps2": way(TIME_S, 2)}, {"elevation_m": way(TIME_S)},
-                     "source: me\n")
-    (tmp_path / "mass.yaml").write_text(
-        "name: mass\nmodel: single_mass\nmass_kg: 1\nstiffness_n_per_m: 3000\ndamping_n_s_per_m: unknown\n")
-    with pytest.raises(CheckFailed):  # this record is of no mass
-        main(["identify", "--vehicle", str(tmp_path / "mass.yaml"), "--free", "stiffness_n_per_m", str(shaken)])
-    assert "identify holds them fixed: damping_n_s_per_m" in capsys.readouterr().err
+    (part := tmp_path / "part.yaml").write_text("name: part\nmodel: component\ndamping_n_s_per_m: unknown\n"
+                                                "stiffness_n_per_m: 3e4 +- 30%\npreload_n: unknown\n")
+    found = identified(capsys, part, run, "--out", str(tmp_path / "found.yaml"))
+    for name, true in {"preload_n": 37.0, "stiffness_n_per_m": 2e4, "damping_n_s_per_m": 0.0}.items():
+        assert abs(found["parameters"][name] - true) < 3 * found["standard_errors"][name]
+    assert 0 < found["standard_errors"]["damping_n_s_per_m"] < 1
+    assert found["cannot_tell"] == []
+    again = identified(capsys, tmp_path / "found.yaml", run)
+    assert again["parameters"] == pytest.approx(found["parameters"], rel=1e-3)
+    one = identified(capsys, part, run, "--free", "stiffness_n_per_m")
+    assert set(one["parameters"]) == set(found["parameters"])
+    part.write_text("name: part\nmodel: component\ndamping_n_s_per_m: 1\nstiffness_n_per_m: 2e4\n")
+    with pytest.raises(BadInput, match=r"--free: expected what to find, as .* gives every number exactly"):
+        main(["identify", "--vehicle", str(part), str(run)])
+
+
+def test_what_accelerations_do_not_show_is_as_uncertain_as_the_file_says(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mass on a shaken base moves the same with all numbers larger by one factor."""
+    true, way = Bench(0.8, 2000.0, 3.0), noise(8.0, 0.004, 6)
+    seen = true.moved(way, NOTHING, NOTHING)["accel_z_mps2"]
+    run = written(tmp_path / "run", {"accel_z_mps2": seen + np.random.default_rng(1).normal(0.0, 0.02, len(seen))},
+                  {"elevation_m": way(TIME_S)}, "source: me\n")
+    (mass := tmp_path / "mass.yaml").write_text("name: mass\nmodel: single_mass\nmass_kg: 0.84 +- 5%\n"
+                                                "stiffness_n_per_m: [1000, 4000]\ndamping_n_s_per_m: unknown\n")
+    found = identified(capsys, mass, run)
+    for name, value in {"mass_kg": 0.84, "stiffness_n_per_m": 2100.0, "damping_n_s_per_m": 3.15}.items():
+        assert found["parameters"][name] == pytest.approx(value, rel=0.01)
+        assert found["standard_errors"][name] == pytest.approx(0.05 * value, rel=0.05)
 
 
 @pytest.mark.parametrize("rate_hz", [100, 200, 240, 1000])

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -36,14 +37,14 @@ from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
-from logger.vehicle.named_parameters import Coordinates, Free, read
+from logger.vehicle.named_parameters import AXLES, BOTH, PRELOAD, Coordinates, Free
 from logger.vehicle.uncertain import UNKNOWN
 
 if TYPE_CHECKING:
     from logger.identification.prediction_error_fit import FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
-    from logger.vehicle.uncertain import NumberErrors
+    from logger.vehicle.uncertain import Known, NumberErrors
     from logger.vehicle.vehicle import Vehicle
 
 
@@ -125,6 +126,8 @@ def answer(question: IdentifyQuestion) -> Identification:
     flat_will_do = bool(question.obstacles) or question.road != MEASURED
     drives = [run_on_road(one) if not flat_will_do else one if isinstance(one, Run) else read_run(one) for one in given]
     records = _records(drives, question, model.vehicle)
+    if question.free is None and (question.road != MEASURED or question.obstacles):
+        raise question.wrong("free", ": expected what to find, as the road was not measured")
     if question.road != MEASURED:
         return _on_unmeasured_roads(model, records, question)
     return _on_measured_roads(model, records, _narrowed(question, drives))
@@ -189,6 +192,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     from logger.simulation.virtual_drive import SimulatedRuns
 
     word = word_of(question.vehicle, given)
+    known = given.known if question.free is None else {}
     question = _with_unknown_numbers(given, word, records, question)
     _check_effects(given, word, records, question)
     _check_rigs(records, question)
@@ -197,7 +201,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     road, unplaced = _road(question)
 
     def model_of_records(of: list[Record]) -> DriveModel:
-        return _drive_model(given, of, road, unplaced, question)
+        return _drive_model(given, of, road, unplaced, question, known)
 
     try:
         found = fit_to_readings(model_of_records, records, lambda one: _options(one, question))
@@ -221,16 +225,23 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
 
 def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
                           question: IdentifyQuestion) -> IdentifyQuestion:
-    """The question with those numbers free as well that the vehicle's file calls unknown, where a force was measured;
-    without one they may not be found together, and it is said that they are held."""
-    named = {one.replace("both.", f"{axle}.") for one in question.free for axle in ("front", "rear")}
-    if not (unknown := [name for name, one in given.known.items() if one.words == UNKNOWN and name not in named]):
-        return question
-    if all(record.pushed or record.facts.main.measures == "force" for record in records):
-        return replace(question, free=(*question.free, *unknown))
-    held = ", ".join(f"{name} {read(given.vehicle, name):.4g}" for name in unknown)
-    question.warn(f"{word}: the file calls these unknown, but identify holds them fixed: {held}; name them in --free")
-    return question
+    """The question with those numbers free as well that the vehicle's file calls unknown; where none is named, all that
+    it does not know exactly, those of its effects too. BadInput where it knows all."""
+    known, free = given.known, [*(question.free or ())]
+    if question.free is None:
+        free = [name for name in known if known[name].words != UNKNOWN]
+        free += [f"{one.effect.name}.{parameter.name}" for one in given.effects for parameter in one.effect.parameters
+                 if parameter.is_free]
+    named = {one.replace(f"{BOTH}.", f"{axle}.") for one in free for axle in AXLES}
+    free += [name for name, one in known.items() if one.words == UNKNOWN and name not in named]
+    if not free and question.free is None:
+        raise question.wrong("free", f": expected what to find, as {word} gives every number exactly (875 +- 5% or "
+                             "unknown in place of 875 says that one is not)")
+    bounds = {name: one.ends for name, one in known.items() if name in free and one.ends} | dict(question.bounds or {})
+    if PRELOAD in free:  # as large as what was measured, either way
+        most_n = max(float(np.abs(record.measured_mps2).max()) for record in records)
+        bounds = {PRELOAD: (-2 * most_n, 2 * most_n)} | bounds
+    return replace(question, free=free, bounds=bounds)
 
 
 _RIG_WORDS = {"follow the road": "follow the excitation", "of the car or of the road": "of the rig",
@@ -261,7 +272,7 @@ def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Re
     if words := slow_words([one.effect for one in given.effects]):
         question.warn(words)
     there = [one.effect.name for one in given.effects]
-    for name in question.free:
+    for name in question.free or ():
         effect = name.partition(".")[0]
         if "." in name and effect in shipped_effects() and effect not in there:
             raise question.wrong("free", (
@@ -277,7 +288,7 @@ def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
     rig = next((record.name for record in records if record.timed), None)
     if rig is None:
         return
-    if asked := [name for name in question.free if is_input(name)] + list(question.obstacles or {}):
+    if asked := [name for name in question.free or () if is_input(name)] + list(question.obstacles or {}):
         raise BadInput(f"{rig}: expected a road for {asked[0]}; the run is driven by time")
     if question.noise == "road":
         raise question.wrong("noise", f" road: expected white, ar or auto; {rig} is driven by time, on no road")
@@ -303,7 +314,7 @@ def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
 
 
 def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: RoadInput, unplaced: list[str],
-                 question: IdentifyQuestion) -> DriveModel:
+                 question: IdentifyQuestion, known: Mapping[str, Known]) -> DriveModel:
     from logger.identification.session import drive_model, obstacle_starts
 
     try:
@@ -311,7 +322,7 @@ def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: Road
     except ValueError as error:
         obstacle, _, words = str(error).partition(":")
         raise question.wrong("obstacles", f" {obstacle}:{words}") from None
-    parameters = _free(given, road, starts, len(records), question)
+    parameters = _free(given, road, starts, len(records), question, known)
     try:
         return drive_model(given.vehicle, given.effects, parameters, records, road)
     except ValueError as error:
@@ -319,17 +330,18 @@ def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: Road
 
 
 def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, float], runs: int,
-          question: IdentifyQuestion) -> list[Free]:
+          question: IdentifyQuestion, known: Mapping[str, Known] = MappingProxyType({})) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
     from logger.identification.unknown_inputs import EACH, expanded, is_input, run_and_name
 
-    if cars := [name for name in question.free if name.startswith(f"{EACH}.") and not is_input(name)]:
+    free = question.free or ()
+    if cars := [name for name in free if name.startswith(f"{EACH}.") and not is_input(name)]:
         raise question.wrong("free", f" {cars[0]}: expected a number of the road after {EACH}., as all runs have one "
                                      "car")
-    names = [one for name in question.free for one in expanded(name, runs)]
+    names = [one for name in free for one in expanded(name, runs)]
     if not names or len(set(names)) < len(names):
-        raise question.wrong("free", f" {','.join(question.free)}: expected names with commas between them, each once")
+        raise question.wrong("free", f" {','.join(free)}: expected names with commas between them, each once")
     named = {run_and_name(name)[1] for name in names}
     names += [name for name in found if run_and_name(name)[1] not in named]
     start = {one: value for name, value in (question.start or {}).items() for one in expanded(name, runs)}
@@ -340,14 +352,15 @@ def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, flo
     first = {run_and_name(name)[1]: place for name, place in reversed(list(found.items()))}
     start = {**first, **found, **start}
     try:
-        return [_free_number(given, road, name, start.get(name), between.get(name)) for name in names]
+        return [_free_number(given, road, name, start.get(name), between.get(name), known.get(name)) for name in names]
     except ValueError as error:
         raise question.wrong("free", f": {error}") from None
 
 
 def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start: float | None,
-                 between: tuple[float, float] | None) -> Free:
-    """A number of the road, of an effect or of the car. ValueError for one that none of them has."""
+                 between: tuple[float, float] | None, known: Known | None) -> Free:
+    """A number of the road, of an effect or of the car, with how well it was ``known``. ValueError for one that none of
+    them has."""
     from logger.identification.unknown_inputs import free_input, is_input
     from logger.vehicle.named_parameters import free, free_number, free_parameter_named
 
@@ -355,7 +368,8 @@ def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start
         return free_input(road, name, start, between)
     if (move := free_parameter_named(given.effects, name)) is not None:
         return free_number(given.effects, move, start, between)
-    return free(given.vehicle, name, start, between)
+    prior = (known.value, known.deviation) if known is not None and known.is_guess else None
+    return free(given.vehicle, name, start, between, prior)
 
 
 def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
@@ -445,8 +459,9 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
               "noise": question.noise != "auto"}
     if given := [option for option, value in unused.items() if value]:
         raise question.wrong(given[0], ": expected a road whose profile is known, found one that was not measured")
-    names = [name for name in question.free if name != _FREE_WAVINESS]
-    return (Options(waviness=question.waviness or USUAL_WAVINESS, free_waviness=_FREE_WAVINESS in question.free,
+    free = question.free or ()
+    names = [name for name in free if name != _FREE_WAVINESS]
+    return (Options(waviness=question.waviness or USUAL_WAVINESS, free_waviness=_FREE_WAVINESS in free,
                     place_off_m=_PLACES_OFF_M, scale_off=_SCALE_OFF), replace(question, free=names))
 
 

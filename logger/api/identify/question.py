@@ -61,7 +61,7 @@ class IdentifyQuestion(LongQuestion):
     Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it
     was driven on, or, of a rig, with drive.csv (t_s,accel_z_mps2) and the excitation.csv
     (t_s,elevation_m[,elevation_rear_m]) that drove it. What is free is named as in the vehicle's file; both.NAME is the
-    front and rear axle together.
+    front and rear axle together. With nothing named, what the file calls unknown or writes as 2.45 +- 2% is found.
 
       ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
       ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
@@ -104,9 +104,10 @@ class IdentifyQuestion(LongQuestion):
     vehicle: VehicleName
     runs: Annotated[Runs, Argument("folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; "
                                    "of one sample rate", metavar="RUN", read=Path, many=list)]
-    free: Annotated[Sequence[str], Option(
+    free: Annotated[Sequence[str] | None, Option(
         "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
-        "step.start_m, speed_scale or road.waviness of the road", metavar="PARAM,...", read=names_of)]
+        "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file calls unknown or not "
+        "known exactly, weighed with what it says, and its effects)", metavar="PARAM,...", read=names_of)] = None
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, Option(
         "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,

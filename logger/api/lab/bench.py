@@ -41,6 +41,7 @@ from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, chosen
+from logger.vehicle.named_parameters import PRELOAD
 from logger.vehicle.uncertain import Known, Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
@@ -232,7 +233,7 @@ def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingP
     no car's numbers have."""
     if said == UNKNOWN:
         return Tolerance().widened()
-    by_name = {name: one.deviation for name, one in known.items()}
+    by_name = {name: one.deviation for name, one in known.items() if name != PRELOAD}
     if said is None:
         return Tolerance(by_name=by_name)
     TOLERANCE.check("tolerance", float(said))

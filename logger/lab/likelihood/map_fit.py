@@ -315,13 +315,11 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
                          ) -> tuple[LinearModel, list[Array] | None]:
     """The model and the derivatives by the numbers of its effects (m, n), per run, without a common scale of all
     masses and forces: a car in which they are larger by one factor moves the same. Differences over steps do not show
-    that exactly where laws are not linear, least of all those of dry friction, which sticks and slips: they would seem
+    that exactly, least of all of a mode that little damps, or of dry friction, which sticks and slips: they would seem
     to measure a size that only the prior knows. A user's own effects may have units that nobody knows; a force that
     was measured shows the size."""
     prior, numbers, posterior = linear.prior, linear.numbers, linear.posterior
-    if numbers is None or own is None or posterior.shows_forces or any(one.file for one in effects):
-        return linear, own
-    if not posterior.car(effects, linear.state.logs).bends_laws:
+    if numbers is None or posterior.shows_forces or any(one.file for one in effects):
         return linear, own
     step = [float(grows_with_mass(name)) for name in prior.names]
     for free in free_parameters_of(effects):
@@ -331,9 +329,10 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
         step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
     scaling = np.array(step)
     share = np.divide(1.0, scaling, out=np.zeros_like(scaling), where=scaling != 0) / np.count_nonzero(scaling)
-    freed = [one - share[:, None] * (scaling @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
+    slopes = numbers if own is None else list(map(np.vstack, zip(numbers, own, strict=True)))
+    freed = [one - share[:, None] * (scaling @ one) for one in slopes]
     p = linear.count
-    return linear.with_number_slopes([one[:p] for one in freed]), [one[p:] for one in freed]
+    return linear.with_number_slopes([one[:p] for one in freed]), None if own is None else [one[p:] for one in freed]
 
 
 def _fine_steps(linear: LinearModel) -> Array:

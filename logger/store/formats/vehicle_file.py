@@ -191,7 +191,9 @@ def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[C
 def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicle:
     """The vehicle with its numbers as they were given, ``front.unsprung_mass_kg: 40 +- 5%``; how well they were known
     is added to ``known``. Of one that was not known the number that was found stands in its place."""
-    keys = dict(node.mapping(optional=sized(vehicle)))
+    keys = dict(node.mapping(optional=(*sized(vehicle), PRELOAD)))
+    if PRELOAD in keys:
+        _plain_preload(keys.pop(PRELOAD), known)
     for name, one in keys.items():
         if _is_unknown(one):
             known[name] = Known.unknown(name, read(vehicle, name))
@@ -211,7 +213,7 @@ def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
     """The number of a node without how well it is known, which is added to ``known``. BadInput for what says neither.
     """
     if name == PRELOAD:
-        return _plain_preload(node)
+        return _plain_preload(node, known)
     if isinstance(node.content, tuple):
         one = Known.within(*_ends(node, [end.number(above=0.0) for end in node.content]))
     elif isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
@@ -230,14 +232,20 @@ def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
     return replace(node, content=repr(one.value), plain=True)
 
 
-def _plain_preload(node: Node) -> Node:
-    """A preload without how well it is known: any fit finds it as a constant of its record. It has either sign."""
+def _plain_preload(node: Node, known: dict[str, Known]) -> Node:
+    """A preload without how well it is known, which is added to ``known``. It has either sign."""
     if isinstance(node.content, tuple):
-        return replace(node, content=repr(sum(_ends(node, [end.number() for end in node.content])) / 2), plain=True)
-    if isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
+        low, high = _ends(node, [end.number() for end in node.content])
+        value, words = (low + high) / 2, f"[{low!r}, {high!r}]"
+    elif isinstance(node.content, str) and (said := _SPREAD.fullmatch(node.content)):
         replace(node, content=said[2], plain=True).number(above=0.0)
-        return replace(node, content=said[1], plain=True)
-    return replace(node, content="0.0", plain=True) if _is_unknown(node) else node
+        value, words = replace(node, content=said[1], plain=True).number(), node.content
+    elif _is_unknown(node):
+        value, words = 0.0, UNKNOWN
+    else:
+        return node
+    known[PRELOAD] = Known(value, float("inf"), words)
+    return replace(node, content=repr(value), plain=True)
 
 
 def _ends(node: Node, ends: Sequence[float]) -> Sequence[float]:
