@@ -177,7 +177,8 @@ class SimulatedRuns:
         return found
 
 
-_STATE_STEP, _STATE_CLOSE, _MOST_STATE_STEPS = 1e-3, 1e-6, 12
+_STATE_STEP, _MOST_STATE_STEPS = 1e-3, 12
+_STATE_CLOSE = 1e-3  # the last step: what is left after it is of the size of its square
 _UNSEEN, _SMALL_STATE = 1e-4, 1e-6
 
 
@@ -200,16 +201,16 @@ def _begun(car: Car, passage: Passage, run: Run) -> Passage:
     def weighed(samples: Array) -> Array:
         return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / sizes).ravel()
 
-    def record(of: Car, state: Array) -> Array:
-        joined = run.in_band(_recorded(of, passage.begun_with(state), signals, main))
+    def record(of: Car, begun: Passage) -> Array:
+        joined = run.in_band(_recorded(of, begun, signals, main))
         return weighed(joined.reshape(-1, run.count)[:, read])
 
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
-    wanted, none = weighed(measured), np.zeros(2 * len(car.structure.mass))
-    plain = replace(car, laws=(), bends_laws=False, body=(car.body, "linear"))
-    still = record(plain, none)
+    wanted, plain = weighed(measured), car.linear
+    still = record(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
-    columns = np.stack([record(plain, one) - still for one in _SMALL_STATE * np.eye(len(none))], axis=1) / _SMALL_STATE
+    small = passage.begun_in_each(_SMALL_STATE * np.eye(2 * len(car.structure.mass)))
+    columns = np.stack([record(plain, one) - still for one in small], axis=1) / _SMALL_STATE
     seen = np.linalg.norm(columns, axis=0)
     usual = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)
 
@@ -217,24 +218,27 @@ def _begun(car: Car, passage: Passage, run: Run) -> Passage:
         return np.asarray(usual * np.linalg.lstsq(columns * usual, left, rcond=_UNSEEN)[0])
 
     state = step(columns, wanted - still)
+    best = passage.begun_with(state)
     if not car.bends_laws:
-        return passage.begun_with(state)
-    here = record(car, state)
+        return best
+    here = record(car, best)
     for _ in range(_MOST_STATE_STEPS):
         for index, one in enumerate(_STATE_STEP * usual):
             if one > 0:
-                columns[:, index] = (record(car, state + one * (np.arange(len(usual)) == index)) - here) / one
+                beside = passage.begun_with(state + one * (np.arange(len(usual)) == index))
+                columns[:, index] = (record(car, beside) - here) / one
         way, least = step(columns, wanted - here), float(np.sum((wanted - here) ** 2))
         for share in (1.0, 0.5, 0.25, 0.1, 0.02):
-            there = record(car, state + share * way)
+            begun = passage.begun_with(state + share * way)
+            there = record(car, begun)
             if np.sum((wanted - there) ** 2) < least:
                 break
         else:
             break
-        state, here = state + share * way, there
+        state, best, here = state + share * way, begun, there
         if (np.abs(share * way) <= _STATE_CLOSE * usual).all():
             break
-    return passage.begun_with(state)
+    return best
 
 
 def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal) -> Array:

@@ -66,7 +66,7 @@ class Car:
     sensors      effects between body and record, in order
     drives       effects on the position signal, in order
     records      effects on the record in time, in order
-    body         equal for two cars whose bodies move alike where the sensor sits
+    body         equal for two cars whose bodies move alike where the sensor sits: what is linear of them, and their laws
     shift_m      by how much its effects moved its centre of gravity ahead; what is bolted to the body stays
     """
 
@@ -77,7 +77,7 @@ class Car:
     sensors: tuple[Chosen, ...]
     drives: tuple[Chosen, ...]
     bends_laws: bool
-    body: Hashable
+    body: tuple[Hashable, Hashable]
     shift_m: float = 0.0
     records: tuple[Chosen, ...] = ()
 
@@ -85,6 +85,11 @@ class Car:
     def rubs(self) -> bool:
         """Whether there is dry friction in it that decides how it moves: not in a part that its bench moves."""
         return not self.structure.held and any(one.rubs for one in self.laws)
+
+    @property
+    def linear(self) -> Car:
+        """The car without its laws, which its numbers have as well."""
+        return replace(self, laws=(), bends_laws=False, body=(self.body[0], ()))
 
     @property
     def output(self) -> Output:
@@ -175,13 +180,17 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
         laws.append(corner)
     row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
     around = (SensorEffect, DriveEffect, RecordEffect)
-    body = (vehicle, structure.sides, *(
-        (one.effect, *sorted(one.values.items())) for one in ordered if not isinstance(one.effect, around)))
+    moving = [one for one in ordered if not isinstance(one.effect, around)]
+    body = ((vehicle, structure.sides, *(_key(one) for one in moving if one not in forces)), tuple(map(_key, forces)))
     return Car(vehicle, structure, tuple(laws), row,
                tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
                tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body,
                front_m - vehicle.front.cg_distance_m,
                tuple(one for one in ordered if isinstance(one.effect, RecordEffect)))
+
+
+def _key(one: Chosen) -> Hashable:
+    return (one.effect, *sorted(one.values.items()))
 
 
 def recorded(car: Car, passage: Passage) -> Array:

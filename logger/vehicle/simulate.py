@@ -119,6 +119,7 @@ class Passage:
         self._recorder = _recorder(self._coarse, self.steps)
         self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
+        self._begun: dict[bytes, list[Passage]] = {}
 
     @property
     def time_s(self) -> Array:
@@ -133,7 +134,14 @@ class Passage:
     def begun_with(self, state: Array) -> Passage:
         """The same passage begun in a state that differs by this (2 n,) from the one at rest."""
         found = copy(self)
-        found.begins, found._bodies = state, {}
+        found.begins, found._bodies, found._begun = state, {}, {}
+        return found
+
+    def begun_in_each(self, states: Array) -> list[Passage]:
+        """The passages begun in these states (m, 2 n), which keep the bodies that passed; those of the same again."""
+        key = states.tobytes()
+        if (found := self._begun.get(key)) is None:
+            found = self._begun[key] = [self.begun_with(one) for one in states]
         return found
 
     @property

@@ -566,6 +566,21 @@ def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.Captu
         main(["identify", "--vehicle", str(part), str(run)])
 
 
+def test_no_size_is_seen_in_accelerations_of_a_mass_that_little_damps(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """13 t, 12 in its file: all that is found of it is 8 % too small."""
+    way = noise(8.0, 0.004, 6)
+    seen = Bench(13e3, 4e6, 9e3).moved(way, NOTHING, NOTHING)["accel_z_mps2"]
+    run = written(tmp_path / "run", {"accel_z_mps2": seen + np.random.default_rng(1).normal(0.0, 0.005, len(seen))},
+                  {"elevation_m": way(TIME_S)}, "source: me\n")
+    (mass := tmp_path / "mass.yaml").write_text("name: mass\nmodel: single_mass\nmass_kg: 12e3 +- 10%\n"
+                                                "stiffness_n_per_m: 3.5e6 +- 30%\ndamping_n_s_per_m: unknown\n")
+    assert main(["diagnose", "--vehicle", str(mass), str(run), "--json"]) == 0
+    spring = json.loads(capsys.readouterr().out)["fitted_parameters"]["stiffness_n_per_m"]
+    assert abs(spring["value"] - 4e6) < 3 * spring["standard_error"]
+    assert spring["standard_error"] == pytest.approx(0.095 * spring["value"], rel=0.1)  # with what is known of it
+
+
 def test_what_accelerations_do_not_show_is_as_uncertain_as_the_file_says(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A mass on a shaken base moves the same with all numbers larger by one factor."""
