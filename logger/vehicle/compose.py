@@ -66,7 +66,7 @@ class Car:
     sensors      effects between body and record, in order
     drives       effects on the position signal, in order
     records      effects on the record in time, in order
-    body         equal for two cars whose bodies move alike where the sensor sits: what is linear of them, and their laws
+    body         equal for two cars whose bodies move alike where the sensor sits: their linear part, and laws
     shift_m      by how much its effects moved its centre of gravity ahead; what is bolted to the body stays
     """
 
