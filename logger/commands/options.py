@@ -8,12 +8,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING
 from pathlib import Path
-from re import fullmatch
 from types import NoneType
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -91,6 +91,14 @@ def _options_of(question: type[Any]) -> list[Asking]:
     return [one for one in askings(question) if not isinstance(one.option, InPython)]
 
 
+_IN_PYTHON = re.compile(r"; in Python a model as well|\. In Python: .*$| \(in Python [^)]*\)|at a terminal (?=as )")
+
+
+def _help(one: Asking) -> str:
+    """What an option is, without what is of no use at the terminal."""
+    return _IN_PYTHON.sub("", one.help)
+
+
 def _many(repeats: bool) -> dict[str, Any]:
     return {"action": "append"} if repeats else {}
 
@@ -103,12 +111,12 @@ def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
     elif isinstance(option, Argument):
         is_optional = one.default is not MISSING
         nargs = ("*" if is_optional else "+") if option.many else "?" if is_optional else None
-        parser.add_argument(one.name, nargs=nargs, metavar=option.metavar, help=one.help,
+        parser.add_argument(one.name, nargs=nargs, metavar=option.metavar, help=_help(one),
                             type=_reader(str(option.metavar), option, one.kind))
     elif one.default is False:
-        parser.add_argument(one.flag, dest=one.name, action="store_true", help=one.help)
+        parser.add_argument(one.flag, dest=one.name, action="store_true", help=_help(one))
     else:
-        parser.add_argument(one.flag, dest=one.name, required=one.default is MISSING, help=one.help,
+        parser.add_argument(one.flag, dest=one.name, required=one.default is MISSING, help=_help(one),
                             metavar=option.metavar or "|".join(option.choices), **_many(option.many is not None),
                             **({} if option.bare is None else {"nargs": "?", "const": option.bare}),
                             type=_reader(one.flag, option, one.kind))
@@ -137,7 +145,7 @@ def _number(kind: Any, option: Option) -> Callable[[str], float] | None:
     in_metres = kind is float and option.metavar == "M"
 
     def number(text: str) -> float:
-        found = fullmatch(r"([0-9.]+)(m|km|mi|ft)", text) if in_metres else None
+        found = re.fullmatch(r"([0-9.]+)(m|km|mi|ft)", text) if in_metres else None
         try:
             if found:
                 return float(found[1]) * LENGTH_UNITS_M[found[2]]

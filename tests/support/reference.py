@@ -30,7 +30,7 @@ def commands() -> str:
     for title, group in GROUPS.items():
         parts.append(f"## {title}")
         for verb, meaning in group.items():
-            parts += [f"### ridelog {verb}", f"{meaning[0].upper()}{meaning[1:]}."]
+            parts += [f"### ridelog {verb}", f"{meaning[0].upper()}{meaning[1:]}{'.' * (meaning[-1] != '?')}"]
             for parser in parsers(command(verb)[0]):
                 if parser.prog != f"ridelog {verb}":
                     parts.append(f"#### {parser.prog}")

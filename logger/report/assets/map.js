@@ -271,9 +271,11 @@ class TrackMap {
       }
     if (Number.isNaN(worst)) return;
     const x = this.left(windows.x[worst]), y = this.top(windows.y[worst]);
+    const isTaken = this.report.data.places.some(i => Math.abs(this.left(windows.x[i]) - x) < 60
+      && Math.abs(this.top(windows.y[i]) - y + 21) < 16);    // by the number of another place
     circle(ink, x, y, 11, colours.ink, null, 2);
     write(ink, `worst ${value[worst].toFixed(mode === "iri" ? 1 : 2)}`, clamp(x, 40, this.width - 40),
-          y > 40 ? y - 17 : y + 26, {colour: colours.ink, align: "center", weight: 600});
+          y > 40 && !isTaken ? y - 17 : y + 26, {colour: colours.ink, align: "center", weight: 600});
   }
 
   drawPlaces(ink) {
