@@ -71,8 +71,8 @@ class ComfortQuestion(Question):
     or longer, perhaps accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is the standard's
     formula, magnitude and phase, applied to the whole record by Fourier transform.
 
-    A record that repeats samples, whose times are uneven, or that is in g is refused, with the option that mends it.
-    What is doubtful is named on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
+    comfort refuses a record with repeated samples, uneven times or values in g, and names the option that helps. It
+    reports doubts on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
 
     In Python: takes records and runs as well; raises BadInput for what is none of this, for what makes the values
     wrong (repeated samples, gravity in g), and as ``read_record``. What is doubtful is in ``doubts``, a line each.
@@ -100,15 +100,15 @@ class EstimateQuestion(LongQuestion):
     """The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
 
     RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies
-    in the folder, the estimates are compared with its exact IRI. Beside them stands the limit: what an estimator could
-    reach that knew the road's spectrum, the sensor's noise and the car exactly.
+    in the folder, estimate compares with its exact IRI. Beside the estimates stands the limit: the accuracy of an
+    estimator that knows the road's spectrum, the sensor's noise and the car exactly.
 
       ridelog estimate run --vehicle rav4-2009
       ridelog estimate drive.csv --vehicle mycar.yaml --step 0.613 --profile-out road.csv
 
-    A distance may go back by up to 1 m, as one corrected by GPS does; it is then computed again, as the integral of
-    speed_mps plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are
-    brought to 100 Hz. Repeated samples, uneven times and values in g are refused, with the option that mends them.
+    A distance that GPS corrected may go back by up to 1 m; estimate then computes it again, as the integral of speed_mps
+    plus the moving mean over 2 s of the difference. It resamples other rates to 100 Hz. It refuses repeated samples,
+    uneven times and values in g, and names the option that helps.
 
     The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its own IRI too
     low. A drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI: the limit's R2 is
@@ -164,9 +164,9 @@ class EstimateQuestion(LongQuestion):
 class CalibrateQuestion(LongQuestion):
     """How much a vehicle shakes on roads of known roughness: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
 
-    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; one line per speed comes out, and
-    how far one road lies off it. The result is kept beside the vehicle's file (NAME.calibration.json), or in the user's
-    cache, and found again, unless an effect of your own is in it.
+    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; one line per speed comes out, with
+    the scatter of single roads. The result is cached beside the vehicle's file (NAME.calibration.json) or in the user's
+    cache, unless the file has an effect of your own.
 
       ridelog calibrate --vehicle rav4-2009
       ridelog calibrate --vehicle mycar.yaml --out mycar.csv
@@ -219,8 +219,7 @@ class ModesQuestion(Question):
     --speed.
 
     With --vehicle and no FILE they are those of a vehicle's file with its effects; the standard deviations follow from
-    the standard errors that the file carries. Laws that are not linear are what they come to at a speed, on a road of
-    IRI 2.5 m/km.
+    the standard errors that the file carries. Nonlinear forces are linearised at a speed, on a road of IRI 2.5 m/km.
 
     In Python: the record has 100 samples or more; of a vehicle alone as ``vehicle_modes``. Raises BadInput for what
     does not fit together, a record that is too short for it, and as ``read_channels``. Source: P. van Overschee and
@@ -251,7 +250,7 @@ class ModesQuestion(Question):
         "the modes of a vehicle's file; with a FILE, the vehicle that was driven", metavar="NAME|FILE",
         read=str)] = None
     speed_mps: Annotated[float | None, Option(
-        f"of a vehicle alone: at which laws that are not linear are looked at (default: {COMMON_SPEED_MPS:g}); of a "
+        f"of a vehicle alone: at which nonlinear forces are linearised (default: {COMMON_SPEED_MPS:g}); of a "
         "FILE: at which it was driven, if it does not say so", SPEED, "MPS")] = None
 
 

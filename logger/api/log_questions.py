@@ -78,8 +78,8 @@ class SectionsQuestion(LogsQuestion):
       ridelog sections drive-logs/ --length 100m --route route.geojson
 
     Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its
-    windows by length, over as much of it as has an IRI, which is said beside it. Its standard error counts what its
-    windows' errors share; where the logs of an older version do not say what that is, neighbours count as sharing all.
+    windows, weighted by length; beside it stands how much of the section has an IRI. Its standard error includes the
+    errors that its windows share. Logs of older versions do not say how much that is: there it takes all as shared.
     No mean includes rows flagged ``unsettled``.
 
     With --route they count by the measures of a line, for each pass over it and in either direction. The line may say
@@ -113,8 +113,8 @@ class PassesQuestion(LogsQuestion):
     Each drive is matched to those before it as a whole: by its places, its direction, and the receiver's error, which
     changes over minutes. Streets some 15 m apart or more are distinguished, lanes of one direction are not. The
     standard error of a mean includes the errors that all windows of one drive share (the car, its tires, its load),
-    estimated from how drives differ. What all drives share, such as a wrong vehicle file, does not show in that: it
-    counts as far as the vehicle file and the learnt noise give their standard errors.
+    estimated from how drives differ. An error that all drives share, such as a wrong vehicle file, does not show in
+    these differences; it counts by the standard errors of the vehicle file and of the learnt noise.
 
     In Python: raises BadInput for no log, and none with an intact row that counts.
 
@@ -184,9 +184,9 @@ BY = ("segment", "section", "cell", "route")
 
 @dataclass(frozen=True)
 class IngestQuestion(LogsQuestion):
-    """Add the intact rows of logs to a dataset of Parquet files. What is there already is passed over; an ingest that
-    was cut off goes on where it was when it is started again. The dataset keeps a pseudonym of each car, the table
-    beside it (``DATASET.cars.csv``) its name.
+    """Add the intact rows of logs to a dataset of Parquet files. It skips rows that are there already; an ingest that
+    was interrupted continues when you start it again. The dataset keeps a pseudonym of each car, the table beside it
+    (``DATASET.cars.csv``) its name.
 
       ridelog fleet ingest depot/ --to county --car-folders
       ridelog fleet ingest /media/RIDELOG --to county --car "van 7" --trim-m 200
