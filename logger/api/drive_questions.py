@@ -106,9 +106,9 @@ class EstimateQuestion(LongQuestion):
       ridelog estimate run --vehicle rav4-2009
       ridelog estimate drive.csv --vehicle mycar.yaml --step 0.613 --profile-out road.csv
 
-    A distance that GPS corrected may go back by up to 1 m; estimate then computes it again, as the integral of speed_mps
-    plus the moving mean over 2 s of the difference. It resamples other rates to 100 Hz. It refuses repeated samples,
-    uneven times and values in g, and names the option that helps.
+    A distance that GPS corrected may go back by up to 1 m; estimate then computes it again, as the integral of
+    speed_mps plus the moving mean over 2 s of the difference. It resamples other rates to 100 Hz. It refuses repeated
+    samples, uneven times and values in g, and names the option that helps.
 
     The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its own IRI too
     low. A drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI: the limit's R2 is
