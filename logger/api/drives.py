@@ -23,8 +23,7 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import model_of
 from logger.chart_data import Array, line
 from logger.errors import BadInput
-from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
-from logger.estimation.batch import RESOLVED_SHARE
+from logger.estimation.batch import MIX_IRI, RESOLVED_SHARE, SPEED_CLASS_MPS, Assessment, figures, speed_classes
 from logger.estimation.sensor_noise import NOISE_MPS2
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
@@ -307,7 +306,7 @@ def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_nois
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
     ``anyway`` (then ``warn`` is called)."""
-    from logger.estimation.assessment import Unusable, assess, estimable
+    from logger.estimation.batch import Unusable, assess, estimable
 
     if run.excitation is not None:
         raise BadInput(f"{run.path}: expected a drive over a road, found a run that is driven by time")

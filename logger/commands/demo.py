@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from logger.api.drives import Run
     from logger.api.extraction import Extracted
     from logger.api.lab.loop import Say
-    from logger.estimation.assessment import Assessment
+    from logger.estimation.batch import Assessment
     from logger.lab.session import Story
 
 

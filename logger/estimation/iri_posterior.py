@@ -97,31 +97,25 @@ class SlopeKnowledge:
         return 1 - float(self.left(np.zeros(1))[0]) / self.variance
 
 
-class SlopeErrors:
-    """``SlopeKnowledge`` for one car, for lags up to a window."""
+def slope_knowledge(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, variance: float, rate_hz: float,
+                    spacing_m: float, lags: int) -> SlopeKnowledge:
+    """For readings of this variance [(m/s2)2] at this speed [m/s], and so many lags of the distance grid."""
+    prior = _SLOPE_POWER * spectrum.psd_of(LOG_WAVES)
+    resolved = resolved_share(car, speed_mps, spectrum, reading_noise_psd(variance, rate_hz, speed_mps))
+    left = (prior * (1 - resolved)) @ _by_lag(spacing_m, lags)
+    # of a rise e^l the share resolved goes from s to s e^l / (1 - s + s e^l)
+    rise = np.exp(_RISES)[:, None]
+    by_rise = (rise / (1 - resolved + resolved * rise)) @ (prior * (1 - resolved))
+    return SlopeKnowledge(float(prior.sum()), np.log(by_rise), left / left[0],
+                          _vehicle_std(car, speed_mps, prior * resolved**2))
 
-    def __init__(self, car: CarResponse, rate_hz: float, spacing_m: float, lags: int) -> None:
-        self._car = car
-        self._rate_hz = rate_hz
-        self._waves = _by_lag(spacing_m, lags)
 
-    def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
-        """For readings of this variance [(m/s2)2] at this speed [m/s]."""
-        prior = _SLOPE_POWER * spectrum.psd_of(LOG_WAVES)
-        resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
-        left = (prior * (1 - resolved)) @ self._waves
-        # of a rise e^l the share resolved goes from s to s e^l / (1 - s + s e^l)
-        rise = np.exp(_RISES)[:, None]
-        by_rise = (rise / (1 - resolved + resolved * rise)) @ (prior * (1 - resolved))
-        return SlopeKnowledge(float(prior.sum()), np.log(by_rise), left / left[0],
-                              self._vehicle_std(speed_mps, prior * resolved**2))
-
-    def _vehicle_std(self, speed_mps: float, weight: Array) -> float:
-        """A gain that is off by a share dH / H makes the wave that is found off by as much, as far as the readings
-        tell it; the road's level is learnt from those waves, so that what they do not tell goes with them."""
-        if self._car.is_exact:
-            return 0.0
-        return float(np.linalg.norm(self._car.changes(speed_mps).real @ weight)) / float(weight.sum())
+def _vehicle_std(car: CarResponse, speed_mps: float, weight: Array) -> float:
+    """A gain that is off by a share dH / H makes the wave that is found off by as much, as far as the readings tell
+    it; the road's level is learnt from those waves, so that what they do not tell goes with them."""
+    if car.is_exact:
+        return 0.0
+    return float(np.linalg.norm(car.changes(speed_mps).real @ weight)) / float(weight.sum())
 
 
 @lru_cache(maxsize=2)

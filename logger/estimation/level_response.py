@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
-from logger.estimation.roughness import evidence_slope
+from logger.estimation.roughness import resolved_shares
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -35,7 +35,7 @@ _MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 @dataclass(frozen=True)
 class Answer:
     """What a level led to: ``readings`` after it, ``waves`` of the road's innovations, and of the points of the block
-    the arguments of ``evidence_slope``."""
+    what ``RoadLevels.learn`` was told."""
 
     readings: GaussianReadings
     waves: ComplexArray
@@ -48,8 +48,9 @@ class Answer:
 
     def slope(self, counted: Array) -> tuple[float, float]:
         """Of the log evidence, in a level that all points ``counted`` (n,) share, and its expected curvature."""
-        return evidence_slope(self.innovations, self.log_variance, self.gain, self.seen, self.sharper, self.free,
-                              counted)
+        resolved, freedom = resolved_shares(self.log_variance + np.log(self.sharper), self.gain, self.seen, self.free)
+        return (0.5 * float(counted @ (self.innovations**2 * np.exp(-self.log_variance) - resolved)),
+                0.5 * float(counted @ freedom))
 
 
 class LevelResponse:

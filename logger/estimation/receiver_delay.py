@@ -293,20 +293,23 @@ def _line(t_s: Array) -> Array:
     return np.stack([np.ones(len(t_s)), middle / max(float(np.std(middle)), 1e-3)], axis=1)
 
 
-def _whitened(t_s: Array, strength: Strength, weight: Array, columns: Array) -> Array:
-    """Columns (k, m) made white and freed of the line."""
-    root = np.linalg.cholesky(_covariances(t_s, [strength], weight)[0])
-    both = np.linalg.solve(root, np.hstack([_line(t_s), columns]))
-    basis, _ = np.linalg.qr(both[:, :2])
-    white: Array = both[:, 2:] - basis @ (basis.T @ both[:, 2:])
-    return white
+def _whitened(t_s: Array, strengths: Sequence[Strength], weight: Array, columns: Array) -> tuple[Array, Array]:
+    """Columns (k, m) made white and freed of the line by each of the strengths, (s, k, m), and half the logarithms of
+    the determinants of what they were (s,)."""
+    roots = np.linalg.cholesky(_covariances(t_s, strengths, weight))
+    both = np.linalg.solve(roots, np.hstack([_line(t_s), columns]))
+    basis, triangle = np.linalg.qr(both[..., :2])
+    rest = both[..., 2:]
+    white = rest - basis @ (np.swapaxes(basis, 1, 2) @ rest)
+    root, line = (np.log(np.abs(np.diagonal(one, axis1=1, axis2=2))).sum(axis=1) for one in (roots, triangle))
+    return white, root + line
 
 
 def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array
           ) -> tuple[Array, Array, float]:
     """A (d, 3, 3), b (d, 3) and c of a block."""
     d, k, _ = x.shape
-    white = _whitened(t_s, strength, weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))
+    (white,), _ = _whitened(t_s, [strength], weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))
     rows = white[:, 1:].reshape(k, d, 3)
     return np.einsum("kdi,kdj->dij", rows, rows), np.einsum("kdi,k->di", rows, white[:, 0]), \
         float(white[:, 0] @ white[:, 0])
@@ -314,20 +317,14 @@ def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array
 
 def _log_likelihoods(residual: Array, t_s: Array, strengths: Sequence[Strength], weight: Array) -> Array:
     """Of residuals (k,) for each of the strengths (s,), whatever line is in them."""
-    roots = np.linalg.cholesky(_covariances(t_s, strengths, weight))
-    white = np.linalg.solve(roots, np.column_stack([_line(t_s), residual]))
-    basis, triangle = np.linalg.qr(white[..., :2])
-    rest = white[..., 2:]
-    rest = rest - basis @ (np.swapaxes(basis, 1, 2) @ rest)
-    logs = (np.log(np.abs(np.diagonal(one, axis1=1, axis2=2))).sum(axis=1) for one in (roots, triangle))
-    found: Array = -0.5 * (rest**2).sum(axis=(1, 2)) - sum(logs)
-    return found
+    white, half_log = _whitened(t_s, strengths, weight, residual[:, None])
+    return np.asarray(-0.5 * (white**2).sum(axis=(1, 2)) - half_log)
 
 
 def _weights(residual: Array, t_s: Array, strength: Strength, weight: Array) -> Array:
     """Weights (k,) of fixes by Student's t: of what each is off from what the others say."""
     inverse = np.linalg.inv(_covariances(t_s, [strength], weight)[0])
-    line = np.stack([np.ones(len(t_s)), t_s - t_s.mean()], axis=1)
+    line = _line(t_s)
     inverse -= inverse @ line @ np.linalg.solve(line.T @ inverse @ line, line.T @ inverse)
     spread = np.maximum(np.diag(inverse), 1e-9)
     off = (inverse @ residual) / spread  # from what the others say, whose variance is 1 / spread

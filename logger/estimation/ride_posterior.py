@@ -8,7 +8,6 @@ that of the noise, W the weighting. Where nothing was read, all of |W|^2 S is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass, replace
 from math import exp, hypot, sqrt
 
@@ -73,7 +72,7 @@ class RideKnowledge:
 class RidePlace:
     """What is known where a ride was felt.
 
-    speed_mps        steady; ``variance`` of a reading there, as the solution took it [(m/s2)2]
+    car              there; ``speed_mps`` steady; ``variance`` of a reading there, as the solution took it [(m/s2)2]
     spectrum         of the road there, ``log_level_std`` the standard error of its log level
     sensor           as it is believed to be, ``noise_log_std`` the standard error of its noise, a share of it
     scale_log_std    share by which the ride may be off because of that
@@ -81,6 +80,7 @@ class RidePlace:
                      None: nothing
     """
 
+    car: CarResponse
     speed_mps: float
     variance: float
     spectrum: RoadSpectrum
@@ -92,15 +92,12 @@ class RidePlace:
 
 
 class RidePosterior:
-    """The weighted ride of one car, in blocks of ``count`` samples at ``rate_hz``.
+    """The weighted ride, in blocks of ``count`` samples at ``rate_hz``.
 
     response    of the weighting at frequencies (n,) [Hz]
     """
 
-    def __init__(
-        self, car: CarResponse, response: Callable[[Array], ComplexArray], count: int, rate_hz: float
-    ) -> None:
-        self._car = car
+    def __init__(self, response: Callable[[Array], ComplexArray], count: int, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._count = count
         self._response = response(frequencies_hz(count, rate_hz))
@@ -109,19 +106,13 @@ class RidePosterior:
         self._lags = round(_LAGS_S * rate_hz)
         self._running = round(_RUNNING_S * rate_hz)
 
-    def of(self, car: CarResponse) -> RidePosterior:
-        """That of another car, weighted likewise."""
-        other = copy(self)
-        other._car = car
-        return other
-
     def weighted(self, accel_mps2: Array) -> Array:
         """The acceleration (count,) of a block, weighted; its first seconds are those of a start."""
         return np.fft.irfft(np.fft.rfft(accel_mps2) * self._response, self._count)
 
     def knowledge(self, place: RidePlace) -> tuple[RideKnowledge, RideKnowledge]:
         """At a place, and were the road there rougher by ``_LEVEL_TRIAL``."""
-        per_cpm = self._car.power(place.speed_mps) * place.spectrum.psd_of(LOG_WAVES)
+        per_cpm = place.car.power(place.speed_mps) * place.spectrum.psd_of(LOG_WAVES)
         road = np.interp(self._f_hz / place.speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / place.speed_mps
         other: Array | float = 0.0
         if place.other_psd is not None:

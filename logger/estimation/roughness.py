@@ -187,7 +187,7 @@ class RoadLevels:
             return
         count = len(innovations)
         strength = log_before + np.log(sharper)
-        resolved, freedom = _resolved(strength, gain, seen, free)
+        resolved, freedom = resolved_shares(strength, gain, seen, free)
         squares = innovations**2
         rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
                          np.ones(count)]) * seen
@@ -286,7 +286,7 @@ class RoadLevels:
         self._common = 2 / max(scatter, 2 / _MOST_COMMON)
 
 
-def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> tuple[Array, Array]:
+def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | None) -> tuple[Array, Array]:
     """What the readings resolve of each point (n,) of relative variance exp(strength), and their degrees of freedom:
     the share's mean over the waves, and that of its square; ``free`` is its sum over what was ``seen`` (n,)."""
     table = np.arange(strength.min(), strength.max() + _TABLE_STEP, _TABLE_STEP)
@@ -298,15 +298,6 @@ def _resolved(strength: Array, gain: Array, seen: Array, free: float | None) -> 
     if free is not None:  # a hole rings on in the readings, which makes them more than it has degrees of freedom
         resolved = resolved * min(free / float(seen @ resolved), 1.0)
     return resolved, freedom
-
-
-def evidence_slope(innovations: Array, log_before: Array, gain: Array, seen: Array, sharper: Array,
-                   free: float | None, counted: Array) -> tuple[float, float]:
-    """Slope of the log evidence in a level that all points ``counted`` (n,) share, and its expected curvature; the
-    rest as ``RoadLevels.learn``."""
-    resolved, freedom = _resolved(log_before + np.log(sharper), gain, seen, free)
-    return (0.5 * float(counted @ (innovations**2 * np.exp(-log_before) - resolved)),
-            0.5 * float(counted @ freedom))
 
 
 @lru_cache(maxsize=32)

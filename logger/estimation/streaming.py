@@ -20,11 +20,11 @@ from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.bent_forces import BentForces
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
 from logger.estimation.iri_posterior import (
-    SlopeErrors,
     WindowIri,
     by_slope,
     reading_noise_psd,
     resolved_share,
+    slope_knowledge,
     unseen_share,
     window_iri,
 )
@@ -114,9 +114,7 @@ class _Answers:
 
     car: LinearCar
     response: CarResponse
-    errors: SlopeErrors
     grid: TimeGrid
-    ride: RidePosterior | None
     bent: BentForces | None
 
 
@@ -174,8 +172,7 @@ class RoadEstimator:
         self._points = ceil(self._piece_m / _SPACING_M)
         self._spacing_m = self._piece_m / self._points
         self._on_road = on_road
-        self._ride_response = ride_response
-        self._ride: RidePosterior | None = None
+        self._ride = None if ride_response is None else RidePosterior(ride_response, BLOCK_SAMPLES, RATE_HZ)
         self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise, noise_log_std)
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
@@ -193,19 +190,9 @@ class RoadEstimator:
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[car] = _Answers(
-            car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
-            TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
-            self._ride_on(response),
+            car, response, TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
         return self._kept[car]
-
-    def _ride_on(self, response: CarResponse) -> RidePosterior | None:
-        """Of one car; what the weighting is does not change with it."""
-        if self._ride_response is None:
-            return None
-        if self._ride is None:
-            self._ride = RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ)
-        return self._ride.of(response)
 
     @property
     def noise_stretches(self) -> int:
@@ -323,8 +310,7 @@ class RoadEstimator:
         # The slope remembers the road shortly before a place.
         log_relative = np.log(np.maximum(by_slope(solved.relative_variance, self._spacing_m),
                                          solved.relative_variance.min()))
-        ride = self._answers.ride
-        weighted = ride.weighted(solved.accel_mps2) if ride is not None else None
+        weighted = self._ride.weighted(solved.accel_mps2) if self._ride is not None else None
         estimates: list[WindowEstimate] = []
         for number in due:
             low = round((number * self._piece_m - block.start_m) / self._spacing_m)
@@ -341,7 +327,7 @@ class RoadEstimator:
                 if weighted is not None:
                     # Of a sample, which has that share of a reading's noise.
                     log_std = self._road.noise_log_std / self._reads
-                    place = RidePlace(speed_mps, variance, *level, self._road.sensor, log_std,
+                    place = RidePlace(block.car, speed_mps, variance, *level, self._road.sensor, log_std,
                                       self._road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, variance, level[0])
@@ -379,11 +365,11 @@ class RoadEstimator:
         self, weighted: Array, samples: RoadSamples, moving: Bools, number: int, place: RidePlace
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
-        assert self._answers.ride is not None
+        assert self._ride is not None
         begin_m = number * self._piece_m + self._ride_ahead_m
         inside = (samples.distance_m >= begin_m) & (samples.distance_m < begin_m + self._piece_m) & moving
         inside[:round(ENTRY_S * RATE_HZ)] = False
-        return self._answers.ride.sums(weighted, inside, ~samples.read, place) if inside.any() else None
+        return self._ride.sums(weighted, inside, ~samples.read, place) if inside.any() else None
 
     def _speed_mps(self, samples: RoadSamples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
@@ -403,7 +389,8 @@ class RoadEstimator:
         spectrum: RoadSpectrum,
         log_level_std: float,
     ) -> _Piece:
-        knowledge = self._answers.errors.at(speed_mps, spectrum, variance)
+        knowledge = slope_knowledge(self._answers.response, speed_mps, spectrum, variance, RATE_HZ, self._spacing_m,
+                                    self._points + 1)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, rise, knowledge, log_level_std, self._piece_m, self._misplaced_m(speed_mps))

@@ -34,7 +34,7 @@ from logger.dsp.repeated_samples import (
     stretches_of,
 )
 from logger.dsp.whole_record import mean_rate_hz, on_even_grid
-from logger.estimation.mounting import MOVED_DEG, angle_rad, has_moved, sitting
+from logger.estimation.drive_alignment import MOVED_DEG, angle_rad, has_moved, sitting
 from logger.geodesy import EARTH_RADIUS_M
 from logger.units import STANDARD_GRAVITY_MPS2
 
@@ -270,7 +270,7 @@ def upwards(time_s: Array, samples: Array) -> tuple[Array, float]:
 
     A turn in the mount is a lasting change of that direction that is larger than braking and curves can feign: within
     the time that is compared a car changes its velocity by no more than ``_CHANGE_MPS``, and what is left is held
-    against the scatter of the blocks (``estimation.mounting``).
+    against the scatter of the blocks (``estimation.drive_alignment``).
     """
     gravity = felt(time_s, samples).mean
     size = float(np.linalg.norm(gravity))

@@ -21,8 +21,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from drivers.disk import FileSystem
-from logger.estimation.drive_alignment import DriveAlignment
-from logger.estimation.mounting import heading_deg
+from logger.estimation.drive_alignment import DriveAlignment, heading_deg
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig

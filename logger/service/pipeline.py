@@ -24,7 +24,7 @@ from logger.comfort.uncertain_ride import NO_FIGURES
 from logger.dsp.windows import Floats, GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
-from logger.estimation.rms_relation import RmsRelation
+from logger.estimation.rms_calibration import RmsRelation
 from logger.estimation.sensor_noise import NoiseBelief
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord

@@ -30,9 +30,9 @@ from logger.errors import BadInput
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import SpectraKeeper
-from logger.estimation.iri_posterior import SlopeErrors
+from logger.estimation.iri_posterior import slope_knowledge
 from logger.estimation.receiver_delay import CarriedDelay
-from logger.estimation.rms_relation import rms_relation
+from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
@@ -252,8 +252,8 @@ def iri_share_std(model: CarModel, sensor: Instrument) -> float:
     for speed_mps in _SPEEDS_MPS:
         response = CarResponse(car.at(speed_mps, WAVE_NUMBERS_CPM, psd),
                                [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in off])
-        errors = SlopeErrors(response, GRID_RATE_HZ, WINDOW_M, 1)
-        shares.append(errors.at(speed_mps, COMMON_ROAD, sensor.sensor.variance_mps2_2).vehicle_std)
+        shares.append(slope_knowledge(response, speed_mps, COMMON_ROAD, sensor.sensor.variance_mps2_2, GRID_RATE_HZ,
+                                      WINDOW_M, 1).vehicle_std)
     return max(shares)
 
 

@@ -26,7 +26,7 @@ from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.whole_record import in_band
 from logger.estimation.batch import estimated, exact_iri
-from logger.estimation.rms_relation import rms_relation
+from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.drive_model import VehicleModel
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White

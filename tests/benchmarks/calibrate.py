@@ -21,8 +21,8 @@ from logger.estimation.rms_calibration import (
     SpeedCalibration,
     calibrate,
     loaded,
+    rms_relation,
 )
-from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
 from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.service.signal_chain import recorder_gain

@@ -43,7 +43,7 @@ import numpy.typing as npt
 
 from logger.dsp.filters import BlockFilter, butterworth_sos, frequency_response
 from logger.estimation.error_bound import ErrorBound, pooled_r2
-from logger.estimation.rms_relation import RmsRelation, rms_relation
+from logger.estimation.rms_calibration import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator

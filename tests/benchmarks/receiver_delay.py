@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from logger.estimation.mounting import angle_rad
+from logger.estimation.drive_alignment import angle_rad
 from logger.estimation.receiver_delay import DelayEstimate
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator

@@ -61,7 +61,7 @@ def forbid_computing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_json_is_the_contract_and_the_service_s_relation(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from logger.estimation.rms_relation import rms_relation
+    from logger.estimation.rms_calibration import rms_relation
 
     result = Call(capsys, car, "--json").json()
     assert list(result)[:2] == ["vehicle", "speeds"]

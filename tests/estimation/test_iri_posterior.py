@@ -7,12 +7,7 @@ import pytest
 from scipy.signal import sosfilt
 
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope, steady_motion
-from logger.estimation.iri_posterior import (
-    SlopeErrors,
-    resolved_share,
-    unseen_share,
-    window_iri,
-)
+from logger.estimation.iri_posterior import SlopeKnowledge, resolved_share, slope_knowledge, unseen_share, window_iri
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.shipped import vehicle_file
@@ -55,6 +50,11 @@ def simulated(speed_mps: float, spectrum: RoadSpectrum, variance: float) -> tupl
     return tuple(np.fft.irfft(row, COUNT) for row in rows)
 
 
+def knowledge_at(speed_mps: float, spectrum: RoadSpectrum, deviation: float) -> SlopeKnowledge:
+    """For readings of this deviation [m/s2], over the lags of a window."""
+    return slope_knowledge(CAR, speed_mps, spectrum, deviation**2, RATE_HZ, SPACING_M, POINTS + 1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [4.5, 13.4, 31.3])
 @pytest.mark.parametrize(("iri", "waviness", "deviation"), [(1.0, 2.0, 0.06), (4.0, 1.7, 0.06), (3.0, 2.3, 0.25)])
@@ -62,7 +62,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     """Variance of the slope and of the acceleration, their correlation, bias and spread of 2560 windows' IRI."""
     spectrum = RoadSpectrum.of_iri(iri, waviness)
     true, found, accel, fitted = simulated(speed_mps, spectrum, deviation**2)
-    knowledge = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1).at(speed_mps, spectrum, deviation**2)
+    knowledge = knowledge_at(speed_mps, spectrum, deviation)
     assert knowledge.variance == pytest.approx(true.var(), rel=0.03)
     # the cut at 42 Hz falls between two waves
     assert float(knowledge.left(np.zeros(1))[0]) == pytest.approx((true - found).var(), rel=0.06)
@@ -92,12 +92,11 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
 def test_the_levels_error_moves_all_windows_alike(rise: float) -> None:
     """The mean over a normally distributed level, and the deviation over it, by sums over many levels."""
     spectrum, level_std = RoadSpectrum.of_iri(1.0), 0.4
-    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
     flat, unseen = np.zeros(POINTS + 1), np.zeros(POINTS + 1)
-    found = window_iri(flat, unseen, flat + rise, errors.at(5.0, spectrum, 0.3**2), level_std, WINDOW_M)
+    found = window_iri(flat, unseen, flat + rise, knowledge_at(5.0, spectrum, 0.3), level_std, WINDOW_M)
     off = np.linspace(-5, 5, 201)
     chance = np.exp(-0.5 * off**2) / np.exp(-0.5 * off**2).sum()
-    left = [errors.at(5.0, rougher(spectrum, rise + level_std * one), 0.3**2).left(np.zeros(1))[0]
+    left = [knowledge_at(5.0, rougher(spectrum, rise + level_std * one), 0.3).left(np.zeros(1))[0]
             for one in off.tolist()]
     each = 1000 * np.sqrt(2 / np.pi * np.array(left))
     assert found.iri_m_per_km == pytest.approx(chance @ each, rel=2e-3)
@@ -111,8 +110,7 @@ def rougher(spectrum: RoadSpectrum, rise: float) -> RoadSpectrum:
 
 def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
     spectrum = RoadSpectrum.of_iri(3.0)
-    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
-    known = errors.at(20.0, spectrum, 0.05**2)
+    known = knowledge_at(20.0, spectrum, 0.05)
     blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), np.zeros(POINTS + 1), known, 0.0, WINDOW_M)
     assert blind.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * known.variance), rel=1e-6)
     assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre

@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from logger.estimation.assessment import Estimable, assess
-from logger.estimation.batch import estimated
+from logger.estimation.batch import Estimable, assess, estimated
 from logger.estimation.car_response import CarResponse
 from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import Block, TimeGrid

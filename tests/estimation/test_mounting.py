@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.estimation.mounting import heading_deg
+from logger.estimation.drive_alignment import heading_deg
 
 from ..support.drives.braking_drives import Instrument, Mounting, Receiver, drive, fed
 from .test_receiver_delay import town

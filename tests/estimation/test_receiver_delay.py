@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from logger.estimation.drive_alignment import DriveAlignment
-from logger.estimation.mounting import angle_rad
+from logger.estimation.drive_alignment import DriveAlignment, angle_rad
 from logger.estimation.receiver_delay import STRENGTHS, CarriedDelay, DelayEstimate, _log_likelihoods, combined
 
 from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive, fed

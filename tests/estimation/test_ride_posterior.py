@@ -120,13 +120,14 @@ def test_a_ride_far_below_a_step_is_not_reported() -> None:
 
 def test_an_unsure_noise_widens_the_errors_and_moves_nothing() -> None:
     structure = half_car(read_vehicle(vehicle_file("rav4-2009")))
-    posterior = RidePosterior(CarResponse(LinearCar(structure, body_point(structure))), WEIGHTING.response, 2048, 100.0)
+    car = CarResponse(LinearCar(structure, body_point(structure)))
+    posterior = RidePosterior(WEIGHTING.response, 2048, 100.0)
     weighted = posterior.weighted(np.random.default_rng(7).standard_normal(2048))
     inside = np.zeros(2048, dtype=np.bool_)
     inside[1000:1060] = True
 
     def figures(noise_log_std: float) -> RideFigures:
-        place = RidePlace(SPEED_MPS, 0.03, COMMON_ROAD, 0.1, Sensor(NOISE_MPS2, STEP_MPS2), noise_log_std)
+        place = RidePlace(car, SPEED_MPS, 0.03, COMMON_ROAD, 0.1, Sensor(NOISE_MPS2, STEP_MPS2), noise_log_std)
         sums = posterior.sums(weighted, inside, np.zeros(2048, dtype=np.bool_), place)
         assert sums is not None
         return sums.figures(0.01)

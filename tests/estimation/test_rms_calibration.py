@@ -7,8 +7,15 @@ import pytest
 from scipy import signal
 
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.estimation.rms_calibration import SPEEDS_MPS, CalibrationSettings, SpeedCalibration, calibrate, fit, loaded
-from logger.estimation.rms_relation import rms_relation
+from logger.estimation.rms_calibration import (
+    SPEEDS_MPS,
+    CalibrationSettings,
+    SpeedCalibration,
+    calibrate,
+    fit,
+    loaded,
+    rms_relation,
+)
 from logger.roads import iso8608
 from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.roads.iri import rectified_slope, window_iri

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from logger.estimation.rms_relation import RmsRelation, rms_relation
+from logger.estimation.rms_calibration import RmsRelation, rms_relation
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle

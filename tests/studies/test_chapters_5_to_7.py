@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.chart_data import Field
-from logger.estimation.rms_relation import rms_relation
+from logger.estimation.rms_calibration import rms_relation
 from logger.roads.iri import iri
 from logger.studies.dissertation import chapter_5, chapter_6_roads
 from logger.studies.drives import (

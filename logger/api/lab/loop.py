@@ -47,7 +47,7 @@ from logger.api.shown import CommandResult, check_out
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
-from logger.estimation.assessment import Assessment, figures
+from logger.estimation.batch import Assessment, figures
 from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments

@@ -22,8 +22,8 @@ from logger.estimation.rms_calibration import (
     CalibrationSettings,
     calibrate,
     loaded,
+    rms_relation,
 )
-from logger.estimation.rms_relation import rms_relation
 from logger.profiles.track import Track
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD

@@ -18,7 +18,7 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.estimation.batch import RoadProfile, band_passed, estimated
 from logger.estimation.error_bound import ErrorBound
-from logger.estimation.rms_relation import rms_relation
+from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.identifiability import NotIdentifiable
