@@ -6,21 +6,62 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from logger.api.csv_extraction import CsvSettings, recorded_csv
 from logger.api.drive_questions import LearnCarQuestion
+from logger.api.extraction import even_drives, recorded_dump
 from logger.api.question import each, function
 from logger.api.shown import CommandResult
+from logger.api.vehicles import Model, read_vehicle
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed
+from logger.estimation.drive_spectra import (
+    BLOCK_S,
+    DRIVE_SPECTRA,
+    DriveSpectra,
+    drive_spectra,
+    joined,
+    middles_hz,
+    spectra_of_fields,
+)
+from logger.identification.unknown_car import (
+    COORDINATES,
+    Array,
+    CarKnowledge,
+    LearnedCar,
+    UnknownCar,
+    iri_errors,
+    iri_ratio,
+    misfit,
+    reading_power,
+)
 from logger.printable import counted
+from logger.runs import READING
+from logger.service.config import Config
+from logger.shipped import vehicle_names, vehicle_path
+from logger.store.formats import vehicle_file
+from logger.store.formats.drive_file import (
+    DISTANCE,
+    DRIVE,
+    SPEED,
+    Drive,
+    drive_of,
+    facts_beside,
+    header_of,
+    read_columns,
+)
+from logger.store.formats.record_file import TIME, VERTICAL, even_rate_hz
+from logger.store.formats.vehicle_file import CarModel, write_model
+from logger.store.log.log_name import LogName, OwnFile, inside_of
+from logger.store.log.sidecar import load_sidecar
 from logger.units import MPH_MPS
-
-if TYPE_CHECKING:
-    from logger.estimation.drive_spectra import DriveSpectra
-    from logger.identification.unknown_car import Array, CarKnowledge, LearnedCar, UnknownCar
-    from logger.store.formats.drive_file import Drive
-    from logger.store.formats.vehicle_file import CarModel
+from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, share_of
+from logger.vehicle.uncertain import NumberErrors
+from logger.vehicle.vehicle import GENERIC
 
 _GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
 """Standard error of where the sensor sits before the middle between the axles; and where nothing is said, within the
@@ -83,8 +124,6 @@ class LearnedVehicle(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the vehicle's file."""
-        from logger.store.formats.vehicle_file import write_model
-
         write_model(path, self.model, self.comments)
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
@@ -100,12 +139,6 @@ class LearnedVehicle(CommandResult):
 
 def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
     """The drives of a dump, a run or a phone's recording. BadInput for one that cannot be read."""
-    from logger.api.csv_extraction import CsvSettings, recorded_csv
-    from logger.api.extraction import even_drives, recorded_dump
-    from logger.service.config import Config
-    from logger.store.formats.drive_file import DRIVE
-    from logger.vehicle.vehicle import GENERIC
-
     if not isinstance(source, str | Path):
         return [source]
     path = Path(source)
@@ -120,9 +153,6 @@ def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
 
 def _is_drive(path: Path) -> bool:
     """Whether a table has the columns of a drive."""
-    from logger.store.formats.drive_file import SPEED, header_of
-    from logger.store.formats.record_file import VERTICAL
-
     if not path.is_file():
         return False
     try:
@@ -133,9 +163,6 @@ def _is_drive(path: Path) -> bool:
 
 def _read_run(path: Path) -> Drive:
     """A run whose distance may be missing."""
-    from logger.store.formats.drive_file import DISTANCE, DRIVE, SPEED, drive_of, facts_beside, read_columns
-    from logger.store.formats.record_file import TIME, even_rate_hz
-
     table = path / DRIVE if path.is_dir() else path
     file, columns = read_columns(table, timed=True, more=(SPEED,))
     drive = drive_of(path, even_rate_hz(columns[TIME], file), {DISTANCE: columns[SPEED], **columns})
@@ -144,10 +171,6 @@ def _read_run(path: Path) -> Drive:
 
 def spectra_of(drive: Drive) -> DriveSpectra:
     """The blocks of a drive, with what is known of its sensor."""
-    import numpy as np
-
-    from logger.estimation.drive_spectra import drive_spectra
-    from logger.runs import READING
 
     facts = drive.facts
     known = [one for one in (facts.noise_mps2, facts.step_mps2 and facts.step_mps2 / 12**0.5) if one]
@@ -173,10 +196,6 @@ class _Used:
 def _of_logs(source: Drive | Path | str) -> list[_Used] | None:
     """What the sidecars of a log, or of a folder of logs, keep of their drives; None where there are no logs. BadInput
     where they keep nothing."""
-    from logger.estimation.drive_spectra import BLOCK_S, DRIVE_SPECTRA, spectra_of_fields
-    from logger.store.log.log_name import LogName, OwnFile, inside_of
-    from logger.store.log.sidecar import load_sidecar
-
     if not isinstance(source, str | Path):
         return None
     path = Path(source)
@@ -237,10 +256,6 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
 
 def learned(question: LearnCarQuestion) -> LearnedVehicle:
     """The answer to ``LearnCarQuestion``, which says what is raised."""
-    import numpy as np
-
-    from logger.estimation.drive_spectra import joined
-    from logger.identification.unknown_car import CarKnowledge, UnknownCar
 
     used = _used(question)
     knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor,
@@ -253,7 +268,7 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     unseen = _checked_drives(used, knowledge, car.x, unlike, question.progress)
     _check_car(problem, car)
     _check_wheelbase(problem, car)
-    uneven = _uneven_dampers()
+    uneven = np.array([_UNEVEN.get(one.rpartition(".")[2], 0.0) for one in COORDINATES])
     missing, covariance = [], car.covariance + np.outer(uneven, uneven)
     if unlike > _TWO_CARS:
         missing, off = [_not_linear(rough, smooth)], (rough.x - smooth.x) / 2
@@ -261,19 +276,11 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     return _answer(question, used, problem, replace(car, covariance=covariance), missing, unseen)
 
 
-def _uneven_dampers() -> Array:
-    """``_UNEVEN`` at its places among the coordinates (p,)."""
-    import numpy as np
-
-    from logger.identification.unknown_car import COORDINATES
-
-    return np.array([_UNEVEN.get(one.rpartition(".")[2], 0.0) for one in COORDINATES])
-
-
 def _not_linear(rough: LearnedCar, smooth: LearnedCar) -> str:
     """What is said of a car that answers rough roads otherwise than smooth ones."""
     name = _most_apart(rough, smooth, _COMPARED[:-1])
-    like = "friction" if rough.x[_place(name)] < smooth.x[_place(name)] else "a progressive spring or damper"
+    at = COORDINATES.index(name)
+    like = "friction" if rough.x[at] < smooth.x[at] else "a progressive spring or damper"
     return (f"This car is not linear: {_words_of(name)} is {_value(rough, name)} on rough road, {_value(smooth, name)} "
             f"on smooth road, as with {like}. The errors hold half the difference; ridelog diagnose over a measured "
             "street finds the effect.")
@@ -281,17 +288,14 @@ def _not_linear(rough: LearnedCar, smooth: LearnedCar) -> str:
 
 def _most_apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> str:
     """Of some numbers the one by which two cars differ most, in standard errors."""
-    return max(names, key=lambda name: abs(one.x[_place(name)] - other.x[_place(name)]) / (
-        one.std[_place(name)]**2 + other.std[_place(name)]**2)**0.5)
+    at = [COORDINATES.index(name) for name in names]
+    return names[int(np.argmax((abs(one.x - other.x) / np.hypot(one.std, other.std))[at]))]
 
 
 def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where the interference between the axles is that of another wheelbase."""
-    import numpy as np
 
-    from logger.identification.unknown_car import UnknownCar
-
-    at = _place("wheelbase_m")
+    at = COORDINATES.index("wheelbase_m")
     free = UnknownCar(problem.spectra, replace(problem.knowledge, wheelbase_std=0.2))
     found = free.fit_of([car.x, *(_moved(car.x, at, step) for step in (-0.1, 0.1))])
     off, std = float(found.x[at] - np.log(problem.knowledge.wheelbase_m)), float(found.std[at])
@@ -313,9 +317,6 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
     """Each drive, or each group of many, with the car of the others. CheckFailed where one is of another car than the
     rest. ``unlike``: logarithm of how many times likelier another car on rough roads than on smooth ones is than one:
     it explains drives that differ."""
-    from logger.estimation.drive_spectra import joined
-    from logger.identification.unknown_car import UnknownCar
-
     groups: list[list[_Used]] = []
     most = -(-sum(len(one.spectra) for one in used) // _MOST_GROUPS)
     for one in used:
@@ -349,18 +350,10 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
 
 
 def _value(car: LearnedCar, name: str) -> str:
-    import numpy as np
 
-    at = _place(name)
+    at = COORDINATES.index(name)
     value = float(np.exp(car.x[at]))
     return f"{value:.3g} ± {value * float(car.std[at]):.1g} {_WORDS[name.rpartition('.')[2]][1]}".strip()
-
-
-def _place(name: str) -> int:
-    """Of a number among the coordinates."""
-    from logger.identification.unknown_car import COORDINATES
-
-    return COORDINATES.index(name)
 
 
 _WORDS = {"bounce_hz": ("body bounce", "Hz"), "damping_ratio": ("damping ratio", ""), "hop_hz": ("wheel hop", "Hz"),
@@ -384,9 +377,6 @@ def _with_unit(number: str) -> str:
 def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where the numbers together are as far from those of published cars as no car's; a worn damper is no
     reason."""
-    import numpy as np
-
-    from logger.vehicle.published_cars import NUMBERS
 
     off = (car.x - problem.knowledge.mean) / problem.knowledge.std
     kept = [at for at, name in enumerate(NUMBERS) if off[at] > -2 or not name.endswith("damping_ratio")]
@@ -400,11 +390,6 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
 
 def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar,
             missing: Sequence[str], unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> LearnedVehicle:
-    import numpy as np
-
-    from logger.api.vehicles import Model
-    from logger.identification.unknown_car import iri_errors
-    from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG
 
     knowledge, own = problem.knowledge, len(NUMBERS)
     errors = _unseen_errors(knowledge, unseen)
@@ -443,9 +428,6 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
 
 def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> dict[str, Any]:
     """How far drives are from any car of this wheelbase, and from the one that was learnt from the others."""
-    import numpy as np
-
-    from logger.identification.unknown_car import UnknownCar, misfit
 
     found = [[misfit(UnknownCar(spectra, knowledge), x) for x in (knowledge.mean, rest.x)] for spectra, rest in unseen]
     before, after = np.sqrt(np.mean(np.square(found), axis=0)).tolist() if found else (None, None)
@@ -453,9 +435,6 @@ def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra,
 
 
 def _shown(name: str, coordinate: float) -> float:
-    import numpy as np
-
-    from logger.vehicle.published_cars import share_of
 
     return share_of(coordinate) if name == "rear_share" else float(np.exp(coordinate))
 
@@ -466,9 +445,6 @@ def _slope(name: str, value: float) -> float:
 
 def _sprung_side_kg(mass_kg: float, x: Array) -> float:
     """Sprung mass of one side of a car that weighs so much with its wheels."""
-    import numpy as np
-
-    from logger.vehicle.published_cars import NUMBERS
 
     share = _shown("rear_share", float(x[NUMBERS.index("rear_share")]))
     ratios = [float(np.exp(x[NUMBERS.index(f"{end}.unsprung_to_sprung")])) for end in ("front", "rear")]
@@ -477,10 +453,6 @@ def _sprung_side_kg(mass_kg: float, x: Array) -> float:
 
 def _number_errors(knowledge: CarKnowledge, car: LearnedCar, mass: float) -> Any:
     """Errors of the numbers of the vehicle's file, that of the common scale left out."""
-    import numpy as np
-
-    from logger.vehicle.named_parameters import read, sized
-    from logger.vehicle.uncertain import NumberErrors
 
     vehicle = knowledge.car(car.x, mass, "")
     names = [one for one in sized(vehicle) if one != "sprung_mass_kg"]
@@ -540,8 +512,6 @@ def _mass_line(question: LearnCarQuestion, mass: float) -> str:
 
 def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float], deviations: Mapping[str, float]
               ) -> Iterator[str]:
-    from logger.identification.unknown_car import misfit
-
     for end in ("front", "rear"):
         name = f"{end}.damping_ratio"
         if values[name] + deviations[name] < _LIMP:
@@ -556,9 +526,6 @@ def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float],
 
 def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
     """What the drives cannot tell, a line each."""
-    import numpy as np
-
-    from logger.vehicle.published_cars import NUMBERS
 
     low, high = np.quantile(problem.spectra.speed_mps, (0.05, 0.95))
     if high < _ONE_SPEED * low:
@@ -575,10 +542,6 @@ def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
 
 def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
     """What has changed since another file was learnt."""
-    import numpy as np
-
-    from logger.api.vehicles import read_vehicle
-    from logger.vehicle.published_cars import NUMBERS, coordinates_of
 
     assert question.compare is not None
     before = read_vehicle(question.compare)
@@ -601,13 +564,6 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
              level: float) -> Iterator[str]:
     """Vehicles that the settings of the drives named and that are not this car: their IRI is off by more than this
     car's error lets it be."""
-    import numpy as np
-
-    from logger.identification.unknown_car import iri_errors, iri_ratio, reading_power
-    from logger.shipped import vehicle_names, vehicle_path
-    from logger.store.formats.vehicle_file import read_vehicle
-    from logger.vehicle.published_cars import NUMBERS, coordinates_of
-    from logger.vehicle.vehicle import GENERIC
 
     said = {one.vehicle for one in used if one.vehicle in vehicle_names()} - {GENERIC}
     if not said:
@@ -615,7 +571,7 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
     errors = iri_errors(knowledge, car.x, car.covariance, speeds_mps, noise, level)
     for name in sorted(said):
         try:
-            x = np.append(coordinates_of(read_vehicle(vehicle_path(name))), car.x[len(NUMBERS):])
+            x = np.append(coordinates_of(vehicle_file.read_vehicle(vehicle_path(name))), car.x[len(NUMBERS):])
         except ValueError:  # a quarter car says nothing of two axles
             continue
         bias = np.array([iri_ratio(reading_power(knowledge, x, speed), reading_power(knowledge, car.x, speed), speed,
@@ -632,10 +588,6 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
 
 def _coordinate_errors(model: CarModel) -> Array:
     """Standard errors of a model's coordinates, out of those of its numbers; 0 where it says none."""
-    import numpy as np
-
-    from logger.vehicle.named_parameters import changed, read
-    from logger.vehicle.published_cars import NUMBERS, coordinates_of
 
     if model.errors is None:
         return np.zeros(len(NUMBERS))
@@ -653,9 +605,6 @@ def _coordinate_errors(model: CarModel) -> Array:
 
 def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
     """Measured and expected spectra of thirds of the speeds."""
-    import numpy as np
-
-    from logger.estimation.drive_spectra import middles_hz
 
     f_hz, speeds = middles_hz(), problem.spectra.speed_mps
     edges = np.quantile(speeds, (0.0, 1 / 3, 2 / 3, 1.0))
