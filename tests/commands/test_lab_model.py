@@ -105,7 +105,7 @@ def test_what_cannot_be_written_is_refused_first(command: str, runs: list[str], 
         (out / "lab" / "vehicle-3.yaml").mkdir(parents=True)
     with pytest.raises(BadInput, match=words):
         main([*COMMANDS[command](out), *given])
-    with pytest.raises(BadInput, match="a run's" if command != "lab" else "expected a folder"):
+    with pytest.raises(BadInput, match="belong to a run" if command != "lab" else "expected a folder"):
         main([*aimed(COMMANDS[command](tmp_path), Path(runs[0]) / "drive.csv"), *given])
 
 

@@ -1,45 +1,46 @@
-"""Options within a range: what lies outside is named with its option, and no number at all is argparse's complaint."""
+"""Options within a range: what lies outside is named with its option, and no number at all with its unit."""
 
 from __future__ import annotations
 
-import argparse
-from math import inf
+from math import inf, nan
+from pathlib import Path
 
 import pytest
 
-from logger.api.question import named_numbers
-from logger.commands.options import add_number
+from logger.api.question import Range, named_numbers
+from logger.commands.main import main
 from logger.errors import BadInput
 
 
-@pytest.fixture
-def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(exit_on_error=False)
-    add_number(parser, "--rate", 10.0, 1000.0, "Hz", default=100.0, help="samples a second")
-    add_number(parser, "--tries", 0, inf, kind=int, default=0)
-    return parser
+@pytest.mark.parametrize(("within", "value"), [(Range(10.0, 1000.0, "Hz"), 10.0), (Range(10.0, 1000.0, "Hz"), 1e3),
+                                               (Range(0, inf), 12345678)])
+def test_numbers_within_their_range_are_taken(within: Range, value: float) -> None:
+    within.check("--rate", value)
 
 
-def test_numbers_within_their_range_are_taken(parser: argparse.ArgumentParser) -> None:
-    for text, rate_hz in (("10", 10.0), ("1e3", 1000.0)):
-        assert parser.parse_args(["--rate", text, "--tries", "12345678"]) == argparse.Namespace(
-            rate=rate_hz, tries=12345678)
-    assert parser.parse_args([]).rate == 100.0
-
-
-@pytest.mark.parametrize(("arguments", "complaint"), [
-    (["--rate", "9.99"], "^--rate 9.99: expected 10 to 1000 Hz$"), (["--rate", "nan"], "--rate nan: expected 10"),
-    (["--tries", "-12345678"], "^--tries -12345678: expected 0 or more$")])
-def test_others_are_refused_by_name(parser: argparse.ArgumentParser, arguments: list[str], complaint: str) -> None:
+@pytest.mark.parametrize(("within", "value", "complaint"), [
+    (Range(10.0, 1000.0, "Hz"), 9.99, "^--rate 9.99: expected 10 to 1000 Hz$"),
+    (Range(10.0, 1000.0, "Hz"), nan, "--rate nan: expected 10"),
+    (Range(0, inf), -12345678, "^--rate -12345678: expected 0 or more$")])
+def test_others_are_refused_by_name(within: Range, value: float, complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):
-        parser.parse_args(arguments)
+        within.check("--rate", value)
 
 
-def test_what_is_no_number_is_said_with_the_unit(parser: argparse.ArgumentParser) -> None:
+@pytest.mark.parametrize(("option", "complaint"), [("--range", "expected 0.5 to 1000 g"),
+                                                   ("--speed", "expected 0.5 to 100 m/s")])
+def test_extract_refuses_numbers_out_of_range(option: str, complaint: str, tmp_path: Path) -> None:
+    for value in ("0.4", "nan"):
+        with pytest.raises(BadInput, match=f"^{option} {value}: {complaint}$"):
+            main(["extract", "--csv", "ride.csv", "--out", str(tmp_path), option, value])
+
+
+def test_what_is_no_number_is_said_with_the_unit(tmp_path: Path) -> None:
+    asked = ["simulate", "--vehicle", "rav4-2009", "--profile", "60", "--speed", "9", "--out", str(tmp_path / "d.csv")]
     with pytest.raises(BadInput, match=r"^--rate 30mph: expected a number in Hz, without its unit$"):
-        parser.parse_args(["--rate", "30mph"])
-    with pytest.raises(BadInput, match=r"^--tries 1\.5: expected a whole number$"):
-        parser.parse_args(["--tries", "1.5"])
+        main([*asked, "--rate", "30mph"])
+    with pytest.raises(BadInput, match=r"^--seed 1\.5: expected a whole number$"):
+        main([*asked, "--seed", "1.5"])
 
 
 def test_an_equals_sign_in_place_of_the_colon_is_named() -> None:
