@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -119,20 +119,17 @@ class CarKnowledge:
         return car_of(x[:own], wheelbase_m, sprung_mass_kg, sensor, name)
 
 
-def band_gains(knowledge: CarKnowledge, x: Array, speed_mps: Array, spread: Array) -> Array:
-    """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at speeds (s,) that have a
-    standard deviation of a share ``spread`` (s,)."""
-    vehicle = knowledge.car(x, 1.0, "")
-    structure = half_car(vehicle)
-    f_hz = grid_hz()
-    by_axle = frequency_response(structure, [body_point(structure, vehicle.sensor.ahead_m)], f_hz)[:, 0, :]
-    n = f_hz / speed_mps[:, None]
-    turn = 2 * np.pi * n * structure.behind_m.max()
-    both = by_axle[:, 0] * by_axle[:, 1].conj()
-    power = (np.abs(by_axle) ** 2).sum(axis=1) + 2 * np.exp(-0.5 * (turn * spread[:, None]) ** 2) * (
-        both.real * np.cos(turn) - both.imag * np.sin(turn))
-    power *= np.sinc(n * structure.contact_patch_m) ** 2 * (n / PIVOT_CPM) ** -WAVINESS / speed_mps[:, None]
-    return np.asarray(power @ expected().T)
+def interference(n_cpm: Array, spread: Array, behind_m: float) -> tuple[Array, Array]:
+    """What real and imaginary part of the product of both axles' gains count for at wave numbers (s, f): twice the
+    cosine and the sine of the rear one's delay, fading as speeds have a standard deviation of a share ``spread``."""
+    turn = 2 * np.pi * n_cpm * behind_m
+    fading = 2 * np.exp(-0.5 * (turn * spread[:, None]) ** 2)
+    return fading * np.cos(turn), fading * np.sin(turn)
+
+
+def road_under(n_cpm: Array, speed_mps: Array, contact_patch_m: float) -> Array:
+    """Spectrum over time (s, f) of what the patch makes of a road of waviness 2 and level 1 [1/Hz per m3]."""
+    return np.asarray(np.sinc(n_cpm * contact_patch_m) ** 2 * (n_cpm / PIVOT_CPM) ** -WAVINESS / speed_mps[:, None])
 
 
 @dataclass(eq=False)
@@ -181,10 +178,21 @@ class UnknownCar:
         self.power = np.where(seen, spectra.power, 1.0)
         self.noise = np.where(np.isfinite(spectra.noise), np.maximum(spectra.noise, _LEAST_NOISE), _LEAST_NOISE)
         self.stretches = int(spectra.stretch.max(initial=-1)) + 1
+        n_cpm = grid_hz() / self.speed_mps[:, None]
+        # All but one of the derivatives are at the same wheelbase, and at the same patch.
+        self._interference = lru_cache(2)(partial(interference, n_cpm, self.spread))
+        self._road_under = lru_cache(2)(partial(road_under, n_cpm, self.speed_mps))
 
     def gains(self, x: Array) -> Array:
-        """As ``band_gains`` at the speeds of the drives (s, k)."""
-        return band_gains(self.knowledge, x, self.speed_mps, self.spread)
+        """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at the drives' speeds.
+        """
+        vehicle = self.knowledge.car(x, 1.0, "")
+        structure = half_car(vehicle)
+        point = [body_point(structure, vehicle.sensor.ahead_m)]
+        front, rear = frequency_response(structure, point, grid_hz())[:, 0, :].T
+        both, (even, odd) = front * rear.conj(), self._interference(float(structure.behind_m.max()))
+        power = np.abs(front) ** 2 + np.abs(rear) ** 2 + even * both.real - odd * both.imag
+        return np.asarray((power * self._road_under(structure.contact_patch_m)) @ expected().T)
 
     def expected_power(self, x: Array, roads: BlockRoads, gains: Array | None = None) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
