@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -48,16 +49,45 @@ ON_BOARD = [name for name in SOURCES if name.startswith("logger.service.")] + [
 ]
 
 
-@cache
+@dataclass(frozen=True)
+class Used:
+    """What rules ask of a module. Its tree is let go: all of them together are 160 MB, which every search for garbage
+    would go through.
+
+    names    of modules, or in them, that it imports, wherever in it the import stands
+    prints   lines that print; clocks: lines that ask the system for the date
+    writes   whether it may write a file
+    """
+
+    names: frozenset[str]
+    prints: tuple[int, ...]
+    clocks: tuple[int, ...]
+    writes: bool
+
+
 def tree(module: str) -> ast.Module:
     """A module as it is written."""
     return ast.parse(SOURCES[module].read_text("utf-8"))
 
 
 @cache
-def nodes(module: str) -> tuple[ast.AST, ...]:
-    """All that stands in it."""
-    return tuple(ast.walk(tree(module)))
+def used(module: str) -> Used:
+    """By a module."""
+    names: set[str] = set()
+    prints, clocks, is_writing = [], [], False
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} imports relatively"
+            names |= {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Name) and node.id == "print":
+            prints.append(node.lineno)
+        elif isinstance(node, ast.Attribute) and node.attr in WALL_CLOCKS.get(
+                getattr(node.value, "attr", getattr(node.value, "id", "")), ()):
+            clocks.append(node.lineno)
+        is_writing |= writes(node)
+    return Used(frozenset(names), tuple(prints), tuple(clocks), is_writing)
 
 
 def floor_of(module: str) -> str:
@@ -69,17 +99,9 @@ MODULES = [name for name in SOURCES if name.startswith("logger.") and floor_of(n
 DESK = {floor_of(name) for name in MODULES} - CARRIED
 
 
-@cache
 def imports(module: str) -> frozenset[str]:
-    """Every module or name that a module imports, wherever in it the import stands."""
-    found = set()
-    for node in nodes(module):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{module} imports relatively"
-            found |= {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return frozenset(found)
+    """Every module or name that a module imports."""
+    return used(module).names
 
 
 def closure(start: list[str]) -> set[str]:
@@ -207,9 +229,8 @@ print(json.dumps(sorted(sys.modules)))
 
 
 def test_only_commands_print() -> None:
-    elsewhere = [module for module in SOURCES if not module.startswith("logger.commands.")]
-    assert not [(module, node.lineno) for module in elsewhere for node in nodes(module)
-                if isinstance(node, ast.Name) and node.id == "print"]
+    assert not [(module, used(module).prints) for module in SOURCES
+                if used(module).prints and not module.startswith("logger.commands.")]
 
 
 WALL_CLOCKS = {"time": {"time", "time_ns", "localtime", "gmtime", "ctime", "CLOCK_REALTIME"},
@@ -218,9 +239,7 @@ WALL_CLOCKS = {"time": {"time", "time_ns", "localtime", "gmtime", "ctime", "CLOC
 
 def test_nothing_asks_the_system_for_the_date() -> None:
     """A Pi boots without a date and its clock may jump; time comes from the monotonic clock and the GPS."""
-    attributes = ((module, node) for module in SOURCES for node in nodes(module) if isinstance(node, ast.Attribute))
-    assert not [(module, node.lineno) for module, node in attributes if node.attr in WALL_CLOCKS.get(
-        getattr(node.value, "attr", getattr(node.value, "id", "")), ())]
+    assert not [(module, used(module).clocks) for module in SOURCES if used(module).clocks]
 
 
 WRITING = {"write_text", "write_bytes", "savetxt", "savez", "savez_compressed", "tofile", "savefig",
@@ -260,8 +279,7 @@ def writes(node: ast.AST) -> bool:
 
 
 def test_files_are_written_in_one_place() -> None:
-    found = {module for module in SOURCES if any(map(writes, nodes(module)))}
-    assert found == set(WRITERS_OF_FILES)
+    assert {module for module in SOURCES if used(module).writes} == set(WRITERS_OF_FILES)
     for words in ("open(a, 'w')", "a.open(mode='x')", "a.write_text(b)", "np.savetxt(a, b)", "figure.savefig(a)",
                   "ZipFile(a, 'w')", "a.replace(b)", "os.open(a, os.O_WRONLY)", "pq.write_table(b, a)"):
         assert writes(ast.parse(words, mode="eval").body), words
