@@ -54,7 +54,7 @@ Shape = Callable[[Array], Array]
 RATE_HZ = 100
 BUMP_MPS, BRIDGE_MPS = 16.1 / 3.6, 48.3 / 3.6
 BUMP_HEIGHT_M, BUMP_WIDTH_M, STEP_M = 0.150, 2.60, 0.0381
-SPACING_M, ROAD_SPACING_M = 0.02, 0.05
+SPACING_M = 0.02
 _BEFORE_M, _BEHIND_M = 80.0, 80.0
 
 
@@ -121,9 +121,10 @@ def drive_over(road: Track, speed_mps: float, conditions: Conditions, vehicle: V
 def random_road(iri_m_per_km: float, length_m: float, seed: int, waviness: float = STANDARD_WAVINESS) -> Track:
     """A random road whose places count from 0 m to its length, with some more before and behind, of this IRI on the
     average of such roads."""
+    road_spacing_m = 0.05
     whole_m = _BEFORE_M + length_m + _BEHIND_M
     gd_n0_cm3 = (iri_m_per_km / iri_per_root_gd(waviness)) ** 2
-    return Track(ROAD_SPACING_M, generate(gd_n0_cm3, whole_m, ROAD_SPACING_M, seed, waviness), -_BEFORE_M)
+    return Track(road_spacing_m, generate(gd_n0_cm3, whole_m, road_spacing_m, seed, waviness), -_BEFORE_M)
 
 
 def places_m(road: Track) -> Array:

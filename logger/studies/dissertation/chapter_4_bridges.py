@@ -56,19 +56,18 @@ from logger.studies.study import (
 from logger.units import MPH_MPS
 from logger.vehicle.models import structure_of
 
-_STEP_AT_M_F4_30, _SECONDS_F4_30 = 10.0, 4.0
-_STILL = 0.02  # of the peak: the body has swung out
-
 
 def _f4_30(effort: Workload) -> Result:
-    (record,) = (record_of(bridge(_STEP_AT_M_F4_30), BRIDGE_MPS, _SECONDS_F4_30, Conditions(noise_mps2=0.0))
+    step_at_m = 10.0
+    still = 0.02  # of the peak: the body has swung out
+    (record,) = (record_of(bridge(step_at_m), BRIDGE_MPS, 4.0, Conditions(noise_mps2=0.0))
                  for _ in effort.each(range(1)))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
     accel, time_s = record.measured_mps2, np.arange(len(record.measured_mps2)) / record.rate_hz
-    front_s = _STEP_AT_M_F4_30 / BRIDGE_MPS
+    front_s = step_at_m / BRIDGE_MPS
     front = (time_s >= front_s) & (time_s < front_s + wheelbase_m / BRIDGE_MPS)
     peaks = [float(np.abs(accel[part]).max()) for part in (front, time_s >= front_s + wheelbase_m / BRIDGE_MPS)]
-    shaken_s = float(time_s[np.abs(accel) > _STILL * max(peaks)].max()) - front_s
+    shaken_s = float(time_s[np.abs(accel) > still * max(peaks)].max()) - front_s
     table = Table("A step of 38.1 mm at 48.3 km/h (printed as a picture only)", (
         Column("rear axle behind the front [s]", ".3f"), Column("peak from the front axle [m/s2]", ".2f"),
         Column("from the rear axle [m/s2]", ".2f"), Column("shaken for [s]", ".1f")),
@@ -77,7 +76,7 @@ def _f4_30(effort: Workload) -> Result:
                f"of within {shaken_s:.1f} s. Height and speed of the printed figure are not given, nor "
                "what it looks like; those of the analysis that follows it are taken.")
     pictures = (Picture(Curves("Input", "time [s]", "elevation under the tire [mm]", tuple(
-        Line(name, time_s, 1000 * bridge(_STEP_AT_M_F4_30, STEP_M)(record.distance_m - behind_m))
+        Line(name, time_s, 1000 * bridge(step_at_m, STEP_M)(record.distance_m - behind_m))
         for name, behind_m in (("front", 0.0), ("rear", wheelbase_m)))), "the step as the input of the model"),
         Picture(Curves("Output", "time [s]", "acceleration [m/s2]", (Line("body", time_s, accel),)),
                 "the simulated response to it"))
@@ -101,14 +100,13 @@ F4_30 = Study("fig_4_30", "Input and output of a bridge's step", "Fig 4.30, sect
                           "Height and speed of the figure are not printed; it is simulated under those of Fig 4.31."),))
 
 
-PRINTED_SPEED, PRINTED_MPH = 48.3, 30.0
-HEIGHTS_M_F4_31 = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
-_STEP_AT_M_F4_31, _SECONDS_F4_31 = 20.0, 6.0
+_STEP_AT_M_F4_31 = 20.0
 
 
 def _f4_31(effort: Workload) -> Result:
-    record = without_profile(record_of(bridge(_STEP_AT_M_F4_31), BRIDGE_MPS, _SECONDS_F4_31, Conditions()))
-    heights = effort.some(HEIGHTS_M_F4_31, 3)
+    heights_m = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
+    record = without_profile(record_of(bridge(_STEP_AT_M_F4_31), BRIDGE_MPS, 6.0, Conditions()))
+    heights = effort.some(heights_m, 3)
     white, masses = (np.array(ends) for ends in zip(*([_mass(record, height, ours) for ours in (False, True)]
                                                       for height in effort.each(heights)), strict=True))
     in_proportion = TRUTH[MASS] * np.array(heights) / STEP_M
@@ -118,8 +116,8 @@ def _f4_31(effort: Workload) -> Result:
         Column("ours, innovations form [kg]", ".1f")),
         tuple(zip((1000 * np.array(heights)).tolist(), in_proportion.tolist(), white.tolist(), masses.tolist(),
                   strict=True)))
-    taken = RoadInput(step=RoadStep(_STEP_AT_M_F4_31, HEIGHTS_M_F4_31[0]))
-    place = {"step.height_m": HEIGHTS_M_F4_31[0], "step.start_m": _STEP_AT_M_F4_31}
+    taken = RoadInput(step=RoadStep(_STEP_AT_M_F4_31, heights_m[0]))
+    place = {"step.height_m": heights_m[0], "step.start_m": _STEP_AT_M_F4_31}
     known, both = fitted(record, place, True, taken), fitted(record, {MASS: 700.0, **place}, True, taken)
     ours = Table("Ours: the step estimated", (
         Column("what is known"), Column("height [mm]", ".2f"), Column("its standard error [mm]", ".2f"),
@@ -158,7 +156,7 @@ def _f4_31(effort: Workload) -> Result:
               *about("4.4.5 height from a known mass", [Value(
                   "height with the mass known, true 38.1 [mm]", 1000 * STEP_M, 1000 * known.parameters["step.height_m"],
                   3000 * known.standard_errors["step.height_m"])]),
-              *about("4.4.5 speed", [Value("48.3 m/s [mph]", PRINTED_MPH, PRINTED_SPEED / MPH_MPS, 0.5, Word.MISPRINT,
+              *about("4.4.5 speed", [Value("48.3 m/s [mph]", 30.0, 48.3 / MPH_MPS, 0.5, Word.MISPRINT,
                                            of_print=True)]))
     return Result((table, ours), verdict, (picture,), values)
 
@@ -178,21 +176,19 @@ F4_31 = Study("fig_4_31", "Mass by the height that a bridge's step is taken for"
                      Item("4.4.5 speed", Word.MISPRINT, "30 mph are 48.3 km/h, not m/s.")))
 
 
-PRINTED_IRI = 2.0
-_STEP_AT_M_F4_32, _LENGTH_M_F4_32, _SEED = 50.0, 100.0, 0
-_BEHIND_M = 15.0  # both axles are over the step and the body has swung out
-
-
 def _f4_32(effort: Workload) -> Result:
-    conditions = Conditions(noise_mps2=0.0, iri_m_per_km=PRINTED_IRI, seed=_SEED)
-    (record,) = (record_of(bridge(_STEP_AT_M_F4_32, -STEP_M), BRIDGE_MPS, _LENGTH_M_F4_32 / BRIDGE_MPS, conditions)
+    printed_iri = 2.0
+    step_at_m, length_m, seed = 50.0, 100.0, 0
+    behind_m = 15.0  # both axles are over the step and the body has swung out
+    conditions = Conditions(noise_mps2=0.0, iri_m_per_km=printed_iri, seed=seed)
+    (record,) = (record_of(bridge(step_at_m, -STEP_M), BRIDGE_MPS, length_m / BRIDGE_MPS, conditions)
                  for _ in effort.each(range(1)))
     accel, distance_m = record.measured_mps2, record.distance_m
-    hit = (distance_m >= _STEP_AT_M_F4_32) & (distance_m < _STEP_AT_M_F4_32 + _BEHIND_M)
+    hit = (distance_m >= step_at_m) & (distance_m < step_at_m + behind_m)
     peaks = [float(np.abs(accel[part]).max()) for part in (hit, ~hit)]
-    place_m = np.arange(0, _LENGTH_M_F4_32, SPACING_M)
-    road = generate(gd_n0_from_iri(PRINTED_IRI), _LENGTH_M_F4_32, SPACING_M, _SEED)[: len(place_m)]
-    stepped = road + bridge(_STEP_AT_M_F4_32, -STEP_M)(place_m)
+    place_m = np.arange(0, length_m, SPACING_M)
+    road = generate(gd_n0_from_iri(printed_iri), length_m, SPACING_M, seed)[: len(place_m)]
+    stepped = road + bridge(step_at_m, -STEP_M)(place_m)
     table = Table("The step and the road (printed as pictures only)", (
         Column("what"), Column("IRI of the 100 m [m/km]", ".2f"), Column("largest acceleration [m/s2]", ".2f")),
         (("the road without the step, printed IRI 2", iri(road, SPACING_M), peaks[1]),
@@ -207,10 +203,10 @@ def _f4_32(effort: Workload) -> Result:
                 Picture(Curves("The car's answer (Fig 4.33)", "distance [m]", "acceleration [m/s2]",
                                (Line("body", distance_m, accel),)),
                         "the response, in which the step is clear beside the rest of the road"))
-    spread = relative_spread(_LENGTH_M_F4_32)
-    values: tuple[Check, ...] = (*about("Fig 4.32", [Value("IRI of the road without the step [m/km]", PRINTED_IRI,
+    spread = relative_spread(length_m)
+    values: tuple[Check, ...] = (*about("Fig 4.32", [Value("IRI of the road without the step [m/km]", printed_iri,
                                                            iri(road, SPACING_M),
-                                        PRINTED_IRI * (0.01 + 3 * spread), Word.NOT_REPRODUCIBLE)]),
+                                        printed_iri * (0.01 + 3 * spread), Word.NOT_REPRODUCIBLE)]),
               *about("Fig 4.33", [Statement("peak at the step over the peak elsewhere", "clearly shows the effect of "
                                                                                         "the "
                                             "bump", peaks[0] / peaks[1], 2.0, word=Word.NOT_REPRODUCIBLE)]))
@@ -227,14 +223,14 @@ F4_32 = Study("fig_4_32", "A bridge's step on a smooth road, and the car's answe
 
 
 PRINTED_PEAK_MPS2 = 1.5
-UNCOMFORTABLE = (0.8, 2.5)
-"""From the lower end of uncomfortable to the upper end of very uncomfortable, Table 2.5 [m/s2]."""
 SECTIONS_M = (1.0, 10.0)
 OF_ONE_SIZE = 0.4  # a metre is a thirteenth of a second: where it begins moves its a_w by 0.2; as much for "close to"
-_STEP_AT_M_F4_34, _SECONDS_F4_34, _LENGTH_M_F4_34 = 50.0, 8.0, 100.0
+_LENGTH_M_F4_34 = 100.0
 
 
 def _f4_34(effort: Workload) -> Result:
+    # From the lower end of uncomfortable to the upper end of very uncomfortable, Table 2.5 [m/s2].
+    uncomfortable = (0.8, 2.5)
     roads = effort.count(20)
     found = [_sections(seed) for seed in effort.each(range(roads))]
     rows = tuple((section, PRINTED_PEAK_MPS2 if section == 1 else None, float(found[0][index].max()),
@@ -259,7 +255,7 @@ def _f4_34(effort: Workload) -> Result:
         *about("Fig 4.34", [Value("largest a_w of a metre, nearly [m/s2]", PRINTED_PEAK_MPS2, each, OF_ONE_SIZE,
                                   Word.NOT_REPRODUCIBLE)]),
         *about("Fig 4.34", [Statement("largest a_w of a metre [m/s2]", "uncomfortable to very uncomfortable", each,
-                                      UNCOMFORTABLE[0], UNCOMFORTABLE[1], Word.NOT_REPRODUCIBLE)]),
+                                      uncomfortable[0], uncomfortable[1], Word.NOT_REPRODUCIBLE)]),
         *about("Fig 4.35", [
             Statement("largest a_w of 10 m [m/s2]", "still clear that the bump causes a discomfort", tens,
                       COMFORT_WORDS[-2][0], word=Word.NOT_REPRODUCIBLE),
@@ -269,7 +265,7 @@ def _f4_34(effort: Workload) -> Result:
 
 def _sections(seed: int) -> list[Array]:
     """a_w [m/s2] of each section of the way, for both lengths of a section."""
-    record = record_of(bridge(_STEP_AT_M_F4_34, -STEP_M), BRIDGE_MPS, _SECONDS_F4_34, Conditions(0.0, 0.0, 2.0, seed))
+    record = record_of(bridge(50.0, -STEP_M), BRIDGE_MPS, 8.0, Conditions(0.0, 0.0, 2.0, seed))
     return [per_section(record, section_m, _LENGTH_M_F4_34) for section_m in SECTIONS_M]
 
 
@@ -291,39 +287,36 @@ F4_34 = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m
                           "m.")))
 
 
-HEIGHTS_M_F4_36 = (0.0127, 0.0254, 0.0381, 0.0508, 0.0635)
-SPEEDS_KMH = (16.1, 32.2, 48.3, 64.4, 80.5, 96.6)
-_STEP_AT_M_F4_36, _LENGTH_M_F4_36, _SECTION_M = 20.0, 60.0, 1.0
-_LIMITS = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
-
-
 def _f4_36(effort: Workload) -> Result:
-    speeds = np.array(effort.some(SPEEDS_KMH, 3))
+    heights_m = (0.0127, 0.0254, 0.0381, 0.0508, 0.0635)
+    speeds_kmh = (16.1, 32.2, 48.3, 64.4, 80.5, 96.6)
+    LIMITS = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
+    speeds = np.array(effort.some(speeds_kmh, 3))
     # The car is linear: one height is enough for all.
     per_metre = np.array([_peak(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M
-    peaks = np.outer(HEIGHTS_M_F4_36, per_metre)
+    peaks = np.outer(heights_m, per_metre)
     table = Table("Largest a_w of a metre (printed as a picture only)", (
         Column("step [mm]", ".1f"), *(Column(f"{kmh:.0f} km/h [m/s2]", ".2f") for kmh in speeds),
         Column(f"in words at {speeds[-1]:.0f} km/h")), tuple(
         (1000 * height, *row, comfort_word(row[-1]).replace("_", " "))
-        for height, row in zip(HEIGHTS_M_F4_36, peaks.tolist(), strict=True)))
+        for height, row in zip(heights_m, peaks.tolist(), strict=True)))
     own = _peak(STEP_M, BRIDGE_MPS)
     values: tuple[Check, ...] = (Value("38.1 mm at 48.3 km/h, nearly, from Fig 4.34 [m/s2]", PRINTED_PEAK_MPS2, own,
                                        OF_ONE_SIZE,
                     Word.NOT_REPRODUCIBLE),
               Statement("least of the figure [m/s2]", "points below the green line, comfortable", float(peaks.min()),
                         0.0,
-                        _LIMITS[0][0], Word.NOT_REPRODUCIBLE),
+                        LIMITS[0][0], Word.NOT_REPRODUCIBLE),
               Statement("largest of the figure [m/s2]", "points above the red line, a noticeable discomfort",
-                        float(peaks.max()), _LIMITS[1][0], word=Word.NOT_REPRODUCIBLE))
+                        float(peaks.max()), LIMITS[1][0], word=Word.NOT_REPRODUCIBLE))
     verdict = ("In proportion to the height, as the car is linear; with the speed it rises steeply up to 32 km/h and "
                "slowly beyond, as a metre gets shorter than the blow. Where a metre begins moves its a_w by a tenth "
                "either way. The lines for comfort are those of Table 2.5 here, a little uncomfortable from 0.315 and "
                "uncomfortable from 0.8 m/s2, for the text does not say which ones were drawn.")
     lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height,
-                  row in zip(HEIGHTS_M_F4_36, peaks, strict=True))
+                  row in zip(heights_m, peaks, strict=True))
     limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit))
-                   for limit, word in _LIMITS)
+                   for limit, word in LIMITS)
     picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
                       "dots for heights and speeds, and two lines across: comfortable below the green one, a "
                       "noticeable discomfort above the red one")
@@ -331,9 +324,10 @@ def _f4_36(effort: Workload) -> Result:
 
 
 def _peak(height_m: float, speed_mps: float) -> float:
-    seconds = (_LENGTH_M_F4_36 + 2) / speed_mps
-    record = record_of(bridge(_STEP_AT_M_F4_36, -height_m), speed_mps, seconds, Conditions(noise_mps2=0.0))
-    return float(per_section(record, _SECTION_M, _LENGTH_M_F4_36).max())
+    length_m = 60.0
+    seconds = (length_m + 2) / speed_mps
+    record = record_of(bridge(20.0, -height_m), speed_mps, seconds, Conditions(noise_mps2=0.0))
+    return float(per_section(record, 1.0, length_m).max())
 
 
 F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by its height and the speed", "Fig 4.36, section 4.4.6",

@@ -76,21 +76,18 @@ PRINTED_PERCENT = {
 }
 """A row per start mass, a column per start stiffness."""
 NAMES = {MASS: "sprung mass (Table 4.4)", FRONT: "front stiffness (Table 4.5)", REAR: "rear stiffness (Table 4.6)"}
-START_MASSES_KG = (700.0, 800.0, 900.0, 1000.0, 1100.0)
-START_RATES_N_PER_M = (20_000.0, 21_250.0, 22_500.0, 23_750.0, 25_000.0)
-ROADS = 200
-_IRI = 5.0
-_SECONDS_T4_4, _BUMP_AT_M_T4_4 = 12.0, 8.0
 _TYPICAL = {MASS: 800.0, FRONT: 22_000.0, REAR: 22_000.0}
 
 
 def _t4_4(effort: Workload) -> Result:
-    masses = effort.some(list(enumerate(START_MASSES_KG)))
-    rates = effort.some(list(enumerate(START_RATES_N_PER_M)))
+    start_masses_kg = (700.0, 800.0, 900.0, 1000.0, 1100.0)
+    start_rates_n_per_m = (20_000.0, 21_250.0, 22_500.0, 23_750.0, 25_000.0)
+    masses = effort.some(list(enumerate(start_masses_kg)))
+    rates = effort.some(list(enumerate(start_rates_n_per_m)))
     record = _drive(0)
     ends = [[fitted(record, {MASS: mass, FRONT: rate, REAR: rate}, ours=True) for _, rate in rates]
             for _, mass in masses]
-    drives = [_drive(seed) for seed in range(effort.count(ROADS, 6))]
+    drives = [_drive(seed) for seed in range(effort.count(200, 6))]
     draws = [tuple(fitted(one, _TYPICAL, ours) for ours in (False, True)) for one in effort.each(drives)]
     tables: list[Table] = []
     values: list[Check] = []
@@ -119,7 +116,7 @@ def _t4_4(effort: Workload) -> Result:
 
 
 def _drive(seed: int) -> Run:
-    return record_of(bump(_BUMP_AT_M_T4_4), BUMP_MPS, _SECONDS_T4_4, Conditions(iri_m_per_km=_IRI, seed=seed))
+    return record_of(bump(8.0), BUMP_MPS, 12.0, Conditions(iri_m_per_km=5.0, seed=seed))
 
 
 def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int, float]], errors: Array,
@@ -151,28 +148,25 @@ T4_4 = Study("table_4_4", "Mass and both stiffnesses together, from 25 starts", 
                           "themselves."))
 
 
-WINDOWS_M_F4_19 = (15.0, 100.0)
-PRINTED_IRI = 5.0
-_BUMP_AT_M_F4_19 = 5.0
-_BUMP_ENDS_M = 15.0  # both axles are over it and the body has swung out
-
-
 def _f4_19(effort: Workload) -> Result:
-    (whole,) = (record_of(bump(_BUMP_AT_M_F4_19), BUMP_MPS, (WINDOWS_M_F4_19[-1] + 1) / BUMP_MPS,
-                          Conditions(iri_m_per_km=PRINTED_IRI)) for _ in effort.each(range(1)))
+    windows_m = (15.0, 100.0)
+    bump_at_m = 5.0
+    bump_ends_m = 15.0  # both axles are over it and the body has swung out
+    (whole,) = (record_of(bump(bump_at_m), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS,
+                          Conditions(iri_m_per_km=5.0)) for _ in effort.each(range(1)))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
     rows, pictures = [], []
     values: list[Statement] = []
-    road = float(np.std(whole.measured_mps2[whole.distance_m >= _BUMP_ENDS_M]))
-    for figure, window in zip(("4.19", "4.20"), WINDOWS_M_F4_19, strict=True):
+    road = float(np.std(whole.measured_mps2[whole.distance_m >= bump_ends_m]))
+    for figure, window in zip(("4.19", "4.20"), windows_m, strict=True):
         record = until(whole, window)
         time_s = np.arange(len(record.distance_m)) / record.rate_hz
-        over = record.distance_m < _BUMP_ENDS_M
+        over = record.distance_m < bump_ends_m
         rms = [float(np.sqrt(np.mean(record.measured_mps2[part] ** 2))) if part.any() else None
                for part in (over, ~over)]
         share = float(np.sum(record.measured_mps2[over] ** 2) / np.sum(record.measured_mps2**2))
         rows.append((window, float(time_s[-1]), float(np.abs(record.measured_mps2).max()), *rms, 100 * share))
-        inputs = {name: 1000 * bump(_BUMP_AT_M_F4_19)(record.distance_m - behind_m)
+        inputs = {name: 1000 * bump(bump_at_m)(record.distance_m - behind_m)
                   for name, behind_m in (("front", 0.0), ("rear", wheelbase_m))}
         pictures += [
             Picture(Curves(f"Input in a window of {window:g} m (Fig {figure})", "time [s]",
@@ -210,16 +204,12 @@ F4_19 = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m"
                           "described."))
 
 
-WINDOWS_M_F4_21 = tuple(float(end) for end in range(5, 101, 5))
-_BUMP_AT_M_F4_21 = 1.0
-BOTH_AXLES_M = 10.0
-VERY_CLOSE = 0.02  # two standard errors of ours on such a road are twice that
-
-
 def _f4_21(effort: Workload) -> Result:
-    whole = record_of(bump(_BUMP_AT_M_F4_21), BUMP_MPS, (WINDOWS_M_F4_21[-1] + 1) / BUMP_MPS,
+    windows_m = tuple(float(end) for end in range(5, 101, 5))
+    very_close = 0.02  # two standard errors of ours on such a road are twice that
+    whole = record_of(bump(1.0), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS,
                       Conditions(iri_m_per_km=5.0))
-    windows = effort.some(WINDOWS_M_F4_21, 4)
+    windows = effort.some(windows_m, 4)
     white, ours = zip(*([fitted(until(whole, window), {MASS: 800.0}, ours=way) for way in (False, True)]
                         for window in effort.each(windows)), strict=True)
     mass, expected = (np.array([getattr(one, what)[MASS] for one in ours]) for what in ("parameters",
@@ -240,8 +230,8 @@ def _f4_21(effort: Workload) -> Result:
         Line("white noise, their way", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
         "the mass from windows of 5 to 100 m, very close to 875 kg for each")
     values = tuple(Value(f"mass, the worst window from {least:g} m, {way} [kg]", TRUTH[MASS], _worst(
-        found, np.array(windows) >= least), VERY_CLOSE * TRUTH[MASS], Word.NOT_REPRODUCIBLE)
-                   for way, found, least in (("their way", their_mass, BOTH_AXLES_M), ("ours", mass, 0.0)))
+        found, np.array(windows) >= least), very_close * TRUTH[MASS], Word.NOT_REPRODUCIBLE)
+                   for way, found, least in (("their way", their_mass, 10.0), ("ours", mass, 0.0)))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -258,19 +248,17 @@ F4_21 = Study("fig_4_21", "Mass from windows of 5 to 100 m", "Fig 4.21, section 
                           "axles are over the bump, as the text says."),))
 
 
-PRINTED_STARTS_KG = tuple(np.linspace(700, 1100, 20).tolist())
-PRINTED_WITHIN_PERCENT = 6.0
-_WIDER_KG = (300.0, 400.0, 550.0, 1500.0, 2000.0, 3000.0)
-
-
 def _f4_22(effort: Workload) -> Result:
+    printed_starts_kg = tuple(np.linspace(700, 1100, 20).tolist())
+    printed_within_percent = 6.0
+    wider_kg = (300.0, 400.0, 550.0, 1500.0, 2000.0, 3000.0)
     record = record_of(bump(8.0), BUMP_MPS, 12.0, Conditions(iri_m_per_km=5.0))
-    kg = sorted([*effort.some(PRINTED_STARTS_KG), *effort.some(_WIDER_KG)])
+    kg = sorted([*effort.some(printed_starts_kg), *effort.some(wider_kg)])
     found = [fitted(record, {MASS: start}, ours=True) for start in effort.each(kg)]
     starts = np.array(kg)
     ends = np.array([one.parameters[MASS] for one in found])
     standard_error = found[0].standard_errors[MASS]
-    said = f"within {PRINTED_WITHIN_PERCENT:g} % of 875"
+    said = f"within {printed_within_percent:g} % of 875"
     rows = tuple((float(start), said if 699 < start < 1101 else None, float(end), 100 * float(end / TRUTH[MASS] - 1))
                  for start, end in zip(starts, ends, strict=True))
     table = Table("Mass, by where the fit starts", (Column("start [kg]", ".1f"), Column("printed end [kg]"),
@@ -283,7 +271,7 @@ def _f4_22(effort: Workload) -> Result:
                              (Line("start", starts, starts), Line("end", starts, ends, dots=True)),
                              (TRUTH[MASS], "875 kg")), "the masses from 20 starts, all within 6 % of 875 kg")
     values = (Statement("largest error of any start [%]", "all within 6 % of 875 kg",
-                        100 * float(np.abs(ends / TRUTH[MASS] - 1).max()), 0.0, PRINTED_WITHIN_PERCENT,
+                        100 * float(np.abs(ends / TRUTH[MASS] - 1).max()), 0.0, printed_within_percent,
                         Word.NOT_REPRODUCIBLE),
               Statement("the ends differ by up to [kg]", "effective from every start", float(np.ptp(ends)), 0.0, 0.01,
                         Word.NOT_REPRODUCIBLE))
@@ -298,20 +286,18 @@ F4_22 = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4
                           "the printed 6 %."),))
 
 
-HEIGHTS_M_F4_25 = (0.1016, 0.1270, 0.1524, 0.1778, 0.2032)
-WIDTHS_M_F4_25 = (1.83, 2.13, 2.44, 2.74, 3.05, 3.35)
-PRINTED_PEAK_G = 0.8703  # Table 5.5, measured on speed bumps
-
-
 def _f4_25(effort: Workload) -> Result:
-    heights, widths = effort.some(HEIGHTS_M_F4_25), effort.some(WIDTHS_M_F4_25)
+    heights_m = (0.1016, 0.1270, 0.1524, 0.1778, 0.2032)
+    widths_m = (1.83, 2.13, 2.44, 2.74, 3.05, 3.35)
+    printed_peak_g = 0.8703  # Table 5.5, measured on speed bumps
+    heights, widths = effort.some(heights_m), effort.some(widths_m)
     peaks = np.array([[_peak(height, width) for width in widths] for height in effort.each(heights)])
     columns = (Column("height [mm]", ".1f"), *(Column(f"width {width:.2f} m [m/s2]", ".2f") for width in widths))
     rows = tuple((1000 * height, *map(float, row)) for height, row in zip(heights, peaks, strict=True))
     own = _peak(BUMP_HEIGHT_M, BUMP_WIDTH_M)
     one = Table("The bump of 5.5.2, 150 mm by 2.60 m",
                 (Column("printed, Table 5.5 [g]", ".4f"), Column("ours [g]", ".4f")),
-                ((PRINTED_PEAK_G, own / STANDARD_GRAVITY_MPS2),))
+                ((printed_peak_g, own / STANDARD_GRAVITY_MPS2),))
     verdict = ("As the source says, a higher bump gives a larger peak and a wider one a smaller. The car is linear, "
                "so the peak is exactly proportional to the height; no number of the figure is in the text. Over the "
                f"bump of 5.5.2 the model peaks at {own / STANDARD_GRAVITY_MPS2:.2f} g, the record on a row of speed "
@@ -341,47 +327,47 @@ F4_25 = Study("fig_4_25", "Peak acceleration by height and width of a bump", "Fi
                           "numbers in the text."),))
 
 
-HEIGHTS_M_F4_27 = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())
-WIDTHS_M_F4_27 = tuple(round(0.3048 * feet, 3) for feet in np.arange(6, 11.01, 0.5).tolist())
-PRINTED_LIMIT_PERCENT, PRINTED_LEAST_MM = 50.0, 72.2
-_BUMP_AT_M_F4_27, _SECONDS_F4_27 = 8.0, 8.0
-_SHOWN = 2  # every other grid point is in the table, all are in the picture
-_NUMBERS = ((MASS, "mass [kg]", TRUTH[MASS]), ("bump.height_m", "height [m]", BUMP_HEIGHT_M),
-            ("bump.width_m", "width [m]", BUMP_WIDTH_M), ("speed_scale", "recorded speed over true", 1.0))
+_BUMP_AT_M_F4_27 = 8.0
 
 
 def _f4_27(effort: Workload) -> Result:
-    drive = record_of(bump(_BUMP_AT_M_F4_27), BUMP_MPS, _SECONDS_F4_27, Conditions())
+    heights_m = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())
+    widths_m = tuple(round(0.3048 * feet, 3) for feet in np.arange(6, 11.01, 0.5).tolist())
+    printed_limit_percent = 50.0
+    shown = 2  # every other grid point is in the table, all are in the picture
+    numbers = ((MASS, "mass [kg]", TRUTH[MASS]), ("bump.height_m", "height [m]", BUMP_HEIGHT_M),
+               ("bump.width_m", "width [m]", BUMP_WIDTH_M), ("speed_scale", "recorded speed over true", 1.0))
+    drive = record_of(bump(_BUMP_AT_M_F4_27), BUMP_MPS, 8.0, Conditions())
     record = without_profile(drive)
-    heights, widths = effort.some(HEIGHTS_M_F4_27, 3), effort.some(WIDTHS_M_F4_27, 3)
+    heights, widths = effort.some(heights_m, 3), effort.some(widths_m, 3)
     errors = np.array([[_error_percent(record, height, width) for width in widths] for height in effort.each(heights)])
     columns = (Column("height taken [mm]", ".1f"),
-               *(Column(f"width taken {width:.2f} m [%]", "+.1f") for width in widths[::_SHOWN]))
-    rows = tuple((1000 * height, *row[::_SHOWN].tolist())
-                 for height, row in zip(heights[::_SHOWN], errors[::_SHOWN], strict=True))
+               *(Column(f"width taken {width:.2f} m [%]", "+.1f") for width in widths[::shown]))
+    rows = tuple((1000 * height, *row[::shown].tolist())
+                 for height, row in zip(heights[::shown], errors[::shown], strict=True))
     taken = Bump(_BUMP_AT_M_F4_27, 0.1016, 3.05)
     found = mass_and_bump(record, taken)
     ours = Table("Ours: mass, bump and speed together, beginning with a bump taken for 101.6 mm by 3.05 m", (
         Column("number"), Column("truth", ".4g"), Column("estimate", ".5g"), Column("standard error", ".2g")), tuple(
-        (words, truth, found.parameters[name], found.standard_errors[name]) for name, words, truth in _NUMBERS))
+        (words, truth, found.parameters[name], found.standard_errors[name]) for name, words, truth in numbers))
     best = [widths[int(np.abs(row).argmin())] for row in errors]
     verdict = ("The slanting valley of the printed picture is there: least error for a bump taken for "
                f"{1000 * heights[0]:.0f} mm by {best[0]:.2f} m up to {1000 * heights[-1]:.0f} mm by {best[-1]:.2f} m; "
                "taken for wider, it has to be taken for higher as well. The source cuts its errors at "
-               f"{PRINTED_LIMIT_PERCENT:g} %, the picture here too; its 72.2 mm is a misprint for 76.2 (3 in). The "
+               f"{printed_limit_percent:g} %, the picture here too; its 72.2 mm is a misprint for 76.2 (3 in). The "
                "valley is one of a fit of the mass alone. The wrong bumps in it leave far more behind than noise "
                "does, so the record does tell height and width: fitted together with the mass they come out to a "
                "fraction of a per cent.")
     picture = Picture(Field("Size of the error of the mass, by what the bump is taken for", "width taken [m]",
                             "height taken [mm]", np.array(widths), 1000 * np.array(heights), np.abs(errors),
-                            "error [%]", PRINTED_LIMIT_PERCENT),
+                            "error [%]", printed_limit_percent),
                       "errors up to 50 % over heights of 3 to 9 in and widths of 6 to 11 ft, from two sides: a dark "
                       "blue region of right masses that slants")
     right_m = [float(np.interp(0.0, -row, widths)) for row in errors]  # the wider, the lighter the car
     return Result((Table("Their way: error of the mass, fitted alone (printed as a picture only)",
                          columns, rows), ours),
                   verdict, (picture,), (
-                      *about("4.4.3 least height", [Value("3 in [mm]", PRINTED_LEAST_MM, 1000 * HEIGHTS_M_F4_27[0], 0.5,
+                      *about("4.4.3 least height", [Value("3 in [mm]", 72.2, 1000 * heights_m[0], 0.5,
                                                           Word.MISPRINT, of_print=True)]),
                       *about(("Fig 4.26", "Fig 4.27"), [
                           Statement("width of a right mass at the largest height, less that at the smallest [m]",

@@ -49,15 +49,15 @@ from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz
 from logger.vehicle.structure import Structure
 
-PRINTED_HZ_T4_1, PRINTED_DAMPING_T4_1 = (1.2, 11.0), 0.40
 COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, coupled [Hz]", ".3f"),
            Column("springs and tires in series [Hz]", ".3f"), Column("as it rings [Hz]", ".3f"),
            Column("printed damping", ".2f"), Column("in series, damping", ".3f"), Column("as it rings, damping", ".3f"))
 
 
 def _t4_1(effort: Workload) -> Result:
+    printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
-    (rows,) = (quoted(car, ("body", "wheel"), PRINTED_HZ_T4_1, (PRINTED_DAMPING_T4_1, None)) for _
+    (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _
                in effort.each(range(1)))
     verdict = ("The printed frequencies are those of the coupled car without its damper, to their last figure. The "
                "printed damping ratio is, nearly, that of a body on spring and tire in series with the damper beside "
@@ -101,24 +101,22 @@ T4_1 = Study("table_4_1", "Natural frequencies of the quarter car (the Golden Ca
                           "The frequencies agree to their last printed figure, the damping ratio within 0.005."),))
 
 
-PRINTED_HZ_T4_2, PRINTED_DAMPING_T4_2 = (1.1, 11.0), 0.30
-CURB_KG, PERSON_KG, PRINTED_MASS_KG = 1524.07, 72.57, 875.0
-
-
 def _t4_2(effort: Workload) -> Result:
-    names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), PRINTED_HZ_T4_2
+    printed_hz = (1.1, 11.0)
+    printed_mass_kg = 875.0
+    names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), printed_hz
     (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None),
-                      (PRINTED_DAMPING_T4_2, None, None, None))
+                      (0.30, None, None, None))
                for _ in effort.each(range(1)))
-    by_eq = (CURB_KG / 1.15 + 2 * PERSON_KG) / 2
+    by_eq = (1524.07 / 1.15 + 2 * 72.57) / 2
     verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. "
                "The damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, "
                "rounded. The mass does not follow from the text: by Eq 4.36 half a car with two people has "
-               f"{by_eq:.0f} kg, not {PRINTED_MASS_KG:.0f}; 875 is taken as the published car. The inertia is in kg "
+               f"{by_eq:.0f} kg, not {printed_mass_kg:.0f}; 875 is taken as the published car. The inertia is in kg "
                "m2, not kg/m2; and the pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are "
                "right.")
     values = (*quoted_values(rows, damping_within=0.015),
-              Value("half of the car with two people, Eq 4.36 [kg]", PRINTED_MASS_KG, by_eq, 1.0, Word.MISPRINT,
+              Value("half of the car with two people, Eq 4.36 [kg]", printed_mass_kg, by_eq, 1.0, Word.MISPRINT,
                     of_print=True))
     return Result((Table("Vibrations of the half car", COLUMNS, rows),), verdict, (), values)
 
@@ -131,18 +129,18 @@ T4_2 = Study("table_4_2", "Natural frequencies of the half car (RAV4)", "Table 4
 
 
 PRINTED_T4_3 = (("A", 32.0, 3.05), ("B", 128.0, 6.09), ("C", 512.0, 12.19), ("D", 2048.0, 24.37))
-_ROADS_T4_3, _LENGTH_M_T4_3, _SPACING_M_T4_3 = 60, 1000.0, 0.05
 
 
 def _t4_3(effort: Workload) -> Result:
-    roads = effort.count(_ROADS_T4_3, 4)
+    length_m, spacing_m = 1000.0, 0.05
+    roads = effort.count(60, 4)
     # One seed is one set of phases: the roads of all classes are alike but for their level.
-    found = np.array([[iri(generate(gd, _LENGTH_M_T4_3, _SPACING_M_T4_3, seed), _SPACING_M_T4_3) for _, gd,
+    found = np.array([[iri(generate(gd, length_m, spacing_m, seed), spacing_m) for _, gd,
                        _ in PRINTED_T4_3]
                       for seed in effort.each(range(roads))])
     mean, std = found.mean(axis=0), found.std(axis=0)
     gds = np.array([gd for _, gd, _ in PRINTED_T4_3])
-    rows = tuple((name, gd, limit, float(one), float(spread), iri_of_road(gd, _LENGTH_M_T4_3).value)
+    rows = tuple((name, gd, limit, float(one), float(spread), iri_of_road(gd, length_m).value)
                  for (name, gd, limit), one, spread in zip(PRINTED_T4_3, mean, std, strict=True))
     table = Table("Upper limits of the classes", (
         Column("class"), Column("printed Gd(n0) [cm3]", ".0f"), Column("printed IRI [m/km]", ".2f"),
@@ -153,7 +151,7 @@ def _t4_3(effort: Workload) -> Result:
     relation = Table("IRI = c Gd^b",
                      (Column("number"), Column("printed, Eq 4.39", ".4f"), Column("ours, generated", ".4f"),
                                       Column("ours, computed", ".4f")),
-                     (("c", IRI_PER_ROOT_GD, factor, iri_of_road(1.0, _LENGTH_M_T4_3).value), ("b", 0.5, power, 0.5)))
+                     (("c", IRI_PER_ROOT_GD, factor, iri_of_road(1.0, length_m).value), ("b", 0.5, power, 0.5)))
     verdict = (f"The relation agrees: {factor:.4f} beside the printed {IRI_PER_ROOT_GD}, and the power is one half "
                "because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 to "
                "2.83 cycle/m the factor is 0.543. It holds for a waviness of 2 and long roads only; 100 m scatter by "
@@ -162,7 +160,7 @@ def _t4_3(effort: Workload) -> Result:
         Line("Eq 4.39", np.sqrt(gds), IRI_PER_ROOT_GD * np.sqrt(gds)), Line("ours", np.sqrt(gds), mean, dots=True))),
         "no figure, a table of the upper limits of classes A to D")
     # Sixty roads leave an average in doubt by half a per cent, a few by more; the choice of waves makes one per cent.
-    within = 0.01 + 3 * iri_of_road(1.0, _LENGTH_M_T4_3).std / iri_of_road(1.0, _LENGTH_M_T4_3).value / roads**0.5
+    within = 0.01 + 3 * iri_of_road(1.0, length_m).std / iri_of_road(1.0, length_m).value / roads**0.5
     values = (*(Value(f"class {name}, upper limit [m/km]", limit, float(one), within * limit)
                 for (name, _, limit), one in zip(PRINTED_T4_3, mean, strict=True)),
               Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, within * IRI_PER_ROOT_GD),
@@ -175,36 +173,35 @@ T4_3 = Study("table_4_3", "Degree of roughness and IRI, and Eq 4.39", "Table 4.3
               items=(Item("Table 4.3", Word.AGREES, "The relation agrees within the choice of random roads."),))
 
 
-PRINTED_F4_3 = ((16.0, "very good"), (256.0, "poor"))
-PRINTED_POOR_CM3 = (512.0, 2048.0)
-"""Class D, a poor road by 4.3.4."""
-GD_CM3 = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
 _FIGURES = {16.0: ("Fig 4.3", "Fig 4.5"), 256.0: ("Fig 4.4", "Fig 4.5")}
-_ROADS_F4_3, _LENGTH_M_F4_3, _SPACING_M_F4_3 = 60, 1000.0, 0.1
-_TOLERANCE = 0.05  # of the mean over roads; at Gd of one road's length the longest waves are not averaged out
 
 
 def _f4_3(effort: Workload) -> Result:
-    roads = effort.count(_ROADS_F4_3, 12)
+    printed = ((16.0, "very good"), (256.0, "poor"))
+    printed_poor_cm3 = (512.0, 2048.0)  # Class D, a poor road by 4.3.4.
+    gd_cm3 = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
+    length_m, spacing_m = 1000.0, 0.1
+    tolerance = 0.05  # of the mean over roads; at Gd of one road's length the longest waves are not averaged out
+    roads = effort.count(60, 12)
     rows = []
     values: list[Check] = []
-    for gd in effort.each(GD_CM3):
-        rms_mm = np.array([1000 * float(np.std(generate(gd, _LENGTH_M_F4_3, _SPACING_M_F4_3, seed))) for seed
+    for gd in effort.each(gd_cm3):
+        rms_mm = np.array([1000 * float(np.std(generate(gd, length_m, spacing_m, seed))) for seed
                            in range(roads)])
         expected = 1000 * _rms_m(gd)
-        quality = dict(PRINTED_F4_3).get(gd)
+        quality = dict(printed).get(gd)
         rows.append((gd, road_class(gd), quality, expected, float(rms_mm.mean()), float(rms_mm.std())))
         values += about(_FIGURES.get(gd, ("Fig 4.5",)), [
             Value(f"r.m.s. elevation at {gd:.0f} cm3, of Eq 4.2 and ours [mm]", expected, float(rms_mm.mean()),
-                  _TOLERANCE * expected)])
+                  tolerance * expected)])
     values += about("Fig 4.4", [Statement("Gd of the road [cm3]", "poor, as a road of class D in 4.3.4",
-                                          PRINTED_F4_3[1][0],
-                                          *PRINTED_POOR_CM3, Word.MISPRINT)])
+                                          printed[1][0],
+                                          *printed_poor_cm3, Word.MISPRINT)])
     # Without 2 pi every wave is 2 pi times as long, and there are 2 pi times as many in a step of wave number.
-    asked = PRINTED_F4_3[1][0]
+    asked = printed[1][0]
     values += about("Eq 4.1", [Value(
         f"Gd(n0) of a road made for {asked:.0f} cm3, by Eq 4.1 as printed [cm3]", asked / (2 * np.pi),
-        classify(generate(asked, _LENGTH_M_F4_3, _SPACING_M_F4_3, 0), _SPACING_M_F4_3).gd_n0_cm3, asked / 4,
+        classify(generate(asked, length_m, spacing_m, 0), spacing_m).gd_n0_cm3, asked / 4,
         Word.MISPRINT)])
     table = Table(f"R.m.s. elevation of {roads} roads of 1 km", (
         Column("Gd(n0) [cm3]", ".0f"), Column("class"), Column("printed quality"),
@@ -219,13 +216,13 @@ def _f4_3(effort: Workload) -> Result:
                "for the road's length, so that nothing repeats.")
     place = np.arange(0, 200.0, 0.5)
     shown = tuple(Line(f"{gd:.0f} cm3, {quality}", place, 1000 * generate(gd, 200.0, 0.5, 0)[: len(place)])
-                  for gd, quality in PRINTED_F4_3)
-    gds = np.array(GD_CM3)
+                  for gd, quality in printed)
+    gds = np.array(gd_cm3)
     means, stds = (np.array([row[at] for row in rows], dtype=float) for at in (4, 5))
     pictures = (Picture(Curves("Two roads (Fig 4.3, 4.4)", "distance [m]", "elevation [mm]", shown),
                         "a picture each of a generated profile, 16 cm3 and 256 cm3"),
                 Picture(Curves("R.m.s. elevation and its scatter (Fig 4.5)", "Gd(n0) [cm3]", "r.m.s. elevation [mm]", (
-                    Line("ours", gds, means, stds), Line("Eq 4.2", gds, np.array([1000 * _rms_m(gd) for gd in GD_CM3]),
+                    Line("ours", gds, means, stds), Line("Eq 4.2", gds, np.array([1000 * _rms_m(gd) for gd in gd_cm3]),
                                                          dots=True)), log_x=True, log_y=True),
                     "r.m.s. elevations of generated profiles from 1 to 1024 cm3, their means near those of Da Silva "
                     "(2004), with a large scatter"))
@@ -249,37 +246,35 @@ F4_3 = Study("fig_4_3", "Generated roads, and how high they are", "Fig 4.3, sect
                      Item("Eq 4.1", Word.MISPRINT, "Its argument lacks 2 pi, which Appendix A has: n is in cycle/m.")))
 
 
-PRINTED_POWER = 0.5
-RANGE_CM3 = (2.0, 4096.0)
-_SETS_F4_16, _ROADS_F4_16, _LENGTH_M_F4_16, _SPACING_M_F4_16 = 4, 100, 500.0, 0.1
-
-
 def _f4_16(effort: Workload) -> Result:
-    roads = effort.count(_ROADS_F4_16, 12)
-    gd = np.geomspace(*RANGE_CM3, roads)
-    found = np.array([[iri(generate(one, _LENGTH_M_F4_16, _SPACING_M_F4_16, number * roads + place), _SPACING_M_F4_16)
-                       for place, one in enumerate(gd.tolist())] for number in effort.each(range(_SETS_F4_16))])
+    printed_power = 0.5
+    range_cm3 = (2.0, 4096.0)
+    sets, length_m, spacing_m = 4, 500.0, 0.1
+    roads = effort.count(100, 12)
+    gd = np.geomspace(*range_cm3, roads)
+    found = np.array([[iri(generate(one, length_m, spacing_m, number * roads + place), spacing_m)
+                       for place, one in enumerate(gd.tolist())] for number in effort.each(range(sets))])
     fits = [_power_law(gd, one) for one in found]
-    power, factor = _power_law(np.tile(gd, _SETS_F4_16), found.ravel())
+    power, factor = _power_law(np.tile(gd, sets), found.ravel())
     # From road to road the IRI of so short a road has this spread, so the regression has these standard errors.
-    spread = iri_of_road(1.0, _LENGTH_M_F4_16).std / iri_of_road(1.0, _LENGTH_M_F4_16).value
-    terms = np.column_stack([np.ones(_SETS_F4_16 * roads), np.log(np.tile(gd, _SETS_F4_16))])
+    spread = iri_of_road(1.0, length_m).std / iri_of_road(1.0, length_m).value
+    terms = np.column_stack([np.ones(sets * roads), np.log(np.tile(gd, sets))])
     factor_std, power_std = (spread * np.sqrt(np.diag(np.linalg.inv(terms.T @ terms)))).tolist()
     values = about(("Fig 4.16", "Fig 4.17"), [
         Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
-        Value("b of IRI = c Gd^b", PRINTED_POWER, power, 3 * power_std)])
+        Value("b of IRI = c Gd^b", printed_power, power, 3 * power_std)])
     table = Table(f"Power laws through {roads} roads each", (
         Column("set"), Column("c", ".4f"), Column("b", ".4f")),
         (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
-         ("ours, all", factor, power), ("printed, Eq 4.39", IRI_PER_ROOT_GD, PRINTED_POWER),
-         ("ours, computed", iri_of_road(1.0, _LENGTH_M_F4_16).value, 0.5)))
+         ("ours, all", factor, power), ("printed, Eq 4.39", IRI_PER_ROOT_GD, printed_power),
+         ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
     verdict = (f"Four sets of {roads} roads lie about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
                "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
                "errors of the regression (the length of the printed roads is not given; ours have 500 m and differ by "
                f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to "
                "2.83 cycle/m the factor is 0.543.")
     dots = tuple(Line(f"set {number + 1}", gd, one, dots=True) for number, one in enumerate(found))
-    law = Line("Eq 4.39", gd, IRI_PER_ROOT_GD * gd**PRINTED_POWER)
+    law = Line("Eq 4.39", gd, IRI_PER_ROOT_GD * gd**printed_power)
     pictures = tuple(Picture(Curves(title, "Gd(n0) [cm3]", "IRI [m/km]", (*dots, law), log_x=logarithmic,
                                     log_y=logarithmic), printed)
                      for title, logarithmic, printed in (
@@ -301,26 +296,24 @@ F4_16 = Study("fig_4_16", "IRI of 400 random roads by their degree of roughness"
                           "The power law through the roads is Eq 4.39 within the chance of the roads."))
 
 
-WANTED_M_PER_KM = tuple(float(one) for one in range(1, 21))
-_SETS_F4_18, _LENGTH_M_F4_18, _SPACING_M_F4_18 = 2, 500.0, 0.1
-
-
 def _f4_18(effort: Workload) -> Result:
-    wanted = np.array(effort.some(WANTED_M_PER_KM, 10))
-    found = np.array([[iri(generate(gd_n0_from_iri(one), _LENGTH_M_F4_18, _SPACING_M_F4_18, 1000 * number + place),
-                           _SPACING_M_F4_18)
-                       for place, one in enumerate(wanted.tolist())] for number in effort.each(range(_SETS_F4_18))])
+    wanted_m_per_km = tuple(float(one) for one in range(1, 21))
+    length_m, spacing_m = 500.0, 0.1
+    wanted = np.array(effort.some(wanted_m_per_km, 10))
+    found = np.array([[iri(generate(gd_n0_from_iri(one), length_m, spacing_m, 1000 * number + place),
+                           spacing_m)
+                       for place, one in enumerate(wanted.tolist())] for number in effort.each(range(2))])
     slopes = [float(one @ wanted / (wanted @ wanted)) for one in found]
     alike_sets = [float(np.corrcoef(wanted, one)[0, 1]) for one in found]
     # A slope is a mean of the roads' relative errors with weights that grow as the square of the IRI.
-    chance = relative_spread(_LENGTH_M_F4_18) * float(np.sqrt((wanted**4).sum()) / (wanted**2).sum())
+    chance = relative_spread(length_m) * float(np.sqrt((wanted**4).sum()) / (wanted**2).sum())
     values: tuple[Check, ...] = (*(Value(f"set {number + 1}, IRI found per IRI wanted", 1.0, slope, 0.01 + 3 * chance)
                 for number, slope in enumerate(slopes)),
               Statement("correlation, the smaller of both sets", "highly linear", min(alike_sets), least=0.95))
     table = Table("IRI of generated roads", (Column("printed: wanted [m/km]", ".0f"), Column("set 1 [m/km]", ".2f"),
                                              Column("set 2 [m/km]", ".2f")),
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
-    spread = relative_spread(_LENGTH_M_F4_18)
+    spread = relative_spread(length_m)
     verdict = (f"As printed, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
                f"{slopes[0]:.3f} and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within "
                f"{100 * spread:.0f} % r.m.s., which is why the source shows two sets; the tolerance is three standard "

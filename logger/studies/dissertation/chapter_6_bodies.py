@@ -65,23 +65,22 @@ from logger.vehicle.linearise import known_vehicle
 
 PRINTED_KG = ((870.658, 844.053), (927.464, 911.141), (519.555, 660.512), (672.677, 817.204))
 PRINTED_PERCENT = ((0.50, 3.54), (6.00, 4.13), (40.62, 24.51), (23.12, 6.61))
-LOW_PASS_HZ_T6_1 = 20.0
-SPEEDOMETER = (0.1 * 16.1 + 4) / 16.1
-"""Share by which a speedometer may be off at 16.1 km/h: a tenth and 4 km/h (UNECE Regulation 39, 5.4)."""
 CASES_T6_1 = (("all as taken",
           1.0, 1.0, 1.0, 0.0), ("height 5 % more", 1.05, 1.0, 1.0, 0.0), ("height 5 % less", 0.95, 1.0, 1.0, 0.0),
          ("width 5 % more", 1.0, 1.05, 1.0, 0.0), ("width 5 % less", 1.0, 0.95, 1.0, 0.0),
          ("speed 5 % more", 1.0, 1.0, 1.05, 0.0), ("speed 5 % less", 1.0, 1.0, 0.95, 0.0),
          ("road of IRI 5 m/km", 1.0, 1.0, 1.0, 5.0), ("all at once", 0.95, 1.05, 0.95, 5.0))
 """What was true, against what was taken: factors of height, width and speed, and the road's IRI."""
-_OFF, _IRI, _DRIVES = 0.05, 3.0, 40
-_BUMP_AT_M, _SECONDS_T6_1 = 8.0, 8.0
+_OFF = 0.05
 
 
 def _t6_1(effort: Workload) -> Result:
-    drives = effort.count(_DRIVES)
+    # Share by which a speedometer may be off at 16.1 km/h: a tenth and 4 km/h (UNECE Regulation 39, 5.4).
+    speedometer = (0.1 * 16.1 + 4) / 16.1
+    IRI = 3.0
+    drives = effort.count(40)
     factors = np.random.default_rng(1).normal(1.0, _OFF, (drives, 3)).tolist()
-    jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, _IRI) for height, width, speed in factors)]
+    jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, IRI) for height, width, speed in factors)]
     found = [_both_ways(*job, seed=seed) for seed, job in enumerate(effort.each(jobs))]
     cases, draws = found[:len(CASES_T6_1)], np.array(found[len(CASES_T6_1):])
     printed = Table("Printed", (Column("bump", ".0f"), *(Column(f"trial {trial}, {what}", form) for trial in (1, 2)
@@ -99,7 +98,7 @@ def _t6_1(effort: Workload) -> Result:
         ("ours, the same drives",
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
-    many = Table(f"Height, width and speed each off by chance, 5 % r.m.s., on roads of IRI {_IRI:g} m/km", (
+    many = Table(f"Height, width and speed each off by chance, 5 % r.m.s., on roads of IRI {IRI:g} m/km", (
         Column("way"), Column("r.m.s. error [%]", ".1f"), Column("largest [%]", ".1f"),
         Column("truth within two standard errors [%]", ".0f")), rows)
     by_trial = {f"Table 6.{trial}": _rms_t6_1(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
@@ -109,14 +108,14 @@ def _t6_1(effort: Workload) -> Result:
                "trials "
                f"the second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
                f"({by_trial['Table 6.1']:.0f} %) asks for twice as much, or for a speed that is "
-               f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * SPEEDOMETER:.0f} "
+               f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * speedometer:.0f} "
                "% off at 16 km/h (UNECE R39). Bumps 3 and 4 are too light in both trials, so they differ from the "
                f"first two. Estimating bump and speed together with the mass leaves {_rms_t6_1(ours):.1f} %, which is "
                "the "
                "road's roughness, and its standard error says so.")
     values: tuple[Check, ...] = (*(one for item, rms in by_trial.items() for one in about(item, [
         Statement("speed that would have to be off for the printed r.m.s. error [%]", "changes in speed are a possible "
-                  "source of error", rms / per_percent, 0.0, 100 * SPEEDOMETER, Word.NOT_REPRODUCIBLE)])),
+                  "source of error", rms / per_percent, 0.0, 100 * speedometer, Word.NOT_REPRODUCIBLE)])),
         *about(tuple(by_trial), [
             Statement("error with width or speed 5 % off, ours over their way", "discrepancies of width and speed are "
                       "possible sources of error", _largest(cases, 1) / _largest(cases, 0), 0.0, 0.2,
@@ -150,11 +149,12 @@ def _sorted(name: str, errors: np.ndarray) -> Line:
 
 def _both_ways(height: float, width: float, speed: float, iri: float, seed: int) -> tuple[float, float, float]:
     """Error of the mass their way and ours, and ours' standard error [%], for true factors of what is taken."""
+    bump_at_m = 8.0
     conditions = PS_2119.on(iri, seed)
-    true = bump(_BUMP_AT_M, height * BUMP_HEIGHT_M, width * BUMP_WIDTH_M)
-    record = without_profile(record_of(true, speed * BUMP_MPS, _SECONDS_T6_1, conditions), 1 / speed)
-    taken = Bump(_BUMP_AT_M / speed, BUMP_HEIGHT_M, BUMP_WIDTH_M)
-    theirs = fitted(record, {MASS: TRUTH[MASS]}, False, RoadInput(bump=taken), LOW_PASS_HZ_T6_1)
+    true = bump(bump_at_m, height * BUMP_HEIGHT_M, width * BUMP_WIDTH_M)
+    record = without_profile(record_of(true, speed * BUMP_MPS, 8.0, conditions), 1 / speed)
+    taken = Bump(bump_at_m / speed, BUMP_HEIGHT_M, BUMP_WIDTH_M)
+    theirs = fitted(record, {MASS: TRUTH[MASS]}, False, RoadInput(bump=taken), 20.0)
     ours = mass_and_bump(record, taken)
     return error_percent(theirs, MASS), error_percent(ours, MASS), standard_error_percent(ours, MASS)
 
@@ -174,17 +174,14 @@ T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed are not qu
 
 PRINTED_T6_3 = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
            ("2-1", 576.042, 34.17, 460.687, 47.35), ("2-2", 416.843, 52.36, 496.564, 43.25))
-CASES_T6_3 = tuple((step_m, iri) for step_m in (STEP_M, 0.0127) for iri in (0.0, 2.0, 5.0))
-"""True step [m] and the road's IRI [m/km]."""
-CHANCE = 0.58  # twice the standard error of an r.m.s. of six, as a share of it
 REFUSED = "cannot tell"
-_TAKEN_FACTOR = 4 / 3  # the ends of Fig 4.31 are a third off
-_ROADS_T6_3 = 6
-_STEP_AT_M, _SECONDS_T6_3 = 20.0, 6.0
 
 
 def _t6_3(effort: Workload) -> Result:
-    cases, roads = effort.some(CASES_T6_3), effort.count(_ROADS_T6_3)
+    # True step [m] and the road's IRI [m/km].
+    CASES = tuple((step_m, iri) for step_m in (STEP_M, 0.0127) for iri in (0.0, 2.0, 5.0))
+    chance = 0.58  # twice the standard error of an r.m.s. of six, as a share of it
+    cases, roads = effort.some(CASES), effort.count(6)
     jobs = [(step_m, iri, seed) for step_m, iri in cases for seed in range(roads)]
     drives = [_drive(*job) for job in effort.each(jobs)]
     rows = tuple(_row_t6_3(*case, drives[number * roads:(number + 1) * roads]) for number, case in enumerate(cases))
@@ -213,7 +210,7 @@ def _t6_3(effort: Workload) -> Result:
         Statement("drives in which a flat input says nothing of the mass [%]", "an input taken for flat gives "
                   "inconsistent masses", 100 * refused, 100.0, word=Word.NOT_REPRODUCIBLE),
         Statement(f"their way, a step of {1000 * rough_m:.1f} mm on IRI 5 taken a third too high: r.m.s. error [%]",
-                  f"a weak signal; errors of {least:.0f} to {most:.0f} %", theirs, least, most + CHANCE * theirs,
+                  f"a weak signal; errors of {least:.0f} to {most:.0f} %", theirs, least, most + chance * theirs,
                   Word.NOT_REPRODUCIBLE),
         Statement("error of the height for a known mass over its standard error, largest of all", "it can be used to "
                   "determine the step's height", max(abs(error / std) for error, std in (one.height for one in drives)),
@@ -246,9 +243,11 @@ class _Found:
 
 
 def _drive(step_m: float, iri: float, seed: int) -> _Found:
-    record = without_profile(record_of(bridge(_STEP_AT_M, step_m), BRIDGE_MPS, _SECONDS_T6_3, PS_2119.on(iri, seed)))
-    taken = RoadInput(step=RoadStep(_STEP_AT_M, step_m * _TAKEN_FACTOR))
-    place = {"step.height_m": step_m * _TAKEN_FACTOR, "step.start_m": _STEP_AT_M}
+    taken_factor = 4 / 3  # the ends of Fig 4.31 are a third off
+    step_at_m = 20.0
+    record = without_profile(record_of(bridge(step_at_m, step_m), BRIDGE_MPS, 6.0, PS_2119.on(iri, seed)))
+    taken = RoadInput(step=RoadStep(step_at_m, step_m * taken_factor))
+    place = {"step.height_m": step_m * taken_factor, "step.start_m": step_at_m}
     theirs = fitted(record, {MASS: TRUTH[MASS]}, False, taken)
     known = fitted(record, place, True, taken)
     both = _identified(record, {MASS: TRUTH[MASS], **place}, taken)
@@ -286,29 +285,27 @@ T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), se
                           "it."))
 
 
-PRINTED_T6_5 = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavement"),
-           (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
-TO_BE_FOUND = ((12.7, 50.8, "at most", 8), (5.0, 80.0, "at most", 8), (4.0, 20.0, "at least", 7))
-"""Sizes that the source names: steps from where a bridge needs maintenance to where many have one (4.4.5) [mm],
-depressions of Table 2.4 [mm], damaged pavements to the roughest of Table 2.3 [m/km]; and the end of our range, with its
-column, that lies nearest to not being found."""
-MANHOLE_M, EDGE_M = 0.60, 0.05
-_UNIT_M, _SECONDS_T6_5, _ROADS_T6_5 = 0.01, 8.0, 40
-_STARTS_M = tuple(np.arange(50.0, 57.6, 1.0).tolist())
-_NEXT_WORD = {word: limit for (_, word), (limit, _) in zip(COMFORT_WORDS[1:], COMFORT_WORDS, strict=False)}
+_UNIT_M = 0.01
 _LIMIT = {word: limit for limit, word in COMFORT_WORDS}
 
 
 def _t6_5(effort: Workload) -> Result:
-    starts = effort.some(_STARTS_M)
+    PRINTED = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavement"),
+          (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
+    # Sizes that the source names: steps from where a bridge needs maintenance to where many have one (4.4.5) [mm],
+    # depressions of Table 2.4 [mm], damaged pavements to the roughest of Table 2.3 [m/km]; and the end of our range,
+    # with its column, that lies nearest to not being found.
+    to_be_found = ((12.7, 50.8, "at most", 8), (5.0, 80.0, "at most", 8), (4.0, 20.0, "at least", 7))
+    starts_m = tuple(np.arange(50.0, 57.6, 1.0).tolist())
+    starts = effort.some(starts_m)
     per_mm = [np.mean([_a_w_per_unit(shape(start), PRINTED_MPH[segment]) for start in starts]) / (1000 * _UNIT_M)
-              for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(PRINTED_T6_5[:2]), strict=True)]
-    speed = (PRINTED_MPH[PRINTED_T6_5[2][1]] * MPH_MPS,)
-    (line,) = calibrate(known_vehicle(rav4()), None, CalibrationSettings(speed, roads=effort.count(_ROADS_T6_5, 5)))
+              for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(PRINTED[:2]), strict=True)]
+    speed = (PRINTED_MPH[PRINTED[2][1]] * MPH_MPS,)
+    (line,) = calibrate(known_vehicle(rav4()), None, CalibrationSettings(speed, roads=effort.count(40, 5)))
     factors = (*map(float, per_mm), line.a_w_per_iri.slope)
     sizes = ("height of a step [mm]", "depth of a dip of 0.6 m [mm]", "IRI over the window [m/km]")
     rows = tuple(_row_t6_5(printed, what, factor)
-                 for printed, what, factor in zip(PRINTED_T6_5, sizes, factors, strict=True))
+                 for printed, what, factor in zip(PRINTED, sizes, factors, strict=True))
     table = Table("What has to lie there for the printed word", (
         Column("location", ".0f"), Column("segment", ".0f"), Column("printed perception"), Column("printed reason"),
         Column("speed [mph]", ".0f"), Column("size that is asked for"), Column("a_w per unit of it [m/s2]", ".4f"),
@@ -326,7 +323,7 @@ def _t6_5(effort: Workload) -> Result:
     values = tuple(Statement(f"location {number}: {what}, {end}", f"{word.replace('_', ' ')}: {reason}",
                              float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE)
                    for (number, _, word, reason), what, row, (least, most, end, place) in zip(
-                       PRINTED_T6_5, sizes, rows, TO_BE_FOUND, strict=True))
+                       PRINTED, sizes, rows, to_be_found, strict=True))
     picture = Picture(Curves("a_w of the worst window by size", "height of the step, depth of the manhole [mm]",
                              "a_w [m/s2]", (Line("step, 25 mph", depths, factors[0] * depths),
                                             Line("manhole, 20 mph", depths, factors[1] * depths), *limits)),
@@ -339,20 +336,21 @@ def _edge(start_m: float) -> Shape:
 
 
 def _manhole(start_m: float) -> Shape:
-    return lambda place_m: pothole(place_m, start_m, _UNIT_M, MANHOLE_M, EDGE_M)
+    return lambda place_m: pothole(place_m, start_m, _UNIT_M, 0.60, 0.05)
 
 
 def _a_w_per_unit(shape: Shape, mph: int) -> float:
     """Of the worst window over something of 10 mm [m/s2]."""
     quiet = Conditions(noise_mps2=1e-3)
-    a_w: Array = per_window(record_of(shape, mph * MPH_MPS, _SECONDS_T6_5, quiet), quiet,
+    a_w: Array = per_window(record_of(shape, mph * MPH_MPS, 8.0, quiet), quiet,
                             low_pass_hz=LOW_PASS_HZ).a_w_mps2
     return float(a_w.max())
 
 
 def _row_t6_5(printed: tuple[int, int, str, str], what: str, factor: float) -> tuple[Cell, ...]:
+    next_word = {word: limit for (_, word), (limit, _) in zip(COMFORT_WORDS[1:], COMFORT_WORDS, strict=False)}
     number, segment, word, reason = printed
-    low, high = _LIMIT[word] / factor, _NEXT_WORD[word] / factor
+    low, high = _LIMIT[word] / factor, next_word[word] / factor
     ours = comfort_word(factor * (low + high) / 2)
     return (float(number), float(segment), word.replace("_", " "), reason, float(PRINTED_MPH[segment]), what, factor,
             low, high, ours.replace("_", " "))

@@ -65,15 +65,13 @@ from logger.vehicle.linearise import known_vehicle
 
 SPEEDS_MPH = tuple(range(10, 71, 10))
 PRINTED_GD_CM3 = (2.0, 4096.0)
-_LEVELS_MPS2 = np.array([0.0, 2.0])
-_ROADS_F6_6, _DRIVEN_M = 120, 100.0
 
 
 def _f6_6(effort: Workload) -> Result:
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
     cars = (rav4(), loaded(rav4(), passengers=2), loaded(rav4(), sprung_mass_factor=2.0))
     own, two, heavy = (rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
-    settings = CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(_ROADS_F6_6, 10))
+    settings = CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(120, 10))
     (drives,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in
@@ -135,13 +133,14 @@ def _f6_6(effort: Workload) -> Result:
 def _power() -> float:
     """Of the r.m.s. acceleration by the degree of roughness, of one road twice as far up and down, stepped in time."""
     ends = [IRI_PER_ROOT_GD * gd**0.5 for gd in PRINTED_GD_CM3]
-    rms = [drive_over(random_road(iri, _DRIVEN_M, 1), SPEEDS_MPH[3] * MPH_MPS, Conditions(0.0)).measured_mps2.std()
+    rms = [drive_over(random_road(iri, 100.0, 1), SPEEDS_MPH[3] * MPH_MPS, Conditions(0.0)).measured_mps2.std()
            for iri in ends]
     return float(np.log(rms[1] / rms[0]) / np.log(PRINTED_GD_CM3[1] / PRINTED_GD_CM3[0]))
 
 
 def _fan(slopes: Array) -> tuple[Line, ...]:
-    return tuple(Line(f"{mph} mph", _LEVELS_MPS2, slope * _LEVELS_MPS2)
+    levels_mps2 = np.array([0.0, 2.0])
+    return tuple(Line(f"{mph} mph", levels_mps2, slope * levels_mps2)
                  for mph, slope in zip(SPEEDS_MPH, slopes.tolist(), strict=True))
 
 
@@ -162,13 +161,13 @@ F6_6 = Study("fig_6_6", "IRI per r.m.s. acceleration at each speed, and what loa
 
 PRINTED = {10: "too high", 40: "accurate", 70: "too low"}
 WAVINESS = (1.6, 2.0, 2.4)
-WINDOWS_M = (100 * FOOT_M, 25 * FOOT_M)
-_IRI, _LENGTH_M_F6_9, _WINDOWED_MPH = 2.5, 305.0, 40
-_ROADS_F6_9 = 6
+_IRI, _LENGTH_M_F6_9 = 2.5, 305.0
 
 
 def _f6_9(effort: Workload) -> Result:
-    speeds, roads = effort.some(SPEEDS_MPH), effort.count(_ROADS_F6_9, 1)
+    windows_m = (100 * FOOT_M, 25 * FOOT_M)
+    windowed_mph = 40
+    speeds, roads = effort.some(SPEEDS_MPH), effort.count(6, 1)
     road = random_road(_IRI, _LENGTH_M_F6_9, 1, WAVINESS[0])
     ours = [per_window(drive_over(road, mph * MPH_MPS, PS_2119), PS_2119) for mph in effort.each(speeds)]
     drift = np.array([[_bias_percent(mph, waviness, roads) for waviness in WAVINESS] for mph in speeds])
@@ -179,14 +178,14 @@ def _f6_9(effort: Workload) -> Result:
         Column(f"ridelog estimate, waviness {WAVINESS[0]:g} [%]", "+.1f")), tuple(
         (float(mph), PRINTED.get(mph, "between"), *map(float, row), float(one))
         for mph, row, one in zip(speeds, drift, own, strict=True)))
-    drive = drive_over(road, _WINDOWED_MPH * MPH_MPS, PS_2119)
-    cut = [per_window(drive, PS_2119, window_m) for window_m in WINDOWS_M]
-    windows = Table(f"IRI per window at {_WINDOWED_MPH} mph, beside the exact one", (
+    drive = drive_over(road, windowed_mph * MPH_MPS, PS_2119)
+    cut = [per_window(drive, PS_2119, window_m) for window_m in windows_m]
+    windows = Table(f"IRI per window at {windowed_mph} mph, beside the exact one", (
         Column("window [m]", ".2f"), Column("printed"), Column("windows", ".0f"),
         Column("spread of the exact IRI [m/km]", ".2f"), Column("r.m.s. error by r.m.s. relation [m/km]", ".2f"),
         Column("r.m.s. error, ridelog estimate [m/km]", ".2f"),
         Column("exact within two standard errors [%]", ".0f")),
-        tuple(_row_f6_9(window_m, one) for window_m, one in zip(WINDOWS_M, cut, strict=True)))
+        tuple(_row_f6_9(window_m, one) for window_m, one in zip(windows_m, cut, strict=True)))
     verdict = ("The printed drift is there, and has a reason. On a road of waviness 2, for which the line of "
                f"Fig 6.6 was made, the relation keeps within {np.abs(drift[:, 1]).max():.0f} %; on one of waviness "
                f"{WAVINESS[0]:g}, with more short waves, it reads {drift[0, 0]:+.0f} % at {speeds[0]} mph and "
@@ -203,7 +202,7 @@ def _f6_9(effort: Workload) -> Result:
         Picture(Curves("Fig 6.9: the profile", "distance [m]", "elevation [mm]",
                        (Line("profile", place_m[shown], 1000 * road.elevation_m[shown]),)),
                 "a profile that a high-speed profiler measured, out of ProVAL"),
-        Picture(Curves(f"Fig 6.10: the response at {_WINDOWED_MPH} mph", "distance [m]", "acceleration [m/s2]",
+        Picture(Curves(f"Fig 6.10: the response at {windowed_mph} mph", "distance [m]", "acceleration [m/s2]",
                        (Line("response", drive.distance_m, drive.measured_mps2),)),
                 "the simulated response of the half car to that profile"),
         Picture(Curves("Fig 6.11: error of the IRI by speed", "speed [mph]", "error [%]",
@@ -211,9 +210,9 @@ def _f6_9(effort: Workload) -> Result:
                           for index, waviness in enumerate(WAVINESS)), Line("ridelog estimate", x_mph, own)),
                        level=(0.0, "exact")),
                 "the IRI by the relation, higher at 10 mph than at 70"),
-        *(Picture(_compared(f"{figures}: windows of {window_m:.2f} m at {_WINDOWED_MPH} mph", one),
+        *(Picture(_compared(f"{figures}: windows of {window_m:.2f} m at {windowed_mph} mph", one),
                   "the exact IRI and the approximated one along the road, and one against the other")
-          for figures, window_m, one in zip(("Fig 6.12, 6.13", "Fig 6.14, 6.15"), WINDOWS_M, cut, strict=True)))
+          for figures, window_m, one in zip(("Fig 6.12, 6.13", "Fig 6.14, 6.15"), windows_m, cut, strict=True)))
     return Result((table, windows), verdict, pictures, (
         *about("Fig 6.11", [
             Statement(f"bias of the relation at {speeds[0]} mph, waviness {WAVINESS[0]:g} [%]", "overestimates at low "
@@ -225,7 +224,7 @@ def _f6_9(effort: Workload) -> Result:
                       "the speed", float(np.ptp(own) / np.ptp(drift[:, 0])), 0.0, 0.5, Word.BETTER)]),
         *(one for items, found in zip((("Fig 6.12", "Fig 6.13"), ("Fig 6.14", "Fig 6.15")), cut, strict=True)
           for one in about(items, [
-              Statement(f"bias of the relation at {_WINDOWED_MPH} mph [%]", "shows the accuracy of the use of "
+              Statement(f"bias of the relation at {windowed_mph} mph [%]", "shows the accuracy of the use of "
                                                                             "acceleration",
                         100 * float(found.by_rms_m_per_km.mean() / found.exact_m_per_km.mean() - 1), -15.0, 15.0),
               Statement("r.m.s. error of a window, ridelog's over the relation's", "accurate at 40 mph", rms_error(
@@ -273,18 +272,14 @@ F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed an
                             "At 40 mph the relation is right on average; ridelog's windows err by half as much.")))
 
 
-_ROADS_F6_16 = 60
-_DRIVEN_IRI, _LENGTH_M_F6_16 = 5.0, 305.0
-
-
 def _f6_16(effort: Workload) -> Result:
-    settings = CalibrationSettings(roads=effort.count(_ROADS_F6_16, 10))
+    settings = CalibrationSettings(roads=effort.count(60, 10))
     (lines,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     mph = np.round(np.array(SPEEDS_MPS) / MPH_MPS)
     per_iri = np.array([one.a_w_per_iri.slope for one in lines])
     levels = np.array(LEVELS_IRI)
     a_w = np.outer(per_iri, levels)
-    road = random_road(_DRIVEN_IRI, _LENGTH_M_F6_16, 3)
+    road = random_road(5.0, 305.0, 3)
     stepped = {number: per_window(drive_over(road, SPEEDS_MPS[number], PS_2119), PS_2119) for number in (1, 3)}
     checks = {number: float(np.sqrt(np.mean(one.a_w_mps2**2)) / one.exact_m_per_km.mean())
               for number, one in stepped.items()}
@@ -338,21 +333,18 @@ PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 3
 """Table D.1: the speed on each segment."""
 PRINTED_KMH = {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
 PRINTED_SLOW_KMH = 32.2
-PRINTED_WINDOW_M = 7.62
-PRINTED_LIMITS = (0.0, 0.315, 0.5, 0.8, 1.25, 2.0)
-"""Where each word of Table 2.5 begins [m/s2], the second colour scale; the first has the ranges of Table 2.3."""
 PRINTED_COMFORT = {"not_uncomfortable": "a majority", **dict.fromkeys(
     ("a_little_uncomfortable", "fairly_uncomfortable", "uncomfortable"), "a place (Table 6.5)")}
 LOW_PASS_HZ = 15.0
-_MEDIAN_IRI, _SPREAD, _WAVINESS = 2.5, 0.4, 1.7
+_MEDIAN_IRI, _WAVINESS = 2.5, 1.7
 _WINDOWS = 24
-_SHOWN = 5
-# further roads of each segment, and of all slow ones together; then the r.m.s. relation alone
-_ROADS_F6_23, _FEWEST = 4, 24
 _LENGTH_M_F6_23 = _WINDOWS * WINDOW_M + 1.0
 
 
 def _f6_23(effort: Workload) -> Result:
+    # Where each word of Table 2.5 begins [m/s2], the second colour scale; the first has the ranges of Table 2.3.
+    printed_limits = (0.0, 0.315, 0.5, 0.8, 1.25, 2.0)
+    shown = 5
     segments = effort.some(sorted(PRINTED_MPH))
     found = {one: _driven(one) for one in effort.each(segments)}
     speeds = [mph for mph in PRINTED_KMH if any(PRINTED_MPH[one] == mph for one in segments)]
@@ -391,14 +383,14 @@ def _f6_23(effort: Workload) -> Result:
                f"majority of windows is comfortable agrees: {shares['not_uncomfortable']:.0f} % here, for roads of a "
                f"median IRI of {_MEDIAN_IRI:g} m/km. Better: each window's IRI has a standard error, and of drives "
                "with GPS ridelog report draws both maps on the ground.")
-    example = found[min(segments, key=lambda number: abs(number - _SHOWN))]
+    example = found[min(segments, key=lambda number: abs(number - shown))]
     colours = "the colours of the scale every 25 ft along an example"
     pictures = (
-        Picture(Curves(f"Fig 6.21: IRI along segment {_SHOWN}", "distance [m]", "IRI [m/km]", (
+        Picture(Curves(f"Fig 6.21: IRI along segment {shown}", "distance [m]", "IRI [m/km]", (
             Line("exact", example.middle_m, example.exact_m_per_km),
             Line("ridelog estimate", example.middle_m, example.iri_m_per_km, example.iri_std_m_per_km),
             Line("r.m.s. relation", example.middle_m, example.by_rms_m_per_km))), f"the IRI in {colours}"),
-        Picture(Curves(f"Fig 6.22: comfort along segment {_SHOWN}", "distance [m]", "a_w [m/s2]",
+        Picture(Curves(f"Fig 6.22: comfort along segment {shown}", "distance [m]", "a_w [m/s2]",
                        (Line("a_w", example.middle_m, example.a_w_mps2),), level=(0.315, "a little uncomfortable")),
                 f"the comfort in {colours}"),
         Picture(_map("Fig 6.23: the roughness map as strips", {
@@ -413,8 +405,8 @@ def _f6_23(effort: Workload) -> Result:
               for (low, high, kind), (_, *ends) in zip(ROAD_RANGES, PRINTED_RANGES, strict=True)
               for end, printed, ours in zip(("from", "to"), ends, (low, high), strict=True)),
             *(Value(f"{word.replace('_', ' ')}, from [m/s2]", printed, limit, 0.0)
-              for (limit, word), printed in zip(reversed(COMFORT_WORDS), PRINTED_LIMITS, strict=True))]),
-        *about(("Fig 6.21", "Fig 6.22"), [Value("length of a window [m]", PRINTED_WINDOW_M, float(np.diff(
+              for (limit, word), printed in zip(reversed(COMFORT_WORDS), printed_limits, strict=True))]),
+        *about(("Fig 6.21", "Fig 6.22"), [Value("length of a window [m]", 7.62, float(np.diff(
             example.edges_m).mean()), 1e-6, Word.NOT_REPRODUCIBLE)]),
         *about("Fig 6.23", [
             Statement(f"bias by r.m.s. below {PRINTED_SLOW_KMH:g} km/h less two standard errors, {len(slow)} roads [%]",
@@ -432,9 +424,11 @@ def _f6_23(effort: Workload) -> Result:
 
 def _biases_percent(mph: int, segments: Sequence[int], effort: Workload) -> Array:
     """Errors of the windows' mean by the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
+    # further roads of each segment, and of all slow ones together; then the r.m.s. relation alone
+    ROADS, fewest = 4, 24
     edges_m: Array = WINDOW_M * np.arange(_WINDOWS + 1.0)
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
-    roads = max(2, effort.count(_ROADS_F6_23 * len(segments)), _FEWEST * slow * (len(segments) > 1))
+    roads = max(2, effort.count(ROADS * len(segments)), fewest * slow * (len(segments) > 1))
     found = []
     for number in range(roads):
         segment, draw = segments[number % len(segments)], 1 + number // len(segments)
@@ -462,7 +456,7 @@ def _scales() -> Table:
 def _drive(segment: int, draw: int = 0) -> tuple[Track, Run, Conditions]:
     """A road for a segment, the drive over it at the segment's speed, and the sensor's conditions."""
     rng = np.random.default_rng([segment, draw] if draw else segment)
-    iri_m_per_km = _MEDIAN_IRI * float(np.exp(_SPREAD * rng.standard_normal()))
+    iri_m_per_km = _MEDIAN_IRI * float(np.exp(0.4 * rng.standard_normal()))
     road = random_road(iri_m_per_km, _LENGTH_M_F6_23, 100 + segment + 1000 * draw, _WAVINESS)
     conditions = PS_2119.on(iri_m_per_km, segment + 1000 * draw)
     return road, drive_over(road, PRINTED_MPH[segment] * MPH_MPS, conditions), conditions

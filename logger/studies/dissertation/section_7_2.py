@@ -64,14 +64,13 @@ from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.named_parameters import WEAKEST, free
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-SHARED = (1.0, 0.9, 0.5, 0.0)
-"""Share of the right track's mean square that it has from the left one."""
-LEFT_M = (0.0, 0.4)
-_SPEED_MPS, _IRI_FULL_CAR, _LENGTH_M_FULL_CAR = 14.0, 4.0, 400.0
+_SPEED_MPS = 14.0
 _SKIP = 200
 
 
 def _full_car(effort: Workload) -> Result:
+    SHARED = (1.0, 0.9, 0.5, 0.0)  # Share of the right track's mean square that it has from the left one.
+    LEFT_M = (0.0, 0.4)
     cases = [(shared, left_m) for left_m in LEFT_M for shared in effort.some(SHARED)]
     rows = tuple(_row_full_car(*case) for case in effort.each(cases))
     table = Table("A full car's record, explained by two models", (
@@ -119,7 +118,7 @@ def _error(measured: Array, model: Array) -> float:
 
 
 def _two_tracks(shared: float) -> Track:
-    left, other = (random_road(_IRI_FULL_CAR, _LENGTH_M_FULL_CAR, seed) for seed in (11, 12))
+    left, other = (random_road(4.0, 400.0, seed) for seed in (11, 12))
     right = np.sqrt(shared) * left.elevation_m + np.sqrt(1 - shared) * other.elevation_m
     return replace(left, elevation_m=np.stack([left.elevation_m, right], axis=1))
 
@@ -142,13 +141,11 @@ FULL_CAR = Study("section_7_2_full_car", "A full car, where left and right track
                           "The full car is a model of every command, and explains what two different tracks do."),))
 
 
-SPEEDS_MPS = (10.0, 20.0)
-_IRI_INPUT, _LENGTH_M_INPUT, _START = 4.0, 300, 1.2
-
-
 def _input(effort: Workload) -> Result:
-    road = random_road(_IRI_INPUT, effort.count(_LENGTH_M_INPUT, _LENGTH_M_INPUT // 2), 7)
-    drives = [drive_over(road, speed, PS_2119.on(_IRI_INPUT, seed)) for seed, speed in enumerate(SPEEDS_MPS)]
+    speeds_mps = (10.0, 20.0)
+    iri, length_m = 4.0, 300
+    road = random_road(iri, effort.count(length_m, length_m // 2), 7)
+    drives = [drive_over(road, speed, PS_2119.on(iri, seed)) for seed, speed in enumerate(speeds_mps)]
     fits: list[tuple[str, list[Run]]] = [(f"one drive, {one.speed_mps[0]:g} m/s", [one]) for one in drives]
     fits.append(("both, over one road", drives))
     probes = effort.count(10, 4)
@@ -189,7 +186,7 @@ def _input(effort: Workload) -> Result:
 
 
 def _mass(drives: list[Run], probes: int) -> RoadFit:
-    car = AxleResponse(rav4(), [free(rav4(), MASS, _START * TRUTH[MASS])], RATE_HZ)
+    car = AxleResponse(rav4(), [free(rav4(), MASS, 1.2 * TRUTH[MASS])], RATE_HZ)
     roads = [[RoadDrive(float(RATE_HZ), one.measured_mps2, one.distance_m) for one in drives]]
     return fit_roads(car, roads, Options(probes=probes, last_probes=probes, refuse=False))
 
@@ -241,17 +238,15 @@ class _Input:
     spacing_m: float = SPACING_M
 
 
-INPUTS = (
-    *(_Input(f"bump, {1000 * height:.0f} mm", bump(_AT_M, height), 10)
-      for height in (BUMP_HEIGHT_M / 2, BUMP_HEIGHT_M)),
-    *(_Input(f"bridge, step of {1000 * height:.1f} mm", bridge(_AT_M, height), mph)
-      for height in (STEP_M / 3, STEP_M) for mph in (30, 60)),
-    *(_Input(f"tube, {1000 * diameter:.2f} mm", tube(_AT_M, diameter), mph, TUBE_SPACING_M)
-      for diameter in (TUBE_M, 3 * TUBE_M) for mph in (10, 40)),
-)
-
-
 def _other_vehicles(effort: Workload) -> Result:
+    INPUTS = (
+        *(_Input(f"bump, {1000 * height:.0f} mm", bump(_AT_M, height), 10)
+          for height in (BUMP_HEIGHT_M / 2, BUMP_HEIGHT_M)),
+        *(_Input(f"bridge, step of {1000 * height:.1f} mm", bridge(_AT_M, height), mph)
+          for height in (STEP_M / 3, STEP_M) for mph in (30, 60)),
+        *(_Input(f"tube, {1000 * diameter:.2f} mm", tube(_AT_M, diameter), mph, TUBE_SPACING_M)
+          for diameter in (TUBE_M, 3 * TUBE_M) for mph in (10, 40)),
+    )
     cars = [read_vehicle(vehicle_file(name)) for name in effort.some(vehicle_names())]
     inputs = effort.some(INPUTS)
     jobs: list[Vehicle | _Input] = [*cars, *inputs]
@@ -330,29 +325,27 @@ OTHER_VEHICLES = Study("section_7_2_other_vehicles", "Other vehicles, other inpu
                           "any drive."),))
 
 
-SPEEDS_MPH_SENSOR_POSITION = (10, 20, 30, 40, 50, 60, 70)
-PLACES_M = (-1.0, -0.5, 0.0, 0.5, 1.0)
-_ESTIMATED_MPH, _IRI_SENSOR_POSITION, _LENGTH_M_SENSOR_POSITION = 30, 3.0, 230.0
-
-
 def _sensor_position(effort: Workload) -> Result:
-    speeds = np.array(SPEEDS_MPH_SENSOR_POSITION) * MPH_MPS
+    speeds_mph = (10, 20, 30, 40, 50, 60, 70)
+    PLACES_M = (-1.0, -0.5, 0.0, 0.5, 1.0)
+    estimated_mph = 30
+    speeds = np.array(speeds_mph) * MPH_MPS
     felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms
                      for place in PLACES_M])
     change = 100 * (felt / felt[PLACES_M.index(0.0)] - 1)
     table = Table("R.m.s. acceleration by where the sensor sits, over that at the centre of gravity (printed: nothing)",
                   (Column("speed [mph]", ".0f"), *(Column(f"{place:+g} m ahead [%]", "+.1f") for place in PLACES_M)),
                   tuple((float(mph), *map(float, row)) for mph,
-                        row in zip(SPEEDS_MPH_SENSOR_POSITION, change.T, strict=True)))
-    road = random_road(_IRI_SENSOR_POSITION, _LENGTH_M_SENSOR_POSITION, 5)
+                        row in zip(speeds_mph, change.T, strict=True)))
+    road = random_road(3.0, 230.0, 5)
     rows = []
     for place in effort.each(effort.some(PLACES_M)):
-        drive = drive_over(road, _ESTIMATED_MPH * MPH_MPS, PS_2119, _at(place))
+        drive = drive_over(road, estimated_mph * MPH_MPS, PS_2119, _at(place))
         unaware, aware = (per_window(drive, PS_2119, vehicle=car) for car in (rav4(), _at(place)))
         exact = aware.exact_m_per_km.mean()
         rows.append((place, *(100 * float(one.mean() / exact - 1)
                               for one in (unaware.by_rms_m_per_km, unaware.iri_m_per_km, aware.iri_m_per_km))))
-    biases = Table(f"What that does to the IRI of a road, at {_ESTIMATED_MPH} mph", (
+    biases = Table(f"What that does to the IRI of a road, at {estimated_mph} mph", (
         Column("sensor ahead by [m]", "+.1f"), Column("r.m.s. relation, place not known [%]", "+.1f"),
         Column("ridelog estimate, place not known [%]", "+.1f"),
         Column("ridelog estimate, place in the vehicle's file [%]", "+.1f")), tuple(rows))
@@ -364,7 +357,7 @@ def _sensor_position(effort: Workload) -> Result:
                f"ahead_m) by {max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, ridelog "
                "diagnose finds sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
     picture = Picture(Curves("What a sensor reads by its place", "speed [mph]", "change of the r.m.s. acceleration [%]",
-                             tuple(Line(f"{place:+g} m ahead", np.array(SPEEDS_MPH_SENSOR_POSITION, dtype=float), row)
+                             tuple(Line(f"{place:+g} m ahead", np.array(speeds_mph, dtype=float), row)
                                    for place, row in zip(PLACES_M, change, strict=True) if place),
                              level=(0.0, "at the centre")), "nothing: future work")
     return Result((table, biases), verdict, (picture,), (
@@ -388,12 +381,10 @@ SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the c
                           "The place of the sensor is part of the vehicle, and with it the pitch that it feels."),))
 
 
-_IRI_SPEED, _LENGTH_M_SPEED = 3.0, 230.0
-
-
 def _speed(effort: Workload) -> Result:
+    iri = 3.0
     limits = ErrorBound(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
-    roads = [random_road(_IRI_SPEED, _LENGTH_M_SPEED, 21 + number, waviness) for number,
+    roads = [random_road(iri, 230.0, 21 + number, waviness) for number,
              waviness in enumerate(WAVINESS)]
     rows = []
     for one_mph in effort.each(effort.some(SPEEDS_MPH)):
@@ -401,7 +392,7 @@ def _speed(effort: Workload) -> Result:
         exact, by_rms, ours, std = (np.stack([getattr(one, name) for one in cut]) for name in (
             "exact_m_per_km", "by_rms_m_per_km", "iri_m_per_km", "iri_std_m_per_km"))
         drift = [float(np.ptp(one.mean(axis=1) / exact.mean(axis=1))) for one in (by_rms, ours)]
-        limit = limits.at(one_mph * MPH_MPS, RoadSpectrum.of_iri(_IRI_SPEED)).std_m_per_km
+        limit = limits.at(one_mph * MPH_MPS, RoadSpectrum.of_iri(iri)).std_m_per_km
         errors = (rms_error(by_rms, exact), rms_error(ours, exact), limit)
         rows.append((float(one_mph), *(100 * one for one in drift), *errors,
                      100 * float((np.abs(ours - exact) < 2 * std).mean())))

@@ -36,23 +36,23 @@ from logger.studies.drives import (
 )
 from logger.studies.study import Check, Column, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
 
-PRINTED_TRUE_HZ, PRINTED_TRUE_DAMPING = (0.890, 2.598, 4.095, 5.261, 6.000), 0.02
-PRINTED_HZ = (0.889, 2.601, 4.096, 5.275, 6.031)
-PRINTED_DAMPING = (0.028, 0.018, 0.018, 0.024, 0.022)
-"""What its SSI-dat gives at order 16, the true frequencies being named by hand."""
-_FLOOR_KG, _STOREY_N_PER_M = 25.91, 10_000.0
-_RECORDS_FIVE_MODES, _RATE_HZ, _LENGTH_S, _DECIBEL, _NEAR = 5, 20.0, 300.0, 20.0, 0.05
-_HALF_DIGIT, _SURE_FIVE_MODES = 0.0005, 3.0
+PRINTED_TRUE_HZ = (0.890, 2.598, 4.095, 5.261, 6.000)
+_RATE_HZ = 20.0
+_HALF_DIGIT = 0.0005
 
 
 def _five_modes(effort: Workload) -> Result:
-    building = with_damping_ratios(*chain(np.full(5, _FLOOR_KG), np.full(5, _STOREY_N_PER_M)),
-                                   np.full(5, PRINTED_TRUE_DAMPING))
+    printed_true_damping = 0.02
+    printed_hz = (0.889, 2.601, 4.096, 5.275, 6.031)
+    # What its SSI-dat gives at order 16, the true frequencies being named by hand.
+    printed_damping = (0.028, 0.018, 0.018, 0.024, 0.022)
+    building = with_damping_ratios(*chain(np.full(5, 25.91), np.full(5, 10_000.0)),
+                                   np.full(5, printed_true_damping))
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
-    missed, extra, records, count = 0, 0, [], effort.count(_RECORDS_FIVE_MODES, 2)
+    missed, extra, records, count = 0, 0, [], effort.count(5, 2)
     for seed in effort.each(range(count)):
         found = find_modes(_record(building, seed), _RATE_HZ).modes
-        near = [[mode for mode in found if abs(mode.frequency_hz / hz - 1) < _NEAR] for hz in true_hz]
+        near = [[mode for mode in found if abs(mode.frequency_hz / hz - 1) < 0.05] for hz in true_hz]
         missed += sum(not one for one in near)
         extra += len(found) - sum(map(bool, near))
         if all(near):
@@ -62,16 +62,16 @@ def _five_modes(effort: Workload) -> Result:
     hz, damping, hz_std, damping_std = numbers[0].T
     values: list[Check] = [Value(f"mode {mode} of the building [Hz]", printed, float(ours), _HALF_DIGIT)
                            for mode, (printed, ours) in enumerate(zip(PRINTED_TRUE_HZ, true_hz, strict=True), start=1)]
-    values += _beside("frequency of mode {} found [Hz]", PRINTED_HZ, PRINTED_TRUE_HZ, hz, hz_std)
-    values += _beside("damping ratio of mode {} found", PRINTED_DAMPING, (PRINTED_TRUE_DAMPING,) * 5, damping,
+    values += _beside("frequency of mode {} found [Hz]", printed_hz, PRINTED_TRUE_HZ, hz, hz_std)
+    values += _beside("damping ratio of mode {} found", printed_damping, (printed_true_damping,) * 5, damping,
                       damping_std)
     values += [Statement(f"modes missed in {count} records", "found where they are named by hand", float(missed),
                          0,
                          0, Word.BETTER),
                Statement("modes that are not there", "found where they are named by hand", float(extra), 0, 0,
                          Word.BETTER)]
-    worst = 100 * float(max(abs(one / PRINTED_TRUE_DAMPING - 1) for one in PRINTED_DAMPING))
-    ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / PRINTED_TRUE_DAMPING - 1).max(axis=1)))
+    worst = 100 * float(max(abs(one / printed_true_damping - 1) for one in printed_damping))
+    ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / printed_true_damping - 1).max(axis=1)))
     verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} found that are not there, "
                "without a person who names them; the example is given their frequencies. The worst damping is "
                f"{ours:.0f} % off on the median, {worst:.0f} % in the print, and here each has a standard error: 300 s "
@@ -82,25 +82,25 @@ def _five_modes(effort: Workload) -> Result:
         Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),
         Column("its standard error", ".4f")), tuple(
         (float(mode), *map(float, row)) for mode, row in enumerate(zip(
-            PRINTED_TRUE_HZ, PRINTED_HZ, hz, hz_std, PRINTED_DAMPING, damping, damping_std, strict=True), start=1)))
+            PRINTED_TRUE_HZ, printed_hz, hz, hz_std, printed_damping, damping, damping_std, strict=True), start=1)))
     picture = Picture(Curves("Damping ratio of each mode, in each record", "frequency [Hz]", "damping ratio", (
         Line("ours", np.tile(true_hz, len(numbers)), numbers[:, :, 1].ravel(), dots=True),
-        Line("printed", np.array(PRINTED_HZ), np.array(PRINTED_DAMPING), dots=True)),
-        level=(PRINTED_TRUE_DAMPING, "true")), "one record's damping ratios, as numbers")
+        Line("printed", np.array(printed_hz), np.array(printed_damping), dots=True)),
+        level=(printed_true_damping, "true")), "one record's damping ratios, as numbers")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
 def _record(building: Masses, seed: int) -> Array:
     """Accelerations (samples, 5) under a white force on each floor, with a tenth of noise."""
     rng = np.random.default_rng(seed)
-    clean = random_response(building, rng.standard_normal((4 * round(_LENGTH_S * _RATE_HZ), 5)), _RATE_HZ)
-    return np.asarray(clean + 10 ** (-_DECIBEL / 20) * clean.std(axis=0) * rng.standard_normal(clean.shape))
+    clean = random_response(building, rng.standard_normal((4 * round(300.0 * _RATE_HZ), 5)), _RATE_HZ)
+    return np.asarray(clean + 10 ** (-20.0 / 20) * clean.std(axis=0) * rng.standard_normal(clean.shape))
 
 
 def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours: Array, std: Array) -> list[Value]:
     """Two estimates of one truth differ by what both are off: theirs by what the print shows, ours by chance."""
     return [Value(name.format(mode), theirs, float(mine),
-                  abs(theirs - truth) + _SURE_FIVE_MODES * float(error) + _HALF_DIGIT)
+                  abs(theirs - truth) + 3.0 * float(error) + _HALF_DIGIT)
             for mode, (theirs, truth, mine, error) in enumerate(zip(printed, true, ours, std, strict=True), start=1)]
 
 
@@ -113,33 +113,29 @@ FIVE_MODES = Study(
     source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, printed January 2025")
 
 
-PEERS = (("SciPy least_squares, own simulator", -0.07, 0.07), ("lmfit 1.3.4, the same simulator", -0.07, 0.07),
-         ("jax-sysid 1.1, own state equation", -0.07, None), ("SIPPY, nfoursid, Octave, python-control", None, None))
-"""Package, error of the mass [%], the standard error that it gives [%], in runs of our own on one simulated record; the
-last ones give poles and no mass."""
-SCATTER = 0.07
-"""Standard error of the mass by the record alone [%]: what any unbiased fit scatters by at least."""
-_RECORDS_MASS_FROM_A_BUMP, _SECONDS, _BUMP_AT_M, _START_KG = 40, 6.0, 8.0, 800.0
-_SURE_MASS_FROM_A_BUMP = 3.0
-
-
 def _mass_from_a_bump(effort: Workload) -> Result:
-    fits = [fitted(record_of(bump(_BUMP_AT_M), BUMP_MPS, _SECONDS, Conditions(seed=seed)), {MASS: _START_KG}, ours=True)
-            for seed in effort.each(range(effort.count(_RECORDS_MASS_FROM_A_BUMP, 5)))]
+    # Package, error of the mass [%], the standard error that it gives [%], in runs of our own on one simulated
+    # record; the last ones give poles and no mass.
+    peers = (("SciPy least_squares, own simulator", -0.07, 0.07), ("lmfit 1.3.4, the same simulator", -0.07, 0.07),
+             ("jax-sysid 1.1, own state equation", -0.07, None),
+             ("SIPPY, nfoursid, Octave, python-control", None, None))
+    scatter = 0.07  # Standard error of the mass by the record alone [%]: what any unbiased fit scatters by at least.
+    fits = [fitted(record_of(bump(8.0), BUMP_MPS, 6.0, Conditions(seed=seed)), {MASS: 800.0}, ours=True)
+            for seed in effort.each(range(effort.count(40, 5)))]
     errors = np.array([error_percent(one, MASS) for one in fits])
     given = np.array([standard_error_percent(one, MASS) for one in fits])
     rms = float(np.sqrt(np.mean(errors**2)))
     # A scatter of n draws is itself off by its share 1 / sqrt(2 n).
-    near = _SURE_MASS_FROM_A_BUMP * SCATTER / np.sqrt(2 * len(errors))
+    near = 3.0 * scatter / np.sqrt(2 * len(errors))
     values = (Statement("error of the mass, r.m.s. [%]", "0.07 % off, in runs of our own of SciPy and lmfit", rms, 0.0,
-                        SCATTER + float(near), Word.NOT_REPRODUCIBLE),
+                        scatter + float(near), Word.NOT_REPRODUCIBLE),
               Statement("standard error that is given over that of the record", "the same",
-                        float(given.mean()) / SCATTER,
-                        1 - float(near) / SCATTER, 1 + float(near) / SCATTER, Word.NOT_REPRODUCIBLE))
+                        float(given.mean()) / scatter,
+                        1 - float(near) / scatter, 1 + float(near) / scatter, Word.NOT_REPRODUCIBLE))
     inside = float(np.mean(np.abs(errors) < 2 * given))
     table = Table("The mass from one bump (nothing of it is printed)", (
         Column("package, run by us"), Column("error [%]", "+.2f"), Column("its standard error [%]", ".2f")),
-        (*PEERS, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
+        (*peers, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
     verdict = (f"The mass comes out {rms:.2f} % off (r.m.s. over {len(errors)} records), as near as the record's "
                "noise lets anybody come, and its standard error says so: the truth lies within two of them in "
                f"{inside:.0%}. Packages that are given the car's equations do as well; those without find frequencies "
@@ -161,7 +157,6 @@ MASS_FROM_A_BUMP = Study(
 
 
 COUNTS = Path(__file__).with_name("examination.json")
-_SURE_LAB_EXAMINATION = 0.95
 
 
 def examined() -> dict[str, Any]:
@@ -173,7 +168,7 @@ def examined() -> dict[str, Any]:
 
 def interval_percent(hits: int, cases: int) -> tuple[float, float]:
     """Wilson's interval of a share (Journal of the American Statistical Association 22, 1927) [%]."""
-    z = float(ndtri(0.5 + _SURE_LAB_EXAMINATION / 2))
+    z = float(ndtri(0.5 + 0.95 / 2))
     share = hits / cases
     middle, half = share + z**2 / (2 * cases), z * np.sqrt(share * (1 - share) / cases + z**2 / (4 * cases**2))
     low, high = ((middle + sign * half) / (1 + z**2 / cases) for sign in (-1, 1))

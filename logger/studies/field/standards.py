@@ -21,25 +21,23 @@ from logger.studies.study import Column, Item, Picture, Result, Study, Table, Va
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import straight_step
 
-_SPACING_M, _LENGTH_M = 0.25, 30.0
 PRINTED_IRI_CHECK_PROFILE = ((2.0, 3.77380), (4.75, 7.84294), (10.0, 5.08670), (20.0, 2.95143), (30.0, 2.04955))
 """Distance [m] and the IRI from 0 to there [m/km], five of the 120 printed."""
-PRINTED_COEFFICIENT = 5.476107e-3
-_ROUNDING_IRI_CHECK_PROFILE, _ATTAINED = 5e-10, 1e-5
 
 
 def _iri_check_profile(effort: Workload) -> Result:
-    at_m = _SPACING_M * np.arange(round(_LENGTH_M / _SPACING_M) + 1)
-    pulse_m = np.interp(at_m, [0, 1, 3, 5, _LENGTH_M], [0, 0, 0.02, 0, 0])
-    slopes = rectified_slope(pulse_m, _SPACING_M)
+    spacing_m, length_m = 0.25, 30.0
+    at_m = spacing_m * np.arange(round(length_m / spacing_m) + 1)
+    pulse_m = np.interp(at_m, [0, 1, 3, 5, length_m], [0, 0, 0.02, 0, 0])
+    slopes = rectified_slope(pulse_m, spacing_m)
     running = 1000 * np.cumsum(slopes) / np.arange(1.0, len(at_m))
     values = [*about("IRI check profile", [Value(f"IRI from 0 to {where:g} m [m/km]", printed,
-                                                 float(running[round(where / _SPACING_M) - 1]),
-                    _ATTAINED) for where, printed in effort.each(PRINTED_IRI_CHECK_PROFILE)])]
-    _, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), _SPACING_M / STANDARD_SPEED_MPS)
+                                                 float(running[round(where / spacing_m) - 1]),
+                    1e-5) for where, printed in effort.each(PRINTED_IRI_CHECK_PROFILE)])]
+    _, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), spacing_m / STANDARD_SPEED_MPS)
     exact = float((ends[0] + ends[1])[0, 0])  # held over the step, as in the print
     values += about("IRI input coefficient", [
-        Value("first input coefficient at 0.25 m", PRINTED_COEFFICIENT, exact, _ROUNDING_IRI_CHECK_PROFILE,
+        Value("first input coefficient at 0.25 m", 5.476107e-3, exact, 5e-10,
               Word.MISPRINT)])
     peak = int(running.argmax())
     table = Table("Where the running IRI is largest", (
@@ -63,26 +61,22 @@ IRI_CHECK_PROFILE = Study(
     source="Sayers, Gillespie, Paterson, World Bank Technical Paper 46, 1986")
 
 
-PRINTED_PEAKS_CPM = (0.065, 0.42)
-PRINTED_HALVES_CPM = (0.033, 0.8)
-"""Peaks, and where the response is down to 0.5; wavelengths of about 15, 2.4, 30 and 1.25 m."""
-_BETWEEN_CPM = 0.2
-_SHARE_GOLDEN_CAR_GAIN = 0.05
-"""Of the printed value, as broad humps are read off a figure."""
-
-
 def _golden_car_gain(effort: Workload) -> Result:
+    printed_peaks_cpm = (0.065, 0.42)
+    # Peaks, and where the response is down to 0.5; wavelengths of about 15, 2.4, 30 and 1.25 m.
+    printed_halves_cpm = (0.033, 0.8)
+    share = 0.05  # Of the printed value, as broad humps are read off a figure.
     wave_number = np.geomspace(0.01, 3.0, effort.count(4000, 1000))
     gain = slope_gain(wave_number, 0.0)
-    slow = wave_number < _BETWEEN_CPM
+    slow = wave_number < 0.2
     peaks = [float(wave_number[np.flatnonzero(part)[gain[part].argmax()]]) for part in (slow, ~slow)]
     rising = float(np.interp(0.5, gain[wave_number < peaks[0]], wave_number[wave_number < peaks[0]]))
     after = wave_number > peaks[1]
     falling = float(np.interp(-0.5, -gain[after], wave_number[after]))
     names = ("body's peak", "wheel's peak", "half, long waves", "half, short waves")
-    printed = (*PRINTED_PEAKS_CPM, *PRINTED_HALVES_CPM)
+    printed = (*printed_peaks_cpm, *printed_halves_cpm)
     ours = (*peaks, rising, falling)
-    values = tuple(Value(f"{name} [cycle/m]", theirs, mine, _SHARE_GOLDEN_CAR_GAIN * theirs)
+    values = tuple(Value(f"{name} [cycle/m]", theirs, mine, share * theirs)
                    for name, theirs, mine in zip(names, printed, ours, strict=True))
     table = Table("The same as wavelengths", (
         Column("where"), Column("printed [m]", ".2f"), Column("ours [m]", ".2f"), Column("gain", ".2f")),
@@ -93,7 +87,7 @@ def _golden_car_gain(effort: Workload) -> Result:
                f"{1 / falling:.2f} m or longer than {1 / rising:.0f} m count for less than half.")
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, for slopes", "wave number [cycle/m]", "gain", (
         Line("ours", wave_number, gain),
-        Line("printed, half", np.array(PRINTED_HALVES_CPM), np.full(2, 0.5), dots=True)), log_x=True),
+        Line("printed, half", np.array(printed_halves_cpm), np.full(2, 0.5), dots=True)), log_x=True),
         "the gain for slopes by wave number, two humps at 0.065 and 0.42 cycle/m, down to 0.5 at 0.033 and 0.8")
     return Result((table,), verdict, (picture,), values)
 
@@ -116,19 +110,19 @@ PRINTED_ISO_2631_FACTORS = {
 }
 """Factors times 1000, as printed, at the nominal frequencies."""
 MISPRINTED = ("wd", "10")
-# of the last printed digit: two of the standard's factors are a little more than half of one low
-_ROUNDING_ISO_2631_FACTORS = 0.75
 _ITEMS = {"wk": "ISO 2631-1 Table 3, Wk", "wd": "ISO 2631-1 Table 3, Wd"}
 
 
 def _iso_2631_factors(effort: Workload) -> Result:
+    # of the last printed digit: two of the standard's factors are a little more than half of one low
+    rounding = 0.75
     values: list[Value] = []
     for name, weighting in effort.each((("wk", WK), ("wd", WD))):
         for hz, printed in zip(HZ, PRINTED_ISO_2631_FACTORS[name], strict=True):
             digit = 10.0 ** -len(printed.partition(".")[2])
             word = Word.MISPRINT if (name, hz) == MISPRINTED else Word.AGREES
             values += about(_ITEMS[name], [Value(f"{name} at {hz} Hz, times 1000", float(printed), 1000 * float(
-                abs(weighting.response(float(hz)))), _ROUNDING_ISO_2631_FACTORS * digit, word)])
+                abs(weighting.response(float(hz)))), rounding * digit, word)])
     wrong = next(one for one in values if one.word is Word.MISPRINT)
     off = [abs(one.difference) for one in values if one is not wrong]
     table = Table("The misprint", (Column("frequency [Hz]"), Column("printed", ".0f"), Column("ours", ".1f"),
@@ -154,23 +148,23 @@ ISO_2631_FACTORS = Study(
     source="ISO 2631-1:1997, Mechanical vibration and shock: evaluation of human exposure to whole-body vibration")
 
 
-TEETH = (1, 2, 4, 8, 16, inf)
 PRINTED_MPS2 = {"wk": (0.0299, 0.0411, 0.0577, 0.0814, 0.115, 0.362),
                 "wd": (0.00669, 0.00906, 0.0116, 0.0148, 0.0197, 0.0590)}
 _SHARE_ISO_8041_BURSTS = {"wk": 0.0025, "wd": 0.015}
 """Of the printed value: three figures are printed, and Wd passes little of a burst."""
-_LENGTH_S, _EVERY_S, _PERIOD_S = 60, 10.0, 2 * np.pi / 100
 _RATE_HZ = 20_000
 
 
 def saw_teeth(teeth: float) -> np.ndarray:
     """The bursts [m/s2]: so many teeth of 1 m/s2 every 10 s, rising from 0."""
-    t_s = np.arange(_RATE_HZ * _LENGTH_S) / _RATE_HZ
-    phase = (t_s if teeth == inf else t_s % _EVERY_S) / _PERIOD_S
+    period_s = 2 * np.pi / 100
+    t_s = np.arange(_RATE_HZ * 60) / _RATE_HZ
+    phase = (t_s if teeth == inf else t_s % 10.0) / period_s
     return np.where(phase < teeth, 2 * ((phase + 0.5) % 1.0) - 1.0, 0.0)
 
 
 def _iso_8041_bursts(effort: Workload) -> Result:
+    TEETH = (1, 2, 4, 8, 16, inf)
     rows, values = [], []
     found: dict[str, list[float]] = {"wk": [], "wd": []}
     for number, teeth in enumerate(effort.each(TEETH)):
