@@ -209,10 +209,6 @@ class ConfiguredChip:
         return self._chip
 
 
-LONGEST_LOOK_US = 50_000
-"""Between two looks: how late a reading may come, whatever the buffer holds."""
-
-
 class BufferState(NamedTuple):
     """What a chip says of its buffer: how many entries it holds, whether some were lost, and the bytes that said so."""
 
@@ -351,7 +347,8 @@ class BufferedDecoder(ABC):
 def buffered_source(name: str, machine: Machine, i2c_bus: int, make_chip: Callable[[I2cBus], BufferedChip],
                     rate_hz: int, entries: int) -> ChipSource:
     """Looks that leave a buffer of so many entries half empty."""
+    longest_look_us = 50_000  # Between two looks: how late a reading may come, whatever the buffer holds.
     interval_us = US_PER_S // rate_hz
-    look_us = min(LONGEST_LOOK_US, entries // 2 * interval_us)
+    look_us = min(longest_look_us, entries // 2 * interval_us)
     return ChipSource(name, lambda: machine.open_i2c(i2c_bus, None), make_chip, machine.now_us,
                       Scattered(look_us, interval_us, machine.sleep))

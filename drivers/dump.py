@@ -50,7 +50,6 @@ _BLOCK_BYTES = 65536
 _GZIP_MAGIC = b"\x1f\x8b"
 _GZIP_WBITS = 31  # zlib: a window of 2^15 bytes with a gzip wrapper
 _MEMBER = bytes.fromhex("1f8b0800000000000003")  # how zlib begins a gzip member: no name, no time, Unix
-_TAIL_BYTES = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -285,7 +284,8 @@ def intact_bytes(path: Path, files: FileSystem | None = None) -> int:
 
     It is looked at from its end, for only what was not yet on the disk can be torn. Raises ``OSError``.
     """
-    looked = _TAIL_BYTES
+    tail_bytes = 1 << 18
+    looked = tail_bytes
     with (files or FileSystem()).open(path) as file:
         size = file.seek(0, os.SEEK_END)
         while True:

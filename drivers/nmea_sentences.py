@@ -22,9 +22,6 @@ from drivers.readings import US_PER_S
 KNOT_MPS = 1852.0 / 3600.0
 KMH_MPS = 1.0 / 3.6
 
-SPEED_MPS_MAX = 150.0
-ALTITUDE_M_MIN, ALTITUDE_M_MAX = -1000.0, 20000.0
-DOP_UNKNOWN = 99.0
 
 MODES_WITH_FIX = (b"", b"A", b"D", b"F", b"P", b"R")
 QUALITIES_WITH_FIX = range(1, 6)
@@ -175,7 +172,7 @@ def _gga(fields: list[bytes]) -> Gga:
         *_position(fields[1:5]),
         _whole(fields[6], 99),
         _dop(fields[7]),
-        _number(fields[8], ALTITUDE_M_MIN, ALTITUDE_M_MAX),
+        _number(fields[8], -1000.0, 20000.0),
     )
 
 
@@ -259,11 +256,11 @@ def _whole(field: bytes, high: int) -> int | None:
 def _dop(field: bytes) -> float | None:
     """A dilution of precision; 0 and 99 upwards are how receivers say that they know none."""
     value = _number(field, 0.0, 10_000.0)
-    return None if value is None or value == 0.0 or value >= DOP_UNKNOWN else value
+    return None if value is None or value == 0.0 or value >= 99.0 else value
 
 
 def _speed_mps(field: bytes, unit_mps: float) -> float | None:
-    speed = _number(field, 0.0, SPEED_MPS_MAX / unit_mps)
+    speed = _number(field, 0.0, 150.0 / unit_mps)
     return None if speed is None else speed * unit_mps
 
 

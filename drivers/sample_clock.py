@@ -13,13 +13,7 @@ from drivers.readings import AccelerationBlock
 
 Floats = npt.NDArray[np.float64]
 
-CHANCE = 1e-6  # of a comb where there is none: tried each 1.28 s, once in 15 days of driving
-CLEARER = 2.0  # than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without
-NEARLY = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
-TICKED = 0.7
 TIMER_US = 20_000.0  # of adapters: 16 ms, if they are left as they come
-BIN_US = 250.0  # of a period of 1 ms, the shortest, a quarter: the resultant is 10 % low there, 1 % at 3 ms
-NEXT = 1.1  # a period so much longer has, over any length that is looked at, another comb
 STEPS_PER_CYCLE = 8  # of the whole span: a comb between two of the periods tried loses 1 % at most
 
 
@@ -42,6 +36,9 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
     longest_gap_us   usual time between two of the arrivals [us]
     lost_most        largest share of samples that may be lost
     """
+    chance = 1e-6  # of a comb where there is none: tried each 1.28 s, once in 15 days of driving
+    # than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without
+    clearer = 2.0
     if count < 2 or slope_us <= 0:  # all of them at one moment have no period
         return None
     step_us = slope_us / count / STEPS_PER_CYCLE
@@ -51,10 +48,10 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
         return None
     lengths = resultant(instants_us, shorter)
     best = int(np.argmax(lengths))
-    if lengths[best] < sqrt(log(max(1.0, len(shorter) / STEPS_PER_CYCLE) / CHANCE) / len(instants_us)):
+    if lengths[best] < sqrt(log(max(1.0, len(shorter) / STEPS_PER_CYCLE) / chance) / len(instants_us)):
         return None
     near = slope_us + step_us * np.arange(-STEPS_PER_CYCLE, STEPS_PER_CYCLE + 1, dtype=np.float64)
-    if lengths[best] < CLEARER * resultant(instants_us, near).max():
+    if lengths[best] < clearer * resultant(instants_us, near).max():
         return None
     period_us = float(shorter[best])
     multiples = period_us * np.arange(2, 1 + max(2, int(longest_gap_us / period_us)), dtype=np.float64)
@@ -67,22 +64,25 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
 def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
     """Tell whether arrivals (m,) [us] stand on the ticks of a timer of nearly a multiple of the samples' period, up to
     ``longest_us``: of the samples themselves all teeth are seen, not every second or third."""
+    nearly = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
     step = 1.0 / (STEPS_PER_CYCLE * (instants_us[-1] - instants_us[0]))
     frequencies = [
-        np.arange((1 - NEARLY) / multiple_us, (1 + NEARLY) / multiple_us, step)
+        np.arange((1 - nearly) / multiple_us, (1 + nearly) / multiple_us, step)
         for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)
     ]
     tried = np.concatenate([np.empty(0), *frequencies])
-    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > TICKED
+    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > 0.7
 
 
 def _coarsest(instants_us: Floats, period_us: float) -> float:
     """How far instants (m,) [us] have one phase in the longer period, up to ``TIMER_US``, where they have it most: of
     an adapter's timer, which samples of another period fill unevenly. By the Fourier transform of their histogram; 0
     where there is no longer period."""
-    bins = np.rint((instants_us - instants_us[0]) / BIN_US).astype(np.int64)
+    bin_us = 250.0  # of a period of 1 ms, the shortest, a quarter: the resultant is 10 % low there, 1 % at 3 ms
+    NEXT = 1.1  # a period so much longer has, over any length that is looked at, another comb
+    bins = np.rint((instants_us - instants_us[0]) / bin_us).astype(np.int64)
     length = 1 << int(STEPS_PER_CYCLE // 2 * (bins[-1] + 1)).bit_length()
-    first, end = (int(length * BIN_US / us) for us in (TIMER_US, NEXT * period_us))
+    first, end = (int(length * bin_us / us) for us in (TIMER_US, NEXT * period_us))
     if end <= first:
         return 0.0
     lines = np.abs(np.fft.rfft(np.bincount(bins), length)[first:end])

@@ -24,14 +24,7 @@ from drivers.framing import exclusive_or, fletcher8, numbers_in
 from drivers.nmea_sentences import Checksum, MalformedError, check, parse_checked
 
 RECENT_BYTES = 4096
-SHOWN_CHARACTERS = 60
-_FEWEST_SENTENCES = 3
-_FEWEST_NUMBERS = 4
 _MOST = 0.5
-_TEXT_SHARE = 0.9
-_ONE_BYTE_SHARE = 0.9
-_ASCII_SHARE = 0.75
-"""Of random bytes 0.38 are printable ASCII; of a line with a degree or square sign at each of three numbers, 0.9."""
 
 RECEIVER, SENSOR = "receiver", "sensor"
 
@@ -123,7 +116,6 @@ _PROTOCOLS = (
     _Protocol("MicroStrain packets", SENSOR, b"\x75\x65", 4, lambda h: 6 + h[3],
               lambda f: fletcher8(f[:-2]) == f[-2:]),
 )
-_LARGEST_FRAME = 2048
 _GARMIN_OR_TSIP = re.compile(rb"\x10([^\x03\x10])((?:[^\x10]|\x10\x10){1,255}?)\x10\x03")
 _MAVLINK = {0xFE: (8, 2), 0xFD: (12, 4)}
 """First byte of a message of version 1 and 2: how many bytes it has beside its load, and where it is numbered."""
@@ -140,7 +132,7 @@ def _folded(data: bytes) -> int:
 def recognise(data: bytes) -> Contents:
     """What some thousand bytes of a line are."""
     framed = _frames(data)
-    if framed is None and data and max(data.count(byte) for byte in set(data)) >= _ONE_BYTE_SHARE * len(data):
+    if framed is None and data and max(data.count(byte) for byte in set(data)) >= 0.9 * len(data):
         byte = max(set(data), key=data.count)
         return Contents("level", f"hardly anything but the byte 0x{byte:02x}", "")
     sentences: dict[Checksum, list[bytes]] = {found: [] for found in Checksum}
@@ -151,7 +143,7 @@ def recognise(data: bytes) -> Contents:
         return framed
     lines, text_share = _text_lines(data)
     count = len(good) + len(bad) + len(unchecked)
-    if count >= _FEWEST_SENTENCES or 2 * count > len(lines) > 0:
+    if count >= 3 or 2 * count > len(lines) > 0:
         if len(good) > max(len(bad), len(unchecked)):
             malformed = [line for line in good if _is_malformed(line)]
             return Contents("malformed" if malformed else "sentences", _kinds(malformed or good),
@@ -159,7 +151,7 @@ def recognise(data: bytes) -> Contents:
         if len(unchecked) > len(bad):
             return Contents("no_checksum", _kinds(unchecked), _shown(unchecked[-1]))
         return Contents("damaged", f"{len(bad)} of {count}", _shown(bad[-1]))
-    if text_share < _TEXT_SHARE:
+    if text_share < 0.9:
         return Contents("noise", "", f"the bytes {data[-12:].hex(' ')}" if data else "")
     if not lines:
         return Contents("endless", "", _shown(data))
@@ -175,7 +167,7 @@ def _frames(data: bytes) -> Contents | None:
         while 0 <= at <= len(data) - protocol.head:
             size = protocol.size(data[at : at + protocol.head])
             frame = data[at : at + size]
-            right = protocol.head <= size <= _LARGEST_FRAME and len(frame) == size and protocol.is_right(frame)
+            right = protocol.head <= size <= 2048 and len(frame) == size and protocol.is_right(frame)
             covered += size if right else 0
             at = data.find(protocol.sync, at + (size if right else 1))
         found.append((covered, protocol.by, protocol.name))
@@ -210,7 +202,7 @@ def _chained(data: bytes, sync: int, more: int, number_at: int) -> int:
             covered += end - at
             numbers.add(data[at + number_at])
         at = end if right else data.find(sync, at + 1)
-    return covered if len(numbers) >= _FEWEST_NUMBERS else 0
+    return covered if len(numbers) >= 4 else 0
 
 
 _SENTENCE = re.compile(rb"[$!](?:P[A-Z]{2}|[A-Z]{2}[A-Z\d]{3},)[ -#%-~]*")
@@ -256,13 +248,15 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 def _is_text(line: bytes) -> bool:
     """A line of UTF-8, or of ASCII with some other bytes: a degree sign of an older code, a terminal's colours."""
+    # Of random bytes 0.38 are printable ASCII; of a line with a degree or square sign at each of three numbers, 0.9.
+    ascii_share = 0.75
     try:
         if line.decode("utf-8").replace("\t", " ").isprintable():
             return True
     except UnicodeDecodeError:
         pass
     plain = _ESCAPE.sub(b"", line)
-    return not _CONTROL.search(plain) and len(_NOT_ASCII.sub(b"", plain)) >= _ASCII_SHARE * len(plain)
+    return not _CONTROL.search(plain) and len(_NOT_ASCII.sub(b"", plain)) >= ascii_share * len(plain)
 
 
 _PLAIN = re.compile(r" *[+-]?[\d.]+ *(?:, *[+-]?[\d.]+ *){2}(?:\*[0-9A-Fa-f]{2} *)?")
@@ -292,7 +286,7 @@ def _form_of_numbers(lines: list[bytes]) -> str:
 
 
 def _shown(line: bytes) -> str:
-    return shortened(line.decode("utf-8", "replace").strip(), SHOWN_CHARACTERS)
+    return shortened(line.decode("utf-8", "replace").strip(), 60)
 
 
 _EXCHANGED = ("{{expected}} expected, and what comes is {{what}}{{shown}}, as {other} sends: the two ports may be "

@@ -27,8 +27,6 @@ from drivers.readings import STANDARD_GRAVITY_MPS2
 WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
 UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}
 AXES = "xyz"
-PROFILE_BYTES_MAX = 65_536
-MOST_NUMBERS = 40  # of one digit in a line of 80 characters
 
 Triple = tuple[float, float, float]
 
@@ -147,11 +145,12 @@ def load_profile(name_or_path: str | Path) -> WireProfile:
 
     Raises SettingsError naming file, line, key and what was expected.
     """
+    profile_bytes_max = 65_536
     place = str(name_or_path)
     if place.endswith((".yaml", ".yml")):
         try:
             with open_regular(place) as file:
-                text = file.read(PROFILE_BYTES_MAX + 1)
+                text = file.read(profile_bytes_max + 1)
         except OSError as error:
             raise SettingsError(f"{place}: expected a readable profile file ({error.strerror})") from error
         except ValueError:
@@ -162,8 +161,8 @@ def load_profile(name_or_path: str | Path) -> WireProfile:
     else:
         known = ", ".join(shipped_profiles())
         raise SettingsError(f"profile {shortened(place)}: expected one of {known}, or the path of a .yaml file")
-    if len(text) > PROFILE_BYTES_MAX:
-        raise SettingsError(f"{place}: expected at most {PROFILE_BYTES_MAX} bytes")
+    if len(text) > profile_bytes_max:
+        raise SettingsError(f"{place}: expected at most {profile_bytes_max} bytes")
     try:
         top = compose_plain(text.decode())
         lines = dict(lines_of(top)) if top is not None else {}
@@ -305,9 +304,10 @@ def _frame_layout(keys: _Keys) -> FrameLayout:
 
 
 def _line_layout(keys: _Keys) -> LineLayout:
+    most_numbers = 40  # of one digit in a line of 80 characters
     layout = LineLayout(UNITS_MPS2[keys.choice("unit", list(UNITS_MPS2))], keys.number("range", 1e-3, 1e4))
     if keys.has("numbers") or keys.has("columns"):
-        numbers = keys.whole("numbers", 3, MOST_NUMBERS)
+        numbers = keys.whole("numbers", 3, most_numbers)
         x, y, z = keys.wholes("columns", 3, 1, numbers)
         layout = replace(layout, numbers=numbers, columns=(x, y, z))
     keys.finish()

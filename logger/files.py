@@ -26,13 +26,10 @@ from pathlib import Path
 from drivers.disk import FileSystem, open_regular
 from logger.errors import BadInput
 
-_GROWN_BYTES = 1 << 20
 DISK = FileSystem()
 """Where all of it goes."""
 BESIDE = ".ridelog-"
 """How files begin that are being written; one that a killed process has left may be removed."""
-_MOST_LINKS = 40
-"""So many links are followed, as the system does (path_resolution(7))."""
 _BLOCK_BYTES = 1 << 20  # of the size of a large file's extents; a call costs nothing beside it
 _AGREED: ContextVar[_Agreed | None] = ContextVar("_AGREED", default=None)
 _WRITTEN: ContextVar[list[Path] | None] = ContextVar("_WRITTEN", default=None)
@@ -40,12 +37,13 @@ _WRITTEN: ContextVar[list[Path] | None] = ContextVar("_WRITTEN", default=None)
 
 def read_bounded(path: Path | str, max_bytes: int) -> bytes:
     """All bytes of a file. Raises BadInput for one that cannot be read or is longer than ``max_bytes``."""
+    grown_bytes = 1 << 20
     try:
         with open_regular(path) as file:
             size = os.fstat(file.fileno()).st_size
             too_long = size > max_bytes
             data = b"" if too_long else file.read(size + 1)  # what is asked for is held, also where nothing comes
-            while size < len(data) <= max_bytes and (more := file.read(_GROWN_BYTES)):  # it grows, or tells no size
+            while size < len(data) <= max_bytes and (more := file.read(grown_bytes)):  # it grows, or tells no size
                 data += more
     except OSError as error:
         raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
@@ -232,8 +230,9 @@ def _agree(change: _Change) -> None:
 
 def _place(path: Path) -> Path:
     """Where links lead: a name that is none, or that of an open file (``/dev/stdout`` leads below ``/proc``)."""
+    most_links = 40  # So many links are followed, as the system does (path_resolution(7)).
     place = path
-    for _ in range(_MOST_LINKS):
+    for _ in range(most_links):
         place = Path(os.path.realpath(place.parent), place.name)
         if place.parts[:2] == ("/", "proc") or not place.is_symlink():
             return place

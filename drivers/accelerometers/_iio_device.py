@@ -44,7 +44,6 @@ AXES = ("x", "y", "z")
 TIMESTAMP = "in_timestamp"
 MONOTONIC = "monotonic"
 _TYPE = re.compile(r"(be|le):([su])(\d{1,2})/(8|16|32|64)(?:X([01]))?(?:>>(\d{1,2}))?")
-_MAX_CHANNELS = 64
 
 Integers = npt.NDArray[np.int64]
 
@@ -157,7 +156,7 @@ def _elements(channels: Any) -> tuple[dict[str, Element], int]:
     """Each channel's place in a scan, and the size of a scan."""
     placed: dict[str, Element] = {}
     position = largest = 0
-    if len(channels) > _MAX_CHANNELS:
+    if len(channels) > 64:
         raise ValueError("too many channels")
     ordered = sorted((int(index), str(name), str(kind)) for name, index, kind in channels)
     if any(before[0] == after[0] for before, after in pairwise(ordered)):

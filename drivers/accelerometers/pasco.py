@@ -233,10 +233,6 @@ class PascoDecoder:
         return self._samples.take()
 
 
-_LARGEST_COUNT = 65536
-_LEAST_STEP_G = 0.1
-
-
 def _profile_name(node: SettingNode) -> str:
     """The name of a shipped profile, or a path, relative to the folder of the settings."""
     is_path = "/" in node.text() or node.text().endswith((".yaml", ".yml"))
@@ -251,9 +247,11 @@ def _calibration(node: SettingNode) -> ScaleCalibration:
 
 def _counts_at_0_and_1_g(node: SettingNode) -> tuple[float, float]:
     """Two points of an axis, extended to the counts at 0 and at 1 g."""
-    values = [item.number(-_LARGEST_COUNT, _LARGEST_COUNT) for item in node.items()]
-    if len(values) != 4 or abs(values[3] - values[1]) < _LEAST_STEP_G:
-        raise node.wrong(f"two different points [raw, g, raw, g], {_LEAST_STEP_G} g or more apart")
+    largest_count = 65536
+    least_step_g = 0.1
+    values = [item.number(-largest_count, largest_count) for item in node.items()]
+    if len(values) != 4 or abs(values[3] - values[1]) < least_step_g:
+        raise node.wrong(f"two different points [raw, g, raw, g], {least_step_g} g or more apart")
     first_raw, first_g, second_raw, second_g = values
     counts_per_g = (second_raw - first_raw) / (second_g - first_g)
     if abs(counts_per_g) < 1:

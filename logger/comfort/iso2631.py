@@ -262,11 +262,8 @@ class CautionZone:
 
 # As a dose of the whole day [m/s^1.75] (ISO 2631-1 clause B.3.1): for rides with shocks.
 CAUTION_ZONE_VDV_MPS175 = CautionZone(8.5, 17.0)
-# Estimated dose of steady vibration: eVDV = 1.4 a_w T^(1/4) (ISO 2631-1 Eq B.3), and the doses that bound the zone.
-_DOSE_PER_RMS = 1.4
 # The lines for n = 2 as drawn in Figure B.1: level up to 10 minutes, then a^2 t constant (Eq B.1).
 _LEVEL_MPS2 = CautionZone(3.0, 6.0)
-_LEVEL_UNTIL_HOURS = 1.0 / 6.0
 
 
 def caution_zone(hours: float, exponent: int) -> CautionZone:
@@ -277,11 +274,15 @@ def caution_zone(hours: float, exponent: int) -> CautionZone:
     for n = 2 have no formula there; they are read off the figure and meet the others at 6.0 hours. Raises ValueError
     for another exponent.
     """
+    # Estimated dose of steady vibration: eVDV = 1.4 a_w T^(1/4) (ISO 2631-1 Eq B.3), and the doses that bound the
+    # zone.
+    dose_per_rms = 1.4
+    level_until_hours = 1.0 / 6.0
     if exponent == 2:
-        factor = math.sqrt(_LEVEL_UNTIL_HOURS / max(hours, _LEVEL_UNTIL_HOURS))
+        factor = math.sqrt(level_until_hours / max(hours, level_until_hours))
         return CautionZone(_LEVEL_MPS2.lower * factor, _LEVEL_MPS2.upper * factor)
     if exponent == 4:
-        per_mps2 = _DOSE_PER_RMS * (hours * S_PER_HOUR) ** 0.25
+        per_mps2 = dose_per_rms * (hours * S_PER_HOUR) ** 0.25
         return CautionZone(CAUTION_ZONE_VDV_MPS175.lower / per_mps2, CAUTION_ZONE_VDV_MPS175.upper / per_mps2)
     raise ValueError(f"the zone is drawn for exponents 2 and 4, not {exponent}")
 
@@ -291,11 +292,6 @@ Array = npt.NDArray[np.float64]
 LOWEST_RATE_HZ = 80.0
 LEAST_TAKEN_HZ = 40.0
 """Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above."""
-SHORTEST_S = 1.0
-# Rounded times make an 80 Hz record look a little slower.
-_RATE_ROUNDING = 1e-3
-_STILL = 1e-12
-"""Of the level: a constant that was laid on another grid differs from itself by some parts in 1e15."""
 
 
 @dataclass(frozen=True)
@@ -355,16 +351,19 @@ def ride_comfort(
 
     ValueError for fewer than 80 samples a second, fewer than 40 that were taken, or less than 1 s.
     """
+    shortest_s = 1.0
+    # Rounded times make an 80 Hz record look a little slower.
+    rate_rounding = 1e-3
     vertical = accel_mps2["z"]
     assert vertical is not None
     duration_s = len(vertical) / rate_hz
-    if rate_hz < LOWEST_RATE_HZ * (1.0 - _RATE_ROUNDING):
+    if rate_hz < LOWEST_RATE_HZ * (1.0 - rate_rounding):
         raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
                          f"{time_hint(rate_hz)}")
     if taken_hz is not None and taken_hz < LEAST_TAKEN_HZ:
         raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
-    if duration_s < SHORTEST_S:
-        raise ValueError(f"expected at least {SHORTEST_S:g} s, found {duration_s:.3g} s")
+    if duration_s < shortest_s:
+        raise ValueError(f"expected at least {shortest_s:g} s, found {duration_s:.3g} s")
     weighted_mps2 = _weighed(weighting, vertical, rate_hz)
     axes, by = {"z": axis_figures(weighted_mps2, rate_hz)}, {"z": weighting}
     others = {axis: accel for axis, accel in accel_mps2.items() if axis != "z" and accel is not None}
@@ -379,6 +378,7 @@ def ride_comfort(
 
 def _weighed(weighting: Weighting, accel_mps2: Array, rate_hz: float) -> Array:
     """(n,); nothing at all of an axis that stands still: what a filter makes of a constant is its rounding."""
-    if np.ptp(accel_mps2) <= _STILL * np.abs(accel_mps2).max():
+    still = 1e-12  # Of the level: a constant that was laid on another grid differs from itself by some parts in 1e15.
+    if np.ptp(accel_mps2) <= still * np.abs(accel_mps2).max():
         return np.zeros(len(accel_mps2))
     return weighting.weigh(accel_mps2, rate_hz)

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-_MOST_SHAPE = 1e8  # beyond, a gamma distribution is a point, and its moments only rounding
-
 
 @dataclass(frozen=True)
 class Uncertain:
@@ -160,10 +158,11 @@ def _variance(derivatives: tuple[Array, ...], correlation: Array) -> float:
 def gamma_root(mean: float, variance: float, degree: int) -> Uncertain:
     """Mean and standard deviation of x^(1/degree), x gamma distributed. (Johnson, Kotz and Balakrishnan, Continuous
     Univariate Distributions 1, 17.)"""
+    most_shape = 1e8  # beyond, a gamma distribution is a point, and its moments only rounding
     if mean <= 0.0:
         return Uncertain(0.0, variance ** (0.5 / degree))
     root = mean ** (1 / degree)
-    if variance <= mean**2 / _MOST_SHAPE:
+    if variance <= mean**2 / most_shape:
         return Uncertain(root, root / degree * sqrt(variance) / mean)
     shape = mean**2 / variance
 

@@ -43,8 +43,6 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.intp]
 
-_DENSE = 0.03
-"""Share of entries that are not zero beyond which products of dense blocks are quicker than sparse ones (measured)."""
 _BLOCK = 4096
 _MOST_SESSIONS = 50_000
 """Whose sums are squared in whole; of more, what their roads add to that comes from a part of them, evenly chosen."""
@@ -222,7 +220,10 @@ def _scaled(matrix: Any, factor: Array) -> Any:
 
 
 def _is_dense(matrix: Any) -> bool:
-    return bool(matrix.nnz >= _DENSE * matrix.shape[0] * matrix.shape[1])
+    # Share of entries that are not zero beyond which products of dense blocks are quicker than sparse ones
+    # (measured).
+    dense = 0.03
+    return bool(matrix.nnz >= dense * matrix.shape[0] * matrix.shape[1])
 
 
 def _product(one: Any, other: Any) -> Array:
@@ -244,20 +245,6 @@ def _groups(information: Array) -> Codes:
     rank = np.empty(count, dtype=np.intp)
     rank[np.argsort(-np.bincount(label), kind="stable")] = np.arange(count)
     return np.asarray(rank[label], dtype=np.intp)
-
-
-_STEPS = 50
-_CLOSE = 1e-9
-_LEAST_GROWN = 0.1
-"""Of its level: where a road's growth is drawn too far, it stays above zero."""
-_ROUNDS = 2
-"""Of weights and variances; a third changes no error by 1 % (measured at 10^6 rows)."""
-_PROBED = 500_000
-"""Random signs for a trace: a few of a large data set, many of a small one, so that its error stays below 1 %."""
-_LEAST_FREEDOM = 1e-6
-LEAST_REPEATS = 6
-"""Of which a standard deviation is known within a factor of two, up or down, with 90 % certainty: the square root of 6
-over the 5 % quantile of chi-square with 6 degrees of freedom is 1.92; with 5 degrees it would be 2.09."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,13 +299,17 @@ class Variances:
 
 def car_biases(passes: RoadPasses, cars: int) -> CarBiases:
     """The biases of so many cars."""
+    rounds = 2  # Of weights and variances; a third changes no error by 1 % (measured at 10^6 rows).
+    # Of which a standard deviation is known within a factor of two, up or down, with 90 % certainty: the square root
+    # of 6 over the 5 % quantile of chi-square with 6 degrees of freedom is 1.92; with 5 degrees it would be 2.09.
+    least_repeats = 6
     variances = Variances(0.0, 0.0, 0.0)
     design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
-    repeats, needed = _repeats(passes, cars), LEAST_REPEATS + design.is_timed
+    repeats, needed = _repeats(passes, cars), least_repeats + design.is_timed
     if repeats < needed:
         return CarBiases(np.ones(cars), np.zeros(cars), design.group, np.zeros(cars, dtype=np.bool_), np.nan, np.nan,
                          np.nan, np.nan, repeats, needed)
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
         _, residual = _fitted(design)
         variances = _variances(design, residual)
@@ -353,13 +344,14 @@ def _repeats(passes: RoadPasses, cars: int) -> int:
 
 def _fitted(design: Elimination) -> tuple[Array, Array]:
     """The effects (c + 1,), and what they and the roads' levels leave of each pass (n,), relative."""
+    least_grown = 0.1  # Of its level: where a road's growth is drawn too far, it stays above zero.
     road, iri, weight = design.passes.road, design.passes.iri, design.weight
     total = design.by_road(weight)
     effects, growth = np.zeros(design.cars + 1), np.zeros(design.roads)
     residual = np.zeros(len(iri))
-    for _ in range(_STEPS):
+    for _ in range(50):
         grown = 1.0 + (effects[-1] + growth[road]) * design.time
-        expected = np.exp(effects[design.car]) * np.maximum(grown, _LEAST_GROWN)
+        expected = np.exp(effects[design.car]) * np.maximum(grown, least_grown)
         level = design.by_road(weight * iri / expected) / total
         residual = iri / (level[road] * expected) - 1.0 + growth[road] * design.time
         working = residual + design.of_effects(effects)
@@ -367,19 +359,21 @@ def _fitted(design: Elimination) -> tuple[Array, Array]:
         change = float(np.abs(found - effects).max())
         effects = found
         growth = design.slopes(working - design.of_effects(effects))
-        if change < _CLOSE:
+        if change < 1e-9:
             break
     return effects, residual
 
 
 def _variances(design: Elimination, residual: Array) -> Variances:
     """The three variances whose expected quadratic forms are those of the residuals; none is below zero."""
+    # Random signs for a trace: a few of a large data set, many of a small one, so that its error stays below 1 %.
+    probed = 500_000
     from scipy.optimize import nnls
 
     passes = design.passes
     sessions = len(passes.car_of_session)
     random = np.random.default_rng(1)
-    probes = int(np.clip(_PROBED // len(passes.count), 4, 100))
+    probes = int(np.clip(probed // len(passes.count), 4, 100))
 
     def expected(of: int) -> Array:
         def once() -> Array:
@@ -392,7 +386,7 @@ def _variances(design: Elimination, residual: Array) -> Variances:
     found, forms = _quadratic(design, residual), np.stack([expected(of) for of in range(3)], axis=1)
     # What is left of a form after cars and roads: nothing where, say, no road has been driven at three times.
     whole = np.array([len(passes.count), sessions, float(passes.count @ design.time**2)])
-    shown = np.diag(forms) > _LEAST_FREEDOM * whole
+    shown = np.diag(forms) > 1e-6 * whole
     scale = 1.0 / np.where(shown, forms.max(axis=1), 1.0)
     solved = np.zeros(3)
     solved[shown] = nnls((forms * scale[:, None])[np.ix_(shown, shown)], (found * scale)[shown])[0]

@@ -31,9 +31,6 @@ from logger.store.log.log_name import LogName
 from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
 from logger.units import US_PER_S
 
-_KEY_BYTES = 32
-_MOST_BYTES = 256 << 20
-
 
 def key_path(dataset: Path) -> Path:
     """Where the key of a dataset lies: beside its folder, so that the folder can be given away without it."""
@@ -42,15 +39,16 @@ def key_path(dataset: Path) -> Path:
 
 def own_key(dataset: Path) -> bytes:
     """The key of a dataset; a new one where there is none. BadInput for one that is damaged."""
+    key_bytes = 32
     path = key_path(dataset)
     if not path.exists():
-        replace_bytes(path, f"{secrets.token_hex(_KEY_BYTES)}\n".encode("ascii"), 0o600)
+        replace_bytes(path, f"{secrets.token_hex(key_bytes)}\n".encode("ascii"), 0o600)
     try:
         key = bytes.fromhex(read_bounded(path, 4096).decode("ascii").strip())
     except (ValueError, UnicodeDecodeError):
         key = b""
-    if len(key) != _KEY_BYTES:
-        raise BadInput(f"{path}: expected {2 * _KEY_BYTES} hexadecimal digits, the key of the cars' pseudonyms")
+    if len(key) != key_bytes:
+        raise BadInput(f"{path}: expected {2 * key_bytes} hexadecimal digits, the key of the cars' pseudonyms")
     return key
 
 
@@ -76,11 +74,12 @@ def names_path(dataset: Path) -> Path:
 
 def names_of(dataset: Path) -> Mapping[int, str]:
     """The cars' names by their numbers; none where the table is not there. BadInput for one that cannot be read."""
+    most_bytes = 256 << 20
     path = names_path(dataset)
     if not path.exists():
         return {}
     try:
-        rows = list(csv.reader(io.StringIO(read_bounded(path, _MOST_BYTES).decode("utf-8"), newline="")))
+        rows = list(csv.reader(io.StringIO(read_bounded(path, most_bytes).decode("utf-8"), newline="")))
         return {int(car.removeprefix("car-"), 16): word(name) for car, name in rows[1:]}
     except (ValueError, csv.Error):
         raise BadInput(f"{path}: expected lines car,name as 'fleet ingest' writes them; remove the file and ingest the "
@@ -239,8 +238,6 @@ Keyed = Callable[[Array, Array, Array, npt.NDArray[np.intp]], npt.NDArray[np.int
 
 ERRORS = ("iri_std_m_per_km", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
 """Columns of the IRI's standard error and its parts."""
-_LEAST_MOVE_M = 1.0
-_AGAIN_M = 5 * SEGMENT_M
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +287,7 @@ def headings(lat_deg: Array, lon_deg: Array, drive: npt.NDArray[np.intp]) -> Arr
     east = (lon_deg[after] - lon_deg[before] + 180.0) % 360.0 - 180.0
     east = east * np.cos(np.radians(lat_deg))
     moved_m = np.hypot(north, east) * (np.pi / 180.0 * EARTH_RADIUS_M)
-    return np.where(moved_m >= _LEAST_MOVE_M, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
+    return np.where(moved_m >= 1.0, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
 
 
 def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], trim_m: float
@@ -307,6 +304,7 @@ def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], t
 
 def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
     """Means over each pass, at the row in its middle; nothing at the others."""
+    again_m = 5 * SEGMENT_M
     count = len(drive)
     known = np.isfinite(rows["iri_m_per_km"]) & np.isfinite(rows["iri_std_m_per_km"])
     counted = {text: NOT_COUNTED.isdisjoint((text or "").split("|")) for text in set(rows["flags"].tolist())}
@@ -318,7 +316,7 @@ def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
         return {**found, "pass_windows": windows}
     along_m = np.cumsum(np.nan_to_num(rows["length_m"]))
     row = row[np.lexsort((row, rows["road"][row], drive[row]))]
-    new = (np.diff(rows["road"][row]) != 0) | (np.diff(drive[row]) != 0) | (np.diff(along_m[row]) > _AGAIN_M)
+    new = (np.diff(rows["road"][row]) != 0) | (np.diff(drive[row]) != 0) | (np.diff(along_m[row]) > again_m)
     number = np.cumsum(np.concatenate([[0], new]))
     size = np.bincount(number)
     middle = row[np.cumsum(size) - size + size // 2]
@@ -341,8 +339,6 @@ def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
 BATCH_ROWS = 500_000
 """Rows of a commit, at least: some 300 MB while they are written."""
 
-_TOGETHER_BYTES = 8 << 20
-"""Of logs that are read at once, at least: beyond it the cost of a reading no longer counts."""
 
 _MARKS = ("segment", "crc32", "utc_us")
 _SAME_US = 10_000_000
@@ -416,6 +412,8 @@ def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed,
 def _read_together(sessions: Sequence[Session], past: _Past, counts: Counts
                    ) -> Iterator[list[tuple[Session, list[tuple[bytes, str]]]]]:
     """Sessions that are not known whole, and the bytes of their logs, some megabytes at a time."""
+    # Of logs that are read at once, at least: beyond it the cost of a reading no longer counts.
+    together_bytes = 8 << 20
     together: list[tuple[Session, list[tuple[bytes, str]]]] = []
     size = 0
     for session in sessions:
@@ -426,7 +424,7 @@ def _read_together(sessions: Sequence[Session], past: _Past, counts: Counts
             continue
         together.append((session, found))
         size += sum(len(data) for data, _ in found)
-        if size >= _TOGETHER_BYTES:
+        if size >= together_bytes:
             yield together
             together, size = [], 0
     if together:

@@ -62,9 +62,7 @@ from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_I
 from logger.store.log.log_reader import iso_utc, utc
 from logger.units import INCH_PER_MILE_M_PER_KM
 
-_SHOWN_ROADS, _SHOWN_CARS = 15, 10
-_SURE = 2.0
-"""Standard errors that a bias is listed from."""
+_SHOWN_ROADS = 15
 
 
 def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
@@ -132,23 +130,25 @@ def not_known(figures: FleetFigures) -> str:
 
 
 def _words_cars(figures: FleetFigures) -> list[str]:
+    shown_cars = 10
+    SURE = 2.0  # Standard errors that a bias is listed from.
     biases = figures.biases
     bias, std = biases.gain - 1.0, biases.gain * biases.log_std
     if not isfinite(biases.pass_std):
-        more = len(figures.names) - _SHOWN_CARS
-        return [f"Cars: {', '.join(sorted(figures.names)[:_SHOWN_CARS])}"
+        more = len(figures.names) - shown_cars
+        return [f"Cars: {', '.join(sorted(figures.names)[:shown_cars])}"
                 + f" and {more} more (--json has all)" * (more > 0)]
     if not biases.known.any():
         return ["No road has passes of two cars: nothing is known of their biases"]
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
-    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > _SURE * std[one]]
+    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > SURE * std[one]]
     alone = int((~biases.known).sum())
     lines = [f"Cars that differ from the mean car ({len(sure)} of {len(bias)})"]
-    width = max((len(figures.names[one]) for one in sure[:_SHOWN_CARS]), default=0)
+    width = max((len(figures.names[one]) for one in sure[:shown_cars]), default=0)
     lines += [f"  {figures.names[one]:{width}}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
-              f"{int(figures.car_passes[one]):,} passes" for one in sure[:_SHOWN_CARS]]
-    if len(sure) > _SHOWN_CARS:
-        lines.append(f"  and {len(sure) - _SHOWN_CARS} more (--json has all)")
+              f"{int(figures.car_passes[one]):,} passes" for one in sure[:shown_cars]]
+    if len(sure) > shown_cars:
+        lines.append(f"  and {len(sure) - shown_cars} more (--json has all)")
     return lines + ([f"  of {alone} cars nothing is known: they share no road with others"] if alone else [])
 
 
@@ -230,11 +230,9 @@ def _line(lat_deg: float, lon_deg: float, heading_deg: float, length_m: float) -
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]
 
-CELLS = 64
 DEEPEST = 15
 """Where a segment of 66 ft is some 6 pixels long at middle latitudes."""
 _STEPS = 4096
-_MOST_LAT_DEG = 85.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +249,8 @@ class History:
 
 def projected(lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:
     """Places [degrees] in Web Mercator, the world being 1 wide and high, y downwards."""
-    lat_rad = np.radians(np.clip(lat_deg, -_MOST_LAT_DEG, _MOST_LAT_DEG))
+    most_lat_deg = 85.0
+    lat_rad = np.radians(np.clip(lat_deg, -most_lat_deg, most_lat_deg))
     return lon_deg / 360.0 + 0.5, 0.5 - np.arcsinh(np.tan(lat_rad)) / (2 * np.pi)
 
 
@@ -276,7 +275,8 @@ def write_tiles(segments: RoadTable, history: History, folder: Path) -> int:
 
 
 def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    column, row = _tile_of(x, y, level, parts=CELLS)
+    cells = 64
+    column, row = _tile_of(x, y, level, parts=cells)
     place, code = np.unique((column << 32) | row, return_inverse=True)
     length_m = np.bincount(code, segments.length_m)
     mean = np.bincount(code, segments.iri_m_per_km * segments.length_m) / length_m
@@ -284,9 +284,9 @@ def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator
     np.maximum.at(worst, code, segments.iri_m_per_km)
     np.maximum.at(worse, code, segments.worse.astype(np.int64))
     column, row = place >> 32, place & (2**32 - 1)
-    quarter = 1 << (2 * column // CELLS % 2 + 2 * (2 * row // CELLS % 2))
-    at = row % CELLS * CELLS + column % CELLS
-    for name, rows in _by_tile(column // CELLS, row // CELLS, level):
+    quarter = 1 << (2 * column // cells % 2 + 2 * (2 * row // cells % 2))
+    at = row % cells * cells + column % cells
+    for name, rows in _by_tile(column // cells, row // cells, level):
         yield name, {"n": int(np.bitwise_or.reduce(quarter[rows])), "at": at[rows].tolist(),
                      "m": _hundredths(mean[rows]), "w": _hundredths(worst[rows]), "c": worse[rows].tolist()}
 

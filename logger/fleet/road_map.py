@@ -34,9 +34,7 @@ DIRECTIONS = 8
 _BLOCK_CELLS = 64
 _FINE_BITS, _DIRECTION_BITS, _COLUMN_BITS = 6, 3, 15
 _CELL_BITS = 2 * _FINE_BITS + _DIRECTION_BITS
-_SECTION_BITS = 3
 _BLOCK_DEG = float(np.degrees(_BLOCK_CELLS * SEGMENT_M / EARTH_RADIUS_M))
-_REGION_BITS = 3
 ON_MAP = np.int64(1) << 62
 """This bit is set in keys of segments of a map (``road_map``), never in those of cells."""
 
@@ -80,16 +78,18 @@ def block_of(keys: Keys) -> Keys:
 
 def section_of(keys: Keys) -> Keys:
     """The sections, 0.1 mi wide and of one direction, that keys of cells (n,) lie in."""
+    section_bits = 3
     fine_row, fine_column = _fine(keys)
-    inside = ((fine_row >> _SECTION_BITS) << _FINE_BITS) | (fine_column >> _SECTION_BITS)
+    inside = ((fine_row >> section_bits) << _FINE_BITS) | (fine_column >> section_bits)
     return ((keys >> _CELL_BITS) << _CELL_BITS) | (inside << _DIRECTION_BITS) | (keys & (DIRECTIONS - 1))
 
 
 def region_of(lat_deg: Array, lon_deg: Array) -> Keys:
     """The coarse cell, 6.4 mi wide, that rows (n,) at these places are filed under."""
+    region_bits = 3
     block = block_of(cell_keys(lat_deg, lon_deg, np.zeros(len(lat_deg))))
     row, column = block >> _COLUMN_BITS, block & ((1 << _COLUMN_BITS) - 1)
-    return ((row >> _REGION_BITS) << (_COLUMN_BITS - _REGION_BITS)) | (column >> _REGION_BITS)
+    return ((row >> region_bits) << (_COLUMN_BITS - region_bits)) | (column >> region_bits)
 
 
 def _columns(row: Keys) -> Array:
@@ -108,10 +108,6 @@ _HEADING_STD_DEG = 20.0
 """Of the direction between windows 50 ft apart with fixes some metres off."""
 _REACH_M = 30.0
 _CANDIDATES = 12
-_NEIGHBOURS = 4
-"""Rows each way that vote: 30 m, over which a receiver's error has not changed but a junction is passed."""
-_FAR = 25.0
-"""Cost of a road that is not among a neighbour's candidates: five standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,14 +203,17 @@ class RoadMap:
 
 def _of_neighbours(way: npt.NDArray[np.int64], cost: Array, drive: npt.NDArray[np.intp]) -> Array:
     """What neighbours along the drive say of each candidate's road (n, k): the mean of their costs for it."""
+    # Rows each way that vote: 30 m, over which a receiver's error has not changed but a junction is passed.
+    neighbours = 4
+    far = 25.0  # Cost of a road that is not among a neighbour's candidates: five standard deviations.
     said, votes = np.zeros(way.shape), np.zeros((len(way), 1))
-    for shift in (*range(-_NEIGHBOURS, 0), *range(1, _NEIGHBOURS + 1)):
+    for shift in (*range(-neighbours, 0), *range(1, neighbours + 1)):
         other = np.arange(len(way)) + shift
         there = (other >= 0) & (other < len(way))
         other = np.where(there, other, 0)
         there &= drive[other] == drive
         same = way[:, :, None] == way[other][:, None, :]
-        theirs = np.minimum(np.where(same, cost[other][:, None, :], np.inf).min(axis=2), _FAR)
+        theirs = np.minimum(np.where(same, cost[other][:, None, :], np.inf).min(axis=2), far)
         said += np.where(there[:, None], theirs, 0.0)
         votes += there[:, None]
     return said / np.maximum(votes, 1.0)

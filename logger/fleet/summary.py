@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 YEAR_US = 365.25 * 86400e6
 """A Julian year."""
-_PRIME = 1_000_003
 
 
 def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:
@@ -70,7 +69,7 @@ def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None
     prime, as the last bits of a key are a direction."""
     passes = _passes(rows, since_us, until_us)
     if one_in > 1:
-        passes = passes.filter((passes.road % _PRIME) % one_in == 0)
+        passes = passes.filter((passes.road % 1_000_003) % one_in == 0)
     passes = passes.mutate(years=(passes.utc_us - zero_us).cast("float64") / YEAR_US)
     return passes.group_by(["road", "car", "session"]).aggregate(
         passes=passes.count(), iri=passes.pass_iri_m_per_km.mean(), years=passes.years.mean())
@@ -212,12 +211,7 @@ Keys = npt.NDArray[np.int64]
 
 FALSE_SHARE = 0.05
 """Of false ones among the changes that are called significant."""
-_POWER = 0.8
-_CERTAIN = 1.645
-"""Standard errors from a mean to where it lies with 95 % certainty on one side."""
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
-UNCOMFORTABLE_MPS2 = 0.8
-"""ISO 2631-1, C.2.3."""
 SECTION_M = MILE_M / 10
 MOST_PASSES = 1_000_000
 """From which biases are estimated, some 300 MB; of more those of a part of the roads are taken. What the passes of a
@@ -373,7 +367,7 @@ def change_found(roads: RoadTable) -> float:
         return np.nan
     called = significant(roads.p_value, FALSE_SHARE)
     at_p = float(roads.p_value[called].max()) if called.any() else FALSE_SHARE / int(known.sum())
-    needed = float(norm.isf(at_p / 2) + norm.ppf(_POWER))
+    needed = float(norm.isf(at_p / 2) + norm.ppf(0.8))
     return needed * float(np.median(roads.trend_std_m_per_km_per_year[known]))
 
 
@@ -446,9 +440,11 @@ def _normal_p(trend: Array, trend_std: Array) -> Array:
 def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Array, length_m: Array, cars: Keys,
            passes: Array, mean_years: Array, figures: RoadFigures, a_w_mps2: Array, speed_mps: Array, last_us: Keys
            ) -> RoadTable:
+    certain = 1.645  # Standard errors from a mean to where it lies with 95 % certainty on one side.
+    uncomfortable_mps2 = 0.8  # ISO 2631-1, C.2.3.
     worse = significant(figures.p_value, FALSE_SHARE) & (figures.trend_m_per_km_per_year > 0)
-    rough = figures.iri_m_per_km - _CERTAIN * figures.iri_std_m_per_km > POOR_M_PER_KM
-    hard = a_w_mps2 >= UNCOMFORTABLE_MPS2
+    rough = figures.iri_m_per_km - certain * figures.iri_std_m_per_km > POOR_M_PER_KM
+    hard = a_w_mps2 >= uncomfortable_mps2
     words = np.array(["|".join(word for word, holds in zip(("rough", "worse", "uncomfortable"), three, strict=True)
                                if holds) for three in zip(rough, worse, hard, strict=True)], dtype=np.str_)
     return RoadTable(by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64), passes,

@@ -31,19 +31,11 @@ METHODS = {
     "ssi": "data-driven stochastic subspace, canonical weighting",
     "n4sid": "deterministic-stochastic subspace, canonical weighting",
 }
-SHORTEST = 100  # samples
 
-_SEGMENTS = 30
 _LEAST_PAST, _MOST_PAST = 60, 300
 """Lags of the past that a state is made of, at most so many samples in all. Measured: with 20 ssi misses 25 of 234
 modes and reports one that is not there, with 60 it misses 21 and with all that there are 29."""
-_MOST_STATES = 40
 _BEYOND = 8  # states beyond the chosen order, for the stabilisation diagram
-_DECAY_RATIO = 3.0
-_DIAGRAM_ORDERS = 24
-_ONE_MODE = 5  # order of excitation: 2 n + 1 for its two states
-_ROUNDED = 10.0  # times the power of rounding: more is of the input
-_FEW_LEVELS = 1e-3  # of an input's power: were rounding more than this, its levels are the input's own, as of a switch
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ def decays(samples: Array) -> bool:
     """Whether a record (samples, channels) looks like a free decay: its first third much louder than the second."""
     thirds = np.array_split(samples - samples[-len(samples) // 3:].mean(axis=0), 3)
     power = [float((third**2 / np.maximum(samples.var(axis=0), 1e-300)).mean()) for third in thirds]
-    return power[0] > _DECAY_RATIO * power[1] and power[1] > 0.8 * power[2]
+    return power[0] > 3.0 * power[1] and power[1] > 0.8 * power[2]
 
 
 def find_modes(
@@ -73,8 +65,9 @@ def find_modes(
 
     ValueError for a record that is too short or a channel that never moves, or an input that shows no mode.
     """
-    if len(samples) < SHORTEST:
-        raise ValueError(f"expected at least {SHORTEST} samples, found {len(samples)}")
+    shortest = 100  # samples
+    if len(samples) < shortest:
+        raise ValueError(f"expected at least {shortest} samples, found {len(samples)}")
     if inputs is None and (decays(samples) if decay is None else decay):
         how = f"free decay: poles proposed by {METHODS['era']}, judged and refined by least squares"
         return decay_modes(samples, rate_hz, proposals, how)
@@ -83,7 +76,7 @@ def find_modes(
         raise ValueError("expected channels that differ, found one that is a sum of others: leave it out")
     whole = samples if inputs is None else np.hstack([samples, inputs])
     plan = _plan((whole - whole.mean(axis=0)) / whole.std(axis=0), samples.shape[1], rate_hz)
-    segments = segment_products(plan.data, plan.lags, min(_SEGMENTS, len(samples) // (2 * plan.lags)))
+    segments = segment_products(plan.data, plan.lags, min(30, len(samples) // (2 * plan.lags)))
     moments = segments.whole()
     chosen = plan.best(moments)
     how = (f"response to unmeasured random forces: {METHODS['ssi']}" if inputs is None else
@@ -91,7 +84,7 @@ def find_modes(
     if chosen == 0:
         return ModalResult((), (), 0, f"{how}; no model explains more than its parameters cost")
     place = plan.orders.index(chosen)
-    thinned = plan.orders[place::-(place // _DIAGRAM_ORDERS + 1)][::-1]
+    thinned = plan.orders[place::-(place // 24 + 1)][::-1]
     diagram = plan.models(moments, thinned + plan.orders[place + 1:place + 1 + _BEYOND])
     place = len(thinned) - 1
     found = diagram[place] if inputs is not None else _without_bias(diagram[place], len(samples) / rate_hz)
@@ -132,7 +125,7 @@ def _plan(data: Array, outputs: int, rate_hz: float) -> _Plan:
         raise ValueError(f"expected at least {24 * channels} samples for {channels} channels, found {len(data)}")
     needed = max(_memory(data, outputs, longest), _LEAST_PAST)
     horizon = min(needed, longest, max(_MOST_PAST // channels, 30))
-    most = min(_MOST_STATES + _BEYOND, (horizon - 1) * outputs) // 2 * 2
+    most = min(40 + _BEYOND, (horizon - 1) * outputs) // 2 * 2
     if channels > outputs:
         most = min(most, (_excitation(data[:, outputs:], rate_hz, 2 * most + 1) - 1) // 4 * 2)
     orders = list(range(2, most + 1, 2))
@@ -162,17 +155,21 @@ def _excitation(inputs: Array, rate_hz: float, lags: int) -> int:
 
     ValueError where it is too low for one mode.
     """
+    one_mode = 5  # order of excitation: 2 n + 1 for its two states
+    rounded = 10.0  # times the power of rounding: more is of the input
+    # of an input's power: were rounding more than this, its levels are the input's own, as of a switch
+    few_levels = 1e-3
     moments = segment_products(np.hstack([inputs, np.ones((len(inputs), 1))]), lags, 1).whole()
     steps = np.diff(np.sort(inputs, axis=0), axis=0)
     rounding = max(float(step[step > 0].min()) ** 2 / 12 for step in steps.T)
-    rounding = rounding if rounding < _FEW_LEVELS else 0.0
-    count = int((np.linalg.eigvalsh(moments.products) > _ROUNDED * max(rounding, subspace.RIDGE)).sum()) - 1
-    if count < _ONE_MODE:
+    rounding = rounding if rounding < few_levels else 0.0
+    count = int((np.linalg.eigvalsh(moments.products) > rounded * max(rounding, subspace.RIDGE)).sum()) - 1
+    if count < one_mode:
         power = (np.abs(np.fft.rfft(inputs, axis=0)) ** 2).sum(axis=1)
         strongest_hz = float(power.argmax()) * rate_hz / len(inputs)
         raise ValueError(
             f"expected an input with many frequencies, found {(count + 1) // 2} (the strongest {strongest_hz:.3g} Hz): "
-            f"its order of excitation is {count}, and one mode takes persistent excitation of order {_ONE_MODE}; drive "
+            f"its order of excitation is {count}, and one mode takes persistent excitation of order {one_mode}; drive "
             "the structure with a sweep or noise, or leave the input out")
     return count
 

@@ -49,16 +49,7 @@ from logger.modal.mode import (
 
 Propose = Callable[[Array, float], tuple[OrderPoles, ...]]
 
-_FALSE_ALARM = 1e-3  # chance that a record of noise yields a mode
-_MOST_MODES = 40
-_AHEAD = 4  # poles that are tried beyond those that are believed
-_MOST_STEPS = 60
-_FEWEST_TO_TELL = 25  # samples from which the noise is known while a mode lasts
-_LOUDNESS_BINS = 60  # of the residual's spectrum on which the noise around a mode is measured
-_ALIKE = 0.005  # relative distance of poles that are tried once only
-_LEAST_DAMPING, _MOST_DAMPING = -0.05, 0.95
-_MOST_GROWTH = 10.0  # in powers of e, from the first sample to the last
-_LARGEST_ERROR = 0.5  # a damping ratio whose standard error is more than this is none
+_MOST_DAMPING = 0.95
 
 
 @dataclass(frozen=True)
@@ -98,9 +89,10 @@ def decay_modes(samples: Array, rate_hz: float, propose: Propose, how: str) -> M
 
 def _threshold(samples: int, channels: int) -> float:
     """Chi-squared that the best of all frequencies reaches by chance once in a thousand records of noise."""
+    false_alarm = 1e-3  # chance that a record of noise yields a mode
     from scipy.special import chdtri
 
-    return float(chdtri(2 * channels + 2, _FALSE_ALARM / samples))
+    return float(chdtri(2 * channels + 2, false_alarm / samples))
 
 
 def _basis(poles: Complex, count: int, rate_hz: float) -> Array:
@@ -143,7 +135,7 @@ def _normal_equations(fit: _Fit, rate_hz: float) -> tuple[Array, Array]:
 
 def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
     """Gauss-Newton on the poles, each step shortened until it helps."""
-    for _ in range(_MOST_STEPS):
+    for _ in range(60):
         information, gradient = _normal_equations(fit, rate_hz)
         scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
         step = np.linalg.lstsq(information / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0] / scale
@@ -188,7 +180,8 @@ def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
     What grows lasts all along. What is over in a few samples, most of whose noise the fit took, is given some more: too
     few show nothing of the noise, and heavily damped modes would drown in what is not known of it.
     """
-    fall = np.clip(poles.real, -rate_hz / _FEWEST_TO_TELL, 0.0)
+    fewest_to_tell = 25  # samples from which the noise is known while a mode lasts
+    fall = np.clip(poles.real, -rate_hz / fewest_to_tell, 0.0)
     envelope = np.exp(2 * np.outer(fall, np.arange(len(fit.residual)) / rate_hz))
     return envelope, np.maximum(1 - (fit.orthonormal**2).sum(axis=1), 0.0)
 
@@ -200,12 +193,13 @@ def _loudness(fit: _Fit, rate_hz: float) -> Array:
 
 def _louder_nearby(fit: _Fit, rate_hz: float) -> Array:
     """In the residual's spectrum around each mode."""
+    loudness_bins = 60  # of the residual's spectrum on which the noise around a mode is measured
     count = len(fit.residual)
     power = np.abs(np.fft.rfft(fit.residual, axis=0)) ** 2 / (count * fit.noise)
     sums = np.vstack([np.zeros(power.shape[1]), np.cumsum(power, axis=0)])
     middle = np.round(fit.poles.imag / (2 * np.pi) * count / rate_hz).astype(int)
-    half = np.maximum(_LOUDNESS_BINS // 2, np.abs(fit.poles.real) / np.pi * count / rate_hz).astype(int)
-    first = np.clip(middle - half, 1, max(1, len(power) - 2 * _LOUDNESS_BINS // 2))
+    half = np.maximum(loudness_bins // 2, np.abs(fit.poles.real) / np.pi * count / rate_hz).astype(int)
+    first = np.clip(middle - half, 1, max(1, len(power) - 2 * loudness_bins // 2))
     last = np.clip(middle + half, first + 1, len(power))
     return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
 
@@ -223,11 +217,12 @@ def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
     While modes are missing the residual is no noise, and a few more poles are tried before those that are no stronger
     than it are given up.
     """
+    ahead = 4  # poles that are tried beyond those that are believed
     proposed = _different(np.concatenate([np.empty(0, complex), *(found.poles for found in diagram)]),
                           len(samples) / rate_hz)
     waves = _basis(proposed, len(samples), rate_hz)
     believed = fit
-    while len(proposed) and len(fit.poles) < min(_MOST_MODES, len(believed.poles) + _AHEAD):
+    while len(proposed) and len(fit.poles) < min(40, len(believed.poles) + ahead):
         gains = _gains(fit, waves)
         fair = (gains / np.maximum(1.0, _louder_meanwhile(fit, proposed, rate_hz))).sum(axis=1)
         best = int(fair.argmax() if fair.max() >= threshold else gains.sum(axis=1).argmax())
@@ -247,13 +242,15 @@ def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
 
 def _bounded(poles: Complex, duration_s: float) -> npt.NDArray[np.bool_]:
     """Which poles grow little enough, if at all, to be those of a record of this duration."""
-    return np.asarray((damping_ratio(poles) > _LEAST_DAMPING) & (poles.real * duration_s < _MOST_GROWTH))
+    most_growth = 10.0  # in powers of e, from the first sample to the last
+    return np.asarray((damping_ratio(poles) > -0.05) & (poles.real * duration_s < most_growth))
 
 
 def _different(poles: Complex, duration_s: float) -> Complex:
     """Poles that could be modes, one of those that are alike within a per cent of damping."""
+    alike = 0.005  # relative distance of poles that are tried once only
     poles = poles[_bounded(poles, duration_s) & (damping_ratio(poles) < _MOST_DAMPING)]
-    cells = np.round(np.log(poles) / _ALIKE)
+    cells = np.round(np.log(poles) / alike)
     return np.asarray(poles[np.unique(cells, return_index=True)[1]])
 
 
@@ -291,6 +288,7 @@ def _gains(fit: _Fit, waves: Array) -> Array:
 
 
 def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[list[FoundMode], list[Rejected]]:
+    largest_error = 0.5  # a damping ratio whose standard error is more than this is none
     modes: list[FoundMode] = []
     rejected: list[Rejected] = []
     if not len(fit.poles):
@@ -308,7 +306,7 @@ def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[l
         reason = None
         if significance[k] < threshold:
             reason = "no stronger than the noise around it"
-        elif frequency_std > _LARGEST_ERROR * frequency or damping_std > _LARGEST_ERROR:
+        elif frequency_std > largest_error * frequency or damping_std > largest_error:
             reason = "the record does not determine its frequency or damping"
         elif ratio < -2 * damping_std:
             reason = "it grows instead of decaying: a hum, not a mode"
@@ -326,11 +324,6 @@ def _unsupported(poles: Complex, diagram: tuple[OrderPoles, ...]) -> list[Reject
         return []
     left = [complex(s) for s in diagram[-1].poles if not len(poles) or np.abs(poles - s).min() > 0.05 * abs(s)]
     return [Rejected(abs(s) / (2 * np.pi), -s.real / abs(s), "explains no more than noise would") for s in left]
-
-
-_BAND = (0.6, 1.4)  # of the strongest frequency
-_FADED = 0.1  # of the first peak: what is below is left to the noise
-_FEWEST_PEAKS = 4
 
 
 @dataclass(frozen=True)
@@ -355,14 +348,16 @@ def log_decrement(samples: Array, rate_hz: float) -> Decrement:
 
     ValueError when fewer than four peaks rise above a tenth of the first.
     """
+    FADED = 0.1  # of the first peak: what is below is left to the noise
+    fewest_peaks = 4
     wave, strongest_hz = _alone(samples, rate_hz)
     top = np.flatnonzero((wave[1:-1] > wave[:-2]) & (wave[1:-1] >= wave[2:]) & (wave[1:-1] > 0)) + 1
     edge = rate_hz / strongest_hz  # the cut rings at both ends
     top = top[(top > edge) & (top < len(wave) - edge)]
-    faded = np.flatnonzero(wave[top] < _FADED * wave[top].max(initial=0.0)) if len(top) else np.empty(0, int)
+    faded = np.flatnonzero(wave[top] < FADED * wave[top].max(initial=0.0)) if len(top) else np.empty(0, int)
     top = top[:faded[0]] if len(faded) else top
-    if len(top) < _FEWEST_PEAKS:
-        raise ValueError(f"expected at least {_FEWEST_PEAKS} peaks of one vibration, found {len(top)}")
+    if len(top) < fewest_peaks:
+        raise ValueError(f"expected at least {fewest_peaks} peaks of one vibration, found {len(top)}")
     below, peak, above = wave[top - 1], wave[top], wave[top + 1]
     shift = 0.5 * (below - above) / (below - 2 * peak + above)
     height, time_s = peak - 0.25 * (below - above) * shift, (top + shift) / rate_hz
@@ -382,10 +377,11 @@ def decrement_mode(samples: Array, rate_hz: float) -> ModalResult:
 
 
 def _alone(samples: Array, rate_hz: float) -> tuple[Array, float]:
+    band = (0.6, 1.4)  # of the strongest frequency
     seen = np.fft.rfft(samples - samples.mean())
     frequency_hz = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     strongest_hz = float(frequency_hz[1 + np.abs(seen[1:]).argmax()])
-    inside = (frequency_hz > _BAND[0] * strongest_hz) & (frequency_hz < _BAND[1] * strongest_hz)
+    inside = (frequency_hz > band[0] * strongest_hz) & (frequency_hz < band[1] * strongest_hz)
     return np.fft.irfft(np.where(inside, seen, 0), len(samples)), strongest_hz
 
 
@@ -398,22 +394,18 @@ def _slope(values: Array) -> tuple[float, float]:
     return float(slope), float(np.sqrt((left**2).sum() / (len(values) - 2) / power))
 
 
-_MOST_ROWS, _MOST_COLUMNS = 300, 400
-_PROPOSED_STATES = 40
-_RANK = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
-
-
 def proposals(samples: Array, rate_hz: float) -> tuple[OrderPoles, ...]:
     """Poles of the orders 2, 4, ... 40 of a free decay (samples, channels)."""
+    rank = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
     count, channels = samples.shape
-    rows = max(2, min(_MOST_ROWS // channels, count // 2))
-    columns = max(1, min(_MOST_COLUMNS, count - rows))
+    rows = max(2, min(300 // channels, count // 2))
+    columns = max(1, min(400, count - rows))
     blocks = samples[np.arange(rows)[:, None] + np.arange(columns + 1)]  # (rows, columns + 1, channels)
     whole = blocks.transpose(0, 2, 1).reshape(rows * channels, columns + 1)
     early, late = whole[:, :-1], whole[:, 1:]
     squares, left = np.linalg.eigh(early @ early.T)
     sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
-    n = max(1, min(_PROPOSED_STATES, int((sizes > _RANK * sizes[0]).sum())))
+    n = max(1, min(40, int((sizes > rank * sizes[0]).sum())))
     left, root = left[:, :n], np.sqrt(np.maximum(sizes[:n], 1e-300))
     transition = left.T @ late @ ((left.T @ early) / sizes[:n, None]).T / np.outer(root, root)
     observe = left[:channels] * root

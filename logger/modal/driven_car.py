@@ -37,20 +37,10 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-# A piece holds some ten of a body's slowest swings; its lowest bins are those of drift and of the offset.
-_PIECE_S, _LOWEST_BIN = 10.0, 4
-_FLAT_TO, _HIGHEST_HZ = 0.38, 25.0  # of the rate: above, recorders' filters differ; wheels hop below 20 Hz
-LEAST_PIECES = 4
-_SPEED_STEP = 0.01  # speeds as near as this share one spectrum
-_STANDING_MPS = 2.0  # slower, engine and driver shake a car as much as the road does
+_PIECE_S = 10.0
 _KERNEL = 6  # half bins to each side that a Hann taper mixes
 _USUAL_WAVINESS, _WAVINESS_SPREAD, _PIVOT_CPM = 2.0, 0.5, 0.2
 _SPREAD, _NOISE_SPREAD = 0.5, 3.0  # of logarithms; the noise starts at the quietest bin
-_FLOORS = (0.0, -2.0)  # of logarithms, over the mean power
-_MOST_STEPS, _LONGEST_STEP, _AT_REST, _HALVINGS = 60, 0.3, 1e-3, 12
-_DERIVATIVE_STEP = 1e-4
-# Bands in which measured and fitted spectrum are compared, and what is no chance and no trifle.
-_BANDS, _MOST_MISFIT, _SURE = 12, 0.2, 4.0
 
 
 class UnlikeCar(ValueError):
@@ -81,18 +71,24 @@ def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], r
 
     ValueError for fewer than four.
     """
+    # A piece holds some ten of a body's slowest swings; its lowest bins are those of drift and of the offset.
+    lowest_bin = 4
+    flat_to, highest_hz = 0.38, 25.0  # of the rate: above, recorders' filters differ; wheels hop below 20 Hz
+    least_pieces = 4
+    speed_step = 0.01  # speeds as near as this share one spectrum
+    standing_mps = 2.0  # slower, engine and driver shake a car as much as the road does
     count = 2 * round(_PIECE_S * rate_hz / 2)
     taper = np.hanning(count + 1)[:count]
-    fit = usable & (speed_mps >= _STANDING_MPS)
+    fit = usable & (speed_mps >= standing_mps)
     starts = [at for at in range(0, len(samples) - count + 1, count // 2) if fit[at:at + count].all()]
-    if len(starts) < LEAST_PIECES:
-        raise ValueError(f"expected at least {LEAST_PIECES} stretches of {_PIECE_S:g} s, each half over the last, at "
-                         f"{_STANDING_MPS:g} m/s or faster, found {len(starts)}")
+    if len(starts) < least_pieces:
+        raise ValueError(f"expected at least {least_pieces} stretches of {_PIECE_S:g} s, each half over the last, at "
+                         f"{standing_mps:g} m/s or faster, found {len(starts)}")
     index = np.array(starts)[:, None] + np.arange(count)
     cut = samples[index] - samples[index].mean(axis=1, keepdims=True)
     power = np.abs(np.fft.rfft(cut * taper, axis=1)) ** 2 * 2 / (rate_hz * float(taper @ taper))
-    bins = np.arange(_LOWEST_BIN, int(min(_FLAT_TO * rate_hz, _HIGHEST_HZ) * count / rate_hz) + 1)
-    cells = np.round(np.log(speed_mps[index]) / _SPEED_STEP).astype(np.int64)
+    bins = np.arange(lowest_bin, int(min(flat_to * rate_hz, highest_hz) * count / rate_hz) + 1)
+    cells = np.round(np.log(speed_mps[index]) / speed_step).astype(np.int64)
     known, where = np.unique(cells, return_inverse=True)
     where = where.reshape(cells.shape)
     weights = taper**2 / float(taper @ taper)
@@ -164,9 +160,10 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
     best where a floor of noise hides first all but the loudest parts of the spectrum, then fewer: with the deep gaps
     between them in sight from the beginning, many sets of numbers are the best near them. ``UnlikeCar`` where the
     spectra are not those of such a car."""
+    floors = (0.0, -2.0)  # of logarithms, over the mean power
     model = CarOnRoads(vehicle, pieces, rate_hz)
     x, loudest = model.start, float(np.log(pieces.power.mean()))
-    for floor in _FLOORS:
+    for floor in floors:
         x = _descend(model, np.append(x[:-1], loudest + floor), floor_is_known=True)[0]
     starts = model.start, np.append(x[:-1], model.start[-1])
     x, spectrum, information, _, settled = min((_descend(model, one) for one in starts), key=lambda found: found[3])
@@ -191,7 +188,7 @@ def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> t
         return whittle + 0.5 * float(model.precision @ (x - model.start) ** 2), spectrum
 
     here, spectrum = cost(x, level, shapes)
-    for _ in range(_MOST_STEPS):
+    for _ in range(60):
         own = np.exp(level)[:, None] * shapes / spectrum  # d ln S / d ln g of each piece
         by = np.concatenate([np.exp(level)[:, None] * slopes / spectrum, (np.exp(x[-1]) / spectrum)[None]])
         off = pieces.worth * (power / spectrum - 1)
@@ -203,11 +200,11 @@ def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> t
         if floor_is_known:
             wanted[-1], information[-1, :-1], information[:-1, -1] = 0.0, 0.0, 0.0
         step = np.linalg.solve(information, wanted)
-        if settled := float(wanted @ step) < _AT_REST:
+        if settled := float(wanted @ step) < 1e-3:
             break
         level_step = (slope_level - across.T @ step) / alone
-        part = min(1.0, _LONGEST_STEP / np.abs(step).max())
-        for _ in range(_HALVINGS):
+        part = min(1.0, 0.3 / np.abs(step).max())
+        for _ in range(12):
             tried, tried_level = x + part * step, level + part * level_step
             shapes, slopes = model.shapes(tried)
             there, spectrum = cost(tried, tried_level, shapes)
@@ -222,15 +219,17 @@ def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> t
 
 def _shares(pieces: Periodograms, spectrum: Array) -> tuple[Array, Array]:
     """Measured over expected power in bands. ``UnlikeCar`` where that is neither chance nor a trifle."""
+    # Bands in which measured and fitted spectrum are compared, and what is no chance and no trifle.
+    bands, most_misfit, sure = 12, 0.2, 4.0
     f_hz, worth = pieces.bins * pieces.step_hz, pieces.worth.sum(axis=0)
-    edges = np.unique(np.searchsorted(f_hz, np.geomspace(f_hz[0], f_hz[-1], _BANDS + 1)[:-1]))
+    edges = np.unique(np.searchsorted(f_hz, np.geomspace(f_hz[0], f_hz[-1], bands + 1)[:-1]))
     total = np.maximum(np.add.reduceat(worth, edges), 1e-9)
     share = np.asarray(np.add.reduceat((pieces.worth * (pieces.power / spectrum - 1)).sum(axis=0), edges) / total + 1,
                        dtype=np.float64)
     chance = 1 / np.sqrt(total)
-    off = np.where(np.abs(share - 1) > _SURE * chance, np.abs(share - 1), 0.0)
+    off = np.where(np.abs(share - 1) > sure * chance, np.abs(share - 1), 0.0)
     worst = int(off.argmax())
-    if off[worst] > _MOST_MISFIT:
+    if off[worst] > most_misfit:
         raise UnlikeCar(f"from {f_hz[edges[worst]]:.2g} Hz the reading has {share[worst]:.2f} times the power that "
                         "this car has on a random road, whatever its springs, dampers and masses")
     return np.asarray(f_hz[edges], dtype=np.float64), share
@@ -238,12 +237,13 @@ def _shares(pieces: Periodograms, spectrum: Array) -> tuple[Array, Array]:
 
 def found_modes(fit: CarFit) -> tuple[list[FoundMode], list[Rejected]]:
     """The modes that the reading resolves, with standard errors, and those that it does not."""
+    derivative_step = 1e-4
     base = _modes(fit.vehicle)
     slopes = np.zeros((len(fit.names), *base.shape))
     for number, name in enumerate(fit.names):
-        moved = _modes(changed(fit.vehicle, {name: read(fit.vehicle, name) * (1 + _DERIVATIVE_STEP)}))
+        moved = _modes(changed(fit.vehicle, {name: read(fit.vehicle, name) * (1 + derivative_step)}))
         near = np.abs(base[:, None, 0] / moved[None, :, 0] - 1) + np.abs(base[:, None, 1] - moved[None, :, 1])
-        slopes[number] = (moved[near.argmin(axis=1)] - base) / _DERIVATIVE_STEP
+        slopes[number] = (moved[near.argmin(axis=1)] - base) / derivative_step
     errors = np.sqrt(np.einsum("iab,ij,jab->ab", slopes, fit.covariance, slopes))
     modes, rejected = [], []
     for (frequency, ratio), (frequency_std, ratio_std) in zip(base.tolist(), errors.tolist(), strict=True):

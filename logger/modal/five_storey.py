@@ -27,8 +27,6 @@ from logger.modal.mode import Array, Complex
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.structure import driven_outputs, matrix_exponential, recursion, straight_step
 
-_STEPS_PER_SAMPLE = 4
-
 
 @dataclass(frozen=True)
 class Masses:
@@ -84,18 +82,16 @@ def random_response(masses: Masses, force_n: Array, rate_hz: float) -> Array:
     White forces have an infinite acceleration at the mass they push; what is returned is the part of the springs and
     dampers, as a sensor sees that whose band ends far below that of the force.
     """
+    steps_per_sample = 4
     transition, drive, observe, _ = masses.equations()
-    step, begin, end = straight_step(transition, drive, 1 / (rate_hz * _STEPS_PER_SAMPLE))
+    step, begin, end = straight_step(transition, drive, 1 / (rate_hz * steps_per_sample))
     start = np.zeros(len(transition))
-    return driven_outputs(step, begin + end, observe, force_n, start)[1::_STEPS_PER_SAMPLE]
+    return driven_outputs(step, begin + end, observe, force_n, start)[1::steps_per_sample]
 
 
-FLOOR_KG, CLAMP_KG, PHONE_KG, SENSOR_KG, AIRLINK_KG = 0.346, 0.35834, 0.112, 0.048, 0.078
-ELASTICITY_PA, SECOND_MOMENT_M4, CLEAR_HEIGHT_M = 2.2e9, 33.873e-12, 0.142875
 DAMPING_RATIO = 0.0134  # Eq 5.3
 RATE_HZ = 100.0
 DURATION_S = 75.0  # at which a decay from Eq 5.3's first peak has the r.m.s. of Table 5.1
-FIRST_PEAK_G, FIRST_PEAK_S = 0.1978, 1.19
 
 PRINTED_MEASURED_HZ = (0.7419, 2.548, 4.226)
 PRINTED_MODEL_HZ = (0.7453, 2.500, 4.534)
@@ -128,9 +124,10 @@ class SensorRecord:
 
 def structure(stiffness_n_per_m: float | None = None) -> Masses:
     """Mass, damping and stiffness of the building, damping ratio 1.34 % in every mode."""
-    middle = 7.5 * ELASTICITY_PA * SECOND_MOMENT_M4 / CLEAR_HEIGHT_M**3
-    top_kg = FLOOR_KG + 2 * CLAMP_KG + PHONE_KG + SENSOR_KG + AIRLINK_KG
-    mass, stiffness = chain(np.array([FLOOR_KG] * 4 + [top_kg]), np.full(5, stiffness_n_per_m or middle))
+    floor_kg = 0.346
+    middle = 7.5 * 2.2e9 * 33.873e-12 / 0.142875**3
+    top_kg = floor_kg + 2 * 0.35834 + 0.112 + 0.048 + 0.078
+    mass, stiffness = chain(np.array([floor_kg] * 4 + [top_kg]), np.full(5, stiffness_n_per_m or middle))
     return with_damping_ratios(mass, stiffness, np.full(5, DAMPING_RATIO))
 
 
@@ -145,10 +142,11 @@ def released(building: Masses, samples: int = round(DURATION_S * RATE_HZ)) -> Ar
 
     As strong as to give the first peak of Eq 5.3 at the top.
     """
+    first_peak_s = 1.19
     pulled = np.linalg.solve(building.stiffness, np.eye(5)[4])
     accel = free_decay(building, pulled / pulled[4], RATE_HZ, samples)
-    around = slice(int((FIRST_PEAK_S - 0.4) * RATE_HZ), int((FIRST_PEAK_S + 0.4) * RATE_HZ))
-    return accel * FIRST_PEAK_G * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
+    around = slice(int((first_peak_s - 0.4) * RATE_HZ), int((first_peak_s + 0.4) * RATE_HZ))
+    return accel * 0.1978 * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
 
 
 def recorded(accel_mps2: Array, sensor: FloorSensor, seed: int) -> Array:

@@ -116,12 +116,9 @@ def normalised(shape: Complex) -> Complex:
     return np.asarray(shape / shape[np.abs(shape).argmax()], dtype=np.complex128)
 
 
-_NEIGHBOURS, _MUST_HAVE_IT = 4, 3
-_KNOWN_WELL = 6.0
 _MOST_DAMPING = 0.9
 LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
 LARGEST_DAMPING_ERROR = 0.15
-_HUM_DAMPING, _NO_DAMPING = 5e-4, 1e-6
 
 
 def best_size(misfit: Array, count: int, parameters_per_step: int) -> int:
@@ -148,8 +145,8 @@ def judge(found: OrderPoles, covariance: Array, larger: list[OrderPoles], scale:
     modes: list[FoundMode] = []
     rejected: list[Rejected] = []
     for k, pole in enumerate(found.poles):
-        is_known_well = _KNOWN_WELL**2 * np.trace(covariance[k]) < pole.real**2
-        near = [] if is_known_well else larger[:_NEIGHBOURS]
+        is_known_well = 6.0**2 * np.trace(covariance[k]) < pole.real**2
+        near = [] if is_known_well else larger[:4]
         moves = _moves(complex(pole), near)
         both = covariance[k] + (np.outer(middle := moves[len(moves) // 2], middle) if len(moves) else 0.0)
         frequency, ratio = float(frequency_hz(pole)), float(damping_ratio(pole))
@@ -183,9 +180,9 @@ def _why_not(
         "parts of the record do not have it": not np.isfinite(frequency_std_hz),
         "it grows instead of decaying": ratio <= 0,
         "damped so heavily that it hardly swings": ratio > _MOST_DAMPING,
-        "no damping to be seen: a hum, not a mode": ratio < max(_NO_DAMPING, min(_HUM_DAMPING, 2 * damping_std)),
+        "no damping to be seen: a hum, not a mode": ratio < max(1e-6, min(5e-4, 2 * damping_std)),
         f"its frequency is uncertain by {frequency_std_hz / hz:.0%}": frequency_std_hz > LARGEST_FREQUENCY_ERROR * hz,
         f"its damping ratio is uncertain by {damping_std:.2f}": damping_std > LARGEST_DAMPING_ERROR,
-        f"only {len(moves)} of the next {models} orders have it": len(moves) < min(_MUST_HAVE_IT, models),
+        f"only {len(moves)} of the next {models} orders have it": len(moves) < min(3, models),
     }
     return next((reason for reason, holds in reasons.items() if holds), "")

@@ -120,8 +120,6 @@ def jackknife(segments: Segments, estimate: Estimate, reference: Complex) -> Arr
 
 RIDGE = 1e-12
 """Of the mean power of the samples: less is rounding of the computation, and is added to give its matrices roots."""
-_RESOLVED = 30.0
-"""Times that power are errors that a ridge alone makes. Without it, records without noise have states without end."""
 
 
 @dataclass(frozen=True)
@@ -220,19 +218,20 @@ def _misfit(power: Array, observe: Array) -> Array:
 
 def _log_det(errors: Array) -> Array:
     """Of covariances (..., n, n), of which no direction has less than what a computation resolves."""
-    return np.asarray(np.log(np.maximum(np.linalg.eigvalsh(errors), _RESOLVED * RIDGE)).sum(axis=-1))
-
-
-_FEWEST_SEGMENTS = 4
-_SHORTEST_SEGMENT = 64
+    # Times that power are errors that a ridge alone makes. Without it, records without noise have states without
+    # end.
+    resolved = 30.0
+    return np.asarray(np.log(np.maximum(np.linalg.eigvalsh(errors), resolved * RIDGE)).sum(axis=-1))
 
 
 def summed_spectrum(samples: Array, rate_hz: float, segments: int) -> tuple[Array, float]:
     """Power of each of equal segments of a record (samples, channels), summed over channels, (segments, bins), and the
     spacing of the bins [Hz]."""
+    fewest_segments = 4
+    shortest_segment = 64
     length = len(samples) // max(segments, 1)
-    if segments < _FEWEST_SEGMENTS or length < _SHORTEST_SEGMENT:
-        raise ValueError(f"expected {_FEWEST_SEGMENTS} segments or more of {_SHORTEST_SEGMENT} samples or more, found "
+    if segments < fewest_segments or length < shortest_segment:
+        raise ValueError(f"expected {fewest_segments} segments or more of {shortest_segment} samples or more, found "
                          f"{segments} of {length}")
     cut = samples[:segments * length].reshape(segments, length, -1)
     window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(length) + 0.5) / length)

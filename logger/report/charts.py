@@ -24,8 +24,8 @@ from logger.report.document import EMPTY, Html, concatenated, document, heading,
 
 WIDTH = 1000
 _ABOUT = 6
-_KEY_PX, _BAR_PX = 20, 24
-_LINE_PX, _LETTER_PX, _MOST_LINES = 15, 7.0, 3
+_KEY_PX = 20
+_LETTER_PX = 7.0
 
 Point = tuple[float, float]
 
@@ -149,16 +149,17 @@ def chart(one: Chart) -> Html:
 
 
 def _bars(one: Bars) -> Html:
+    bar_px = 24
     longest = max((len(name) for name, _ in one.bars), default=0)
-    box = _Box(height=70 + _BAR_PX * len(one.bars), left=min(24 + ceil(_LETTER_PX * longest), 2 * WIDTH // 3), right=90,
+    box = _Box(height=70 + bar_px * len(one.bars), left=min(24 + ceil(_LETTER_PX * longest), 2 * WIDTH // 3), right=90,
                top=26, bottom=44)
     values = [0.0, *(value for _, value in one.bars), *([] if one.level is None else [one.level[0]])]
     low, high = min(values), max(values)
     frame = _Frame(box, low, high if high > low else low + 1.0, 0.0, 1.0)
     parts = [frame.columns(_ABOUT), _words(box.right_px, box.height - 6, one.value_name, "end")]
     for number, (name, value) in enumerate(one.bars):
-        y, ends = box.top + _BAR_PX * number, sorted((frame.x(0.0), frame.x(value)))
-        parts += [_cell(ends[0], y + 3, max(ends[1] - ends[0], 1.0), _BAR_PX - 6, 1.0),
+        y, ends = box.top + bar_px * number, sorted((frame.x(0.0), frame.x(value)))
+        parts += [_cell(ends[0], y + 3, max(ends[1] - ends[0], 1.0), bar_px - 6, 1.0),
                   _words(box.left - 8, y + 16, name, "end"), _words(ends[1] + 6, y + 16, f"{value:.3g}")]
     if one.level is not None:
         x = frame.x(one.level[0])
@@ -317,8 +318,8 @@ def steps_figure(one: Steps) -> Html:
     for (at, value), (words, _) in zip(points, one.values, strict=True):
         x, y = frame.x(at), frame.y(value)
         parts += [_dot(x, y, 5, 0), _words(x, y - 10, f"{value:.3f}", "middle")]
-        parts += [_words(x, _STEPS.bottom_px + 18 + _LINE_PX * number, line, "middle")
-                  for number, line in enumerate(wrap(words, letters)[:_MOST_LINES])]
+        parts += [_words(x, _STEPS.bottom_px + 18 + 15 * number, line, "middle")
+                  for number, line in enumerate(wrap(words, letters)[:3])]
     return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")
 
 
@@ -345,8 +346,6 @@ def _part(text: str) -> Html:
 
 
 ENDINGS = (".png", ".svg", ".pdf")
-_WIDTH_IN, _HEIGHT_IN, _DPI = 8.0, 3.6, 150
-_LEAST_BARS = 5  # fewer leave room below, and are no thicker
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
 
 
@@ -357,7 +356,7 @@ def drawn(charts: Sequence[Chart], path: Path) -> bytes:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise BadInput(f"{path}: expected the 'report' extra: pip install 'ridelog[report]' ({error})") from None
-    figure = Figure(figsize=(_WIDTH_IN, _HEIGHT_IN * len(charts)), dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=(8.0, 3.6 * len(charts)), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     for one, axes in zip(charts, np.atleast_1d(figure.subplots(len(charts), squeeze=False)[:, 0]), strict=True):
         axes.set_title(one.title, loc="left", fontsize=10, fontweight="bold")
@@ -380,10 +379,11 @@ def drawn(charts: Sequence[Chart], path: Path) -> bytes:
 
 
 def _draw_bars(axes: Any, one: Bars) -> None:
+    least_bars = 5  # fewer leave room below, and are no thicker
     places = np.arange(len(one.bars))
     axes.barh(places, [value for _, value in one.bars], color=_LINE_COLOURS[0], height=0.7)
     axes.set_yticks(places, [name.replace(", ", ",\n") for name, _ in one.bars], fontsize=8)
-    axes.set_ylim(max(len(one.bars), _LEAST_BARS) - 0.5, -0.5)
+    axes.set_ylim(max(len(one.bars), least_bars) - 0.5, -0.5)
     if one.level is not None:
         axes.axvline(one.level[0], color="0.5", linestyle=":", linewidth=1, label=one.level[1])
         axes.legend(frameon=False, fontsize=8)

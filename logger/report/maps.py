@@ -21,8 +21,6 @@ from logger.report.document import Html, concatenated, html
 _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
 _LEAST_SPAN_M = 50.0
-_TOLERANCE = 0.3
-_SPREAD = (1, 2, 4, 6)  # colours of a page's style that differ most, on its dark casing
 
 Point = tuple[float, float]
 
@@ -38,18 +36,19 @@ class MapLine:
 
 def ways_map(measured: Sequence[MapLine], driven: Sequence[MapLine]) -> Html:
     """The figure of lines that were measured, wide, under the places at which drives were seen, as dots; with a key."""
+    spread = (1, 2, 4, 6)  # colours of a page's style that differ most, on its dark casing
     projection = _Projection.around([place for one in measured for place in _places(one)])
     parts = [html('<path class="casing" d="{}"/>', _path([projection.xy(place) for place in _places(one)]))
              for one in measured]
     for number, one in enumerate(driven):
         dots = (projection.xy(place) for place in _places(one))
         parts.append(concatenated(html('<circle cx="{:.1f}" cy="{:.1f}" r="2.4" style="fill:var(--c{})"/>', *dot,
-                                       _SPREAD[number % len(_SPREAD)]) for dot in dots))
+                                       spread[number % len(spread)]) for dot in dots))
     parts += [_begins(projection.xy(_places(one)[0]), one.name) for one in measured]
     drawn = html('<figure><svg class="map plot" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the drives">{}'
                  "</svg></figure>", WIDTH, projection.height,
                  concatenated([*parts, _scale_bar(projection), _north()]))
-    key = concatenated(html('<li><i class="f{}"></i>{}</li>', _SPREAD[number % len(_SPREAD)], one.name)
+    key = concatenated(html('<li><i class="f{}"></i>{}</li>', spread[number % len(spread)], one.name)
                        for number, one in enumerate(driven))
     return drawn + html('<ul class="legend">{}</ul>', key)
 
@@ -106,7 +105,7 @@ class _Projection:
 
 
 def _path(points: Sequence[Point]) -> str:
-    kept = [f"{x:.1f} {y:.1f}" for x, y in simplified(points, _TOLERANCE)]
+    kept = [f"{x:.1f} {y:.1f}" for x, y in simplified(points, 0.3)]
     return "M" + (" ".join(kept) if len(kept) > 1 else f"{kept[0]}h0")
 
 

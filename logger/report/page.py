@@ -71,8 +71,6 @@ from logger.vehicle.uncertain import not_known
 from logger.vehicle.vehicle import GENERIC
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
-_MAX_SIDECARS = 10
-_MAX_SIDECAR_CHARS = 20_000
 
 _A_W = Html("a<sub>w</sub> [m/s²]")
 
@@ -274,8 +272,8 @@ def _settings_section(files: Sequence[LoggedFile]) -> Html:
         for file in files if file.sidecar)
     if not different:
         return EMPTY
-    texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:_MAX_SIDECARS]]
-    blocks = concatenated(html("<pre>{}</pre>", text[:_MAX_SIDECAR_CHARS]) for text in texts)
+    texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:10]]
+    blocks = concatenated(html("<pre>{}</pre>", text[:20_000]) for text in texts)
     return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 

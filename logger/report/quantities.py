@@ -26,8 +26,6 @@ _UNIT = rf"(?:{'|'.join(_SYMBOLS)})[2-9]?"
 # of the first five, so that the ``m`` of ``_m_kg`` belongs to the name.
 _ENDING = re.compile(rf"(?:_(?P<over>(?:n|kg|w|j|pa)(?:_(?:m|s|rad)[2-9]?)+|{_UNIT}))?"
                      rf"(?P<under>(?:(?:^|_)per_{_UNIT}(?:_{_UNIT})*)*)$")
-_LARGE, _SMALL = 1e6, 1e-3
-_RARE = 1e-9
 
 
 def unit_of(name: str) -> str:
@@ -51,7 +49,7 @@ def measured(value: float, error: float | None) -> str:
         return f"{value:.3g}"
     decimals = 1 - floor(log10(error)) - (error / 10.0 ** floor(log10(error)) >= 2)
     size = max(abs(value), error)
-    if _SMALL <= size < _LARGE:
+    if 1e-3 <= size < 1e6:
         return " ± ".join(f"{round(one, decimals):.{max(decimals, 0)}f}" for one in (value, error))
     power = floor(log10(size))
     digits = (f"{one / 10.0**power:.{max(decimals + power, 0)}f}" for one in (value, error))
@@ -76,7 +74,7 @@ def _with_unit(value: float, error: float | None, name: str, inside: bool) -> st
 
 def chance(p_value: float) -> str:
     """A probability, such as a p-value."""
-    if p_value < _RARE:
+    if p_value < 1e-9:
         return "below 1e-9"
     return f"{p_value:.2f}" if p_value >= 0.01 else f"{p_value:.2g}"
 

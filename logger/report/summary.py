@@ -19,9 +19,6 @@ from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.store.log.log_reader import along_m, apart_m, end_utc_us, iso_utc, length_m, split_drives, utc
 
-APART_M = 50.0
-PLACES = 5
-
 IRI_CLASSES: Mapping[str, str] = {
     "A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor", "F": "extremely poor",
     "G": "extremely poor", "H": "extremely poor",
@@ -192,9 +189,9 @@ def _roughest(records: Sequence[WindowRecord]) -> tuple[RoughWindow, ...]:
     ]
     found: list[RoughWindow] = []
     for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
-        if all(_apart_m(place, other) >= APART_M for other in found):
+        if all(_apart_m(place, other) >= 50.0 for other in found):
             found.append(place)
-            if len(found) == PLACES:
+            if len(found) == 5:
                 break
     return tuple(found)
 
@@ -204,7 +201,6 @@ def _apart_m(one: RoughWindow, other: RoughWindow) -> float:
     return abs(one.along_m - other.along_m) if ground_m is None else ground_m
 
 
-_BAR_CELLS = 30
 _EIGHTHS = " ▏▎▍▌▋▊▉█"
 
 
@@ -298,11 +294,12 @@ def _bars(shares: Sequence[Share], words_of: Callable[[str], str], drawn: bool) 
 
 def _bar(share: float, drawn: bool) -> str:
     """A bar of fixed room; a share above zero always shows."""
+    bar_cells = 30
     if not drawn:
-        return ("#" * max(round(share * _BAR_CELLS), share > 0)).ljust(_BAR_CELLS, ".")
-    eighths = max(round(share * _BAR_CELLS * 8), share > 0)
+        return ("#" * max(round(share * bar_cells), share > 0)).ljust(bar_cells, ".")
+    eighths = max(round(share * bar_cells * 8), share > 0)
     full, rest = divmod(eighths, 8)
-    return ("█" * full + (_EIGHTHS[rest] if rest else "")).ljust(_BAR_CELLS)
+    return ("█" * full + (_EIGHTHS[rest] if rest else "")).ljust(bar_cells)
 
 
 def _places(places: Sequence[RoughWindow]) -> list[str]:

@@ -53,19 +53,6 @@ from logger.roads.iso8608 import (
 
 Array = npt.NDArray[np.float64]
 
-SHORTEST_M = 100.0
-COARSEST_SPACING_M = 0.3
-
-_HIGHEST_M = 1e4
-_SEGMENT_M = 4 / LOWEST_CPM  # four steps of wave number in the longest octave
-_MOST_HALVES = 16  # a longer road gets longer segments instead of more: its longest waves show more sharply
-_LAST_OCTAVE_EDGE = -4.5  # exponents of 2: the octave centred at 2^-5 ends here, and
-_LAST_THIRD_EDGE = -4.5 + 8 / 3  # the third octave centred at 2^-2 here
-_CLEAR_OF_TREND = 1.5  # in steps of wave number: the mean slope takes a part of the first one only
-_CLEAR_OF_ALIASES = 0.25
-_STEPS_PER_WINDOW = 0.9  # how much wider a Hann window makes a band look, in steps of wave number
-_TWO_SIGMA = 2.0
-
 
 @dataclass(frozen=True)
 class Spectrum:
@@ -128,11 +115,14 @@ def spectrum(elevation_m: npt.ArrayLike, spacing_m: float) -> Spectrum:
     Segments are at least 364 m and there are at most 15 of them; a road of less than 546 m is one segment.
     ValueError unless there are at least 16 elevations, all of them on Earth.
     """
+    highest_m = 1e4
+    segment_m = 4 / LOWEST_CPM  # four steps of wave number in the longest octave
+    most_halves = 16  # a longer road gets longer segments instead of more: its longest waves show more sharply
     elevation = np.asarray(elevation_m, dtype=float)
-    if elevation.ndim != 1 or len(elevation) < 16 or not (np.abs(elevation) < _HIGHEST_M).all():
-        raise ValueError(f"expected a row of at least 16 finite elevations below {_HIGHEST_M:g} m")
+    if elevation.ndim != 1 or len(elevation) < 16 or not (np.abs(elevation) < highest_m).all():
+        raise ValueError(f"expected a row of at least 16 finite elevations below {highest_m:g} m")
     slope = np.diff(elevation) / spacing_m
-    halves = min(max(2, int(len(slope) * spacing_m / _SEGMENT_M * 2)), _MOST_HALVES)
+    halves = min(max(2, int(len(slope) * spacing_m / segment_m * 2)), most_halves)
     hop = len(slope) // halves
     size = 2 * hop
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(size) / size)
@@ -153,10 +143,12 @@ def spectrum(elevation_m: npt.ArrayLike, spacing_m: float) -> Spectrum:
 
 def band_edges(lowest_cpm: float, highest_cpm: float) -> Array:
     """Edges of the smoothing bands of ISO 8608 that lie whole between two wave numbers [cycle/m]; (b + 1,)."""
+    last_octave_edge = -4.5  # exponents of 2: the octave centred at 2^-5 ends here, and
+    last_third_edge = -4.5 + 8 / 3  # the third octave centred at 2^-2 here
     exponents = np.concatenate([
-        np.arange(_LAST_OCTAVE_EDGE - 8, _LAST_OCTAVE_EDGE),
-        _LAST_OCTAVE_EDGE + np.arange(8) / 3,
-        _LAST_THIRD_EDGE + np.arange(12 * 12) / 12,
+        np.arange(last_octave_edge - 8, last_octave_edge),
+        last_octave_edge + np.arange(8) / 3,
+        last_third_edge + np.arange(12 * 12) / 12,
     ])
     edges = 2.0**exponents
     return edges[(edges >= lowest_cpm) & (edges <= highest_cpm)]
@@ -169,13 +161,14 @@ def smooth(of: Spectrum, edges_cpm: Array) -> BandedSpectrum:
     lies in it: Eq 2.4 for a band that reaches over several steps, and as it should be for one inside a single step,
     where the printed sum goes wrong. ValueError if an edge lies outside the spectrum.
     """
+    steps_per_window = 0.9  # how much wider a Hann window makes a band look, in steps of wave number
     borders = of.step_cpm * (np.arange(len(of.psd_m3) + 1) + 0.5)
     if edges_cpm[0] < borders[0] or edges_cpm[-1] > borders[-1]:
         raise ValueError(f"expected band edges within {borders[0]:.4g} ... {borders[-1]:.4g} cycle/m")
     below = np.concatenate([[0.0], np.cumsum(of.psd_m3) * of.step_cpm])
     width_cpm = np.diff(edges_cpm)
     psd_m3 = np.diff(np.interp(edges_cpm, borders, below)) / width_cpm
-    return BandedSpectrum(edges_cpm, psd_m3, 2 * of.chance_m * (width_cpm + _STEPS_PER_WINDOW * of.step_cpm))
+    return BandedSpectrum(edges_cpm, psd_m3, 2 * of.chance_m * (width_cpm + steps_per_window * of.step_cpm))
 
 
 def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float | None = None) -> Roughness:
@@ -188,17 +181,21 @@ def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float 
     ValueError for a profile below 100 m, which is too short; with samples more than 300 mm apart; not finite;
     or without any roughness.
     """
+    shortest_m = 100.0
+    coarsest_spacing_m = 0.3
+    clear_of_trend = 1.5  # in steps of wave number: the mean slope takes a part of the first one only
+    clear_of_aliases = 0.25
     elevation = np.asarray(elevation_m, dtype=float)
     length_m = (elevation.size - 1) * spacing_m
-    if length_m < SHORTEST_M * (1 - 1e-9):
-        raise ValueError(f"too short to classify: expected at least {SHORTEST_M:g} m, found {length_m:.4g} m")
-    if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
-        raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
+    if length_m < shortest_m * (1 - 1e-9):
+        raise ValueError(f"too short to classify: expected at least {shortest_m:g} m, found {length_m:.4g} m")
+    if not 0 < spacing_m <= coarsest_spacing_m * (1 + 1e-9):
+        raise ValueError(f"expected samples at most {coarsest_spacing_m:g} m apart, found {spacing_m:g} m")
     measured_m = max(spacing_m, widest_step_m or 0.0)
     of = spectrum(elevation, spacing_m)
-    edges = band_edges(max(LOWEST_CPM, _CLEAR_OF_TREND * of.step_cpm), min(HIGHEST_CPM, _CLEAR_OF_ALIASES / measured_m))
+    edges = band_edges(max(LOWEST_CPM, clear_of_trend * of.step_cpm), min(HIGHEST_CPM, clear_of_aliases / measured_m))
     if not len(edges) or edges[-1] < 4 * REFERENCE_N0_CPM:
-        raise ValueError(f"expected samples at most {_CLEAR_OF_ALIASES / REFERENCE_N0_CPM / 4:g} m apart, "
+        raise ValueError(f"expected samples at most {clear_of_aliases / REFERENCE_N0_CPM / 4:g} m apart, "
                          f"found a step of {measured_m:.4g} m")
     return straight_line(of, edges)
 
@@ -208,6 +205,7 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
 
     ValueError if there is a band without any roughness in it.
     """
+    two_sigma = 2.0
     bands = smooth(of, edges_cpm)
     if not (bands.psd_m3 > 0).all():
         raise ValueError("expected a road with some roughness at every wavelength; this one is perfectly smooth")
@@ -225,7 +223,7 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
     stray = np.sum((level - terms @ [log_gd, waviness]) ** 2 / (2 / nu + 2 / nu**2)) / (len(nu) - 2)
     log_std, waviness_std = np.sqrt(variance * max(1.0, stray))
 
-    ends = [road_class(float(np.exp(log_gd + sigma * log_std))) for sigma in (-_TWO_SIGMA, _TWO_SIGMA)]
+    ends = [road_class(float(np.exp(log_gd + sigma * log_std))) for sigma in (-two_sigma, two_sigma)]
     letters = "".join(CLASS_GD_N0_CM3)
     gd_n0_cm3 = float(np.exp(log_gd))
     return Roughness(
@@ -242,8 +240,6 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
 
 
 _STEP_CPM = 1 / 2048
-_LAG_M = 1 / 8
-_LAGS = 4096  # to 512 m, when the car remembers nothing
 
 
 @dataclass(frozen=True)
@@ -261,12 +257,14 @@ def iri_per_root_gd(waviness: float = STANDARD_WAVINESS) -> float:
 
 def relative_spread(length_m: float, waviness: float = STANDARD_WAVINESS) -> float:
     """Standard deviation over mean of the IRI of stretches of this length [m] of one and the same random road."""
-    likeness = np.fft.irfft(_slope_spectrum(waviness), round(1 / (_STEP_CPM * _LAG_M)))[:_LAGS]
+    lag_m = 1 / 8
+    lags = 4096  # to 512 m, when the car remembers nothing
+    likeness = np.fft.irfft(_slope_spectrum(waviness), round(1 / (_STEP_CPM * lag_m)))[:lags]
     rho = np.clip(likeness / likeness[0], -1, 1)
     covariance = np.sqrt(1 - rho**2) + rho * np.arcsin(rho) - 1
     covariance[0] /= 2
-    within = np.maximum(1 - _LAG_M * np.arange(_LAGS) / length_m, 0)
-    return float(np.sqrt(2 / length_m * _LAG_M * (covariance @ within)))
+    within = np.maximum(1 - lag_m * np.arange(lags) / length_m, 0)
+    return float(np.sqrt(2 / length_m * lag_m * (covariance @ within)))
 
 
 def iri_of_road(gd_n0_cm3: float, length_m: float, waviness: float = STANDARD_WAVINESS) -> Expected:

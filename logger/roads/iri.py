@@ -356,15 +356,8 @@ DOUBTFUL_M_PER_KM = 100.0
 ROUGHEST_M_PER_KM = iri_from_gd_n0(2 * CLASS_GD_N0_CM3["H"])
 """Upper limit of class H: twice its geometric mean."""
 HIGHEST_LIMIT_M_PER_KM = DOUBTFUL_M_PER_KM / 2
-_ROADS_M_PER_KM = (0.4, 24.0)
-"""From a new motorway to the end of the scale of the World Bank's Technical Paper 46."""
 _FINEST_M = 1e-3
 """No profiler samples more densely; 0.3 m apart are 0.0003 km."""
-_STEEPEST = 1.0
-"""Mean slope, where there is no IRI, as samples are too far apart: a road as steep all along is none."""
-
-_SAME_WAY = 0.05
-"""Of a way by speeds and one by distances: a knot and a mile an hour are 15 % apart."""
 
 
 def unit_doubt(iri_m_per_km: float) -> str:
@@ -390,6 +383,8 @@ def _has_iri(elevation_m: Array, spacing_m: float) -> bool:
 
 def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
     """What is wrong with a profile (n,) [m] that cannot be one in metres ("expected ..., found ..."); else nothing."""
+    # Mean slope, where there is no IRI, as samples are too far apart: a road as steep all along is none.
+    steepest = 1.0
     if spacing_m < _FINEST_M:
         others = " or ".join(f"{spacing_m * UNITS_M[unit]:.3g} m in {unit}" for unit in ("km", "mi"))
         return (f"expected distances in m, found samples {spacing_m:.3g} m apart, finer than any profiler takes them "
@@ -403,7 +398,7 @@ def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
                 f"has{_in_others(found)}, the profile seems to be in {unit}: name the column by its unit, as "
                 f"elevation_{unit}, or write metres")
     slope = float(np.abs(np.diff(elevation_m)).mean()) / spacing_m
-    return "" if slope <= _STEEPEST else (
+    return "" if slope <= steepest else (
         f"expected elevations in m, found a mean slope of {100 * slope:.4g} %, more than any road has. Elevation in "
         "mm? Name the column by its unit, as elevation_mm, or write metres")
 
@@ -418,10 +413,11 @@ def spacing_hint(spacing_m: float) -> str:
 def likely_unit(by_speed_m: float, by_distance_m: float) -> str:
     """The unit of a speed or a distance that comes nearest to how far a way by the speeds is off that by the distances,
     and how far it would be."""
+    same_way = 0.05  # Of a way by speeds and one by distances: a knot and a mile an hour are 15 % apart.
     off = by_speed_m / by_distance_m if by_speed_m > 0 and by_distance_m > 0 else 1 / KMH_MPS
     factors = {"km/h": 1 / KMH_MPS, "mph": 1 / MPH_MPS, "knots": 1 / KNOT_MPS,
                **{f"distances in {unit}": size for unit, size in UNITS_M.items() if unit != "m"}}
-    near = {unit: factor for unit, factor in factors.items() if abs(np.log(off / factor)) < _SAME_WAY}
+    near = {unit: factor for unit, factor in factors.items() if abs(np.log(off / factor)) < same_way}
     unit, factor = next(iter(near.items()), ("km/h", factors["km/h"]))
     return f"{unit} would give {factor:.3g}"
 
@@ -435,7 +431,8 @@ def limit_hint(limit_m_per_km: float) -> str:
 
 def _likely(iri_m_per_km: float) -> list[str]:
     """The units in which elevations with this IRI would be those of a road; millimetres where there is none."""
-    low, high = _ROADS_M_PER_KM
+    roads_m_per_km = (0.4, 24.0)  # From a new motorway to the end of the scale of the World Bank's Technical Paper 46.
+    low, high = roads_m_per_km
     return [unit for unit in ("mm", "cm", "in") if low <= iri_m_per_km * UNITS_M[unit] <= high] or ["mm"]
 
 

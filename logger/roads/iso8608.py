@@ -22,15 +22,12 @@ Array = npt.NDArray[np.float64]
 REFERENCE_N0_CPM = 0.1
 LOWEST_CPM = 0.011
 HIGHEST_CPM = 2.83
-LEAST_PERIOD_M = 10.5 / LOWEST_CPM
 CM3_M3 = 1e-6
 STANDARD_WAVINESS = 2.0
 
 # Geometric mean degree of roughness of each class [cm3] (ISO 8608; Table 2.2 of Blum 2015).
 CLASS_GD_N0_CM3 = dict(zip("ABCDEFGH", (16.0 * 4.0**index for index in range(8)), strict=True))
 
-# Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
-_CLASS_LIMITS_IRI = ((3.05, "B"), (6.09, "C"), (12.19, "D"), (24.37, "E"), (48.74, "F"), (97.48, "G"), (194.96, "H"))
 
 IRI_PER_ROOT_GD = 0.5386
 
@@ -56,8 +53,10 @@ def road_class(gd_n0_cm3: float) -> str:
 
 def iri_class(iri_m_per_km: float) -> str:
     """ISO 8608 letter of a road with this IRI [m/km], after Table 4.3; a limit belongs to the rougher class."""
+    # Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
+    class_limits_iri = ((3.05, "B"), (6.09, "C"), (12.19, "D"), (24.37, "E"), (48.74, "F"), (97.48, "G"), (194.96, "H"))
     letter = "A"
-    for limit, rougher in _CLASS_LIMITS_IRI:
+    for limit, rougher in class_limits_iri:
         if iri_m_per_km >= limit:
             letter = rougher
     return letter
@@ -80,9 +79,10 @@ def generate(
     in any profile that is read off a real road at points. One seed gives the same phases whatever the roughness and
     the waviness.
     """
+    least_period_m = 10.5 / LOWEST_CPM
     count = int(np.floor(length_m / spacing_m + 1e-9)) + 1
     finer = int(np.ceil(2 * HIGHEST_CPM * spacing_m * 1.001))
-    period = int(np.ceil(max(count * spacing_m + 1 / LOWEST_CPM, LEAST_PERIOD_M) / spacing_m)) * finer
+    period = int(np.ceil(max(count * spacing_m + 1 / LOWEST_CPM, least_period_m) / spacing_m)) * finer
     step_cpm = finer / (period * spacing_m)
     harmonic = np.arange(int(np.ceil(LOWEST_CPM / step_cpm)), int(HIGHEST_CPM / step_cpm) + 1)
     amplitude = np.sqrt(2 * step_cpm * displacement_psd(harmonic * step_cpm, gd_n0_cm3, waviness))

@@ -24,7 +24,6 @@ from logger.roads.sections import WindowErrors, errors_of_means
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
-_ROUNDING = 1e-9  # of a measure, in cells
 _CELLS = 1 << 20
 _BITS = 24
 
@@ -75,9 +74,10 @@ def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Arra
               length_m: float) -> Passes:
     """Windows (n,) from and to measures of ways, in cells of a length; a window across a limit counts in each cell by
     its part. NaN in ``iri`` or its error, and negative ways, are left out."""
+    rounding = 1e-9  # of a measure, in cells
     known = (way >= 0) & np.isfinite(iri) & np.isfinite(errors.std) & (end_m > start_m)
-    first = np.floor(np.where(known, start_m, 0.0) / length_m + _ROUNDING).astype(np.int64)
-    count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - _ROUNDING).astype(np.int64) - first, 0)
+    first = np.floor(np.where(known, start_m, 0.0) / length_m + rounding).astype(np.int64)
+    count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - rounding).astype(np.int64) - first, 0)
     window = np.repeat(np.arange(len(way)), count)
     cell = first[window] + np.arange(len(window)) - np.repeat(np.cumsum(count) - count, count)
     piece_m = np.minimum(end_m[window], (cell + 1) * length_m) - np.maximum(start_m[window], cell * length_m)
@@ -243,16 +243,14 @@ class Trends:
     false_share: Array
 
 
-YEAR_S = 365.25 * 86_400.0
-
-
 def trends(passes: Passes, scatter: Scatter) -> Trends:
     """A straight line through the passes over each cell."""
+    year_s = 365.25 * 86_400.0
     dated = passes.of(np.isfinite(passes.time_s))
     key, cell = np.unique(dated.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(dated, scatter), 1e-12)
     total = np.bincount(cell, weight, len(key))
-    year = dated.time_s / YEAR_S
+    year = dated.time_s / year_s
     aside = year - (np.bincount(cell, weight * year, len(key)) / total)[cell]
     spread = np.bincount(cell, weight * aside**2, len(key))
     days = spread / np.maximum(total, 1e-300) > (1.0 / 365.25)**2
@@ -279,12 +277,6 @@ def _two_sided(z: Array) -> Array:
 
 
 BUMP, STRETCH, COMFORT = "single bump", "rough stretch", "comfort only"
-LEAST_CONFIDENCE = 0.8
-"""That a cell's true value lies above the limit: in four of five cases at least."""
-UNCOMFORTABLE_MPS2 = 0.5
-"""From here on ISO 2631-1 (annex C.2.3) calls a ride fairly uncomfortable."""
-BUMP_M = 30.0
-"""One obstacle shakes a car for some car's lengths: what is rough no further is one."""
 
 
 @dataclass(frozen=True)
@@ -318,17 +310,20 @@ def places_to_visit(mean: Means, a_w_mps2: Array, a_w_std_mps2: Array, length_m:
     a_w_mps2, a_w_std_mps2    of the cells; NaN: not known
     above_m_per_km            from which IRI a cell is rough
     """
+    least_confidence = 0.8  # That a cell's true value lies above the limit: in four of five cases at least.
+    uncomfortable_mps2 = 0.5  # From here on ISO 2631-1 (annex C.2.3) calls a ride fairly uncomfortable.
+    bump_m = 30.0  # One obstacle shakes a car for some car's lengths: what is rough no further is one.
     rough = _confidence(mean.iri_m_per_km, mean.iri_std_m_per_km, above_m_per_km)
-    felt = _confidence(a_w_mps2, a_w_std_mps2, UNCOMFORTABLE_MPS2)
-    is_rough = rough >= LEAST_CONFIDENCE
-    rows = _rows(mean, is_rough) + _rows(mean, (felt >= LEAST_CONFIDENCE) & ~is_rough)
+    felt = _confidence(a_w_mps2, a_w_std_mps2, uncomfortable_mps2)
+    is_rough = rough >= least_confidence
+    rows = _rows(mean, is_rough) + _rows(mean, (felt >= least_confidence) & ~is_rough)
     found = []
     for row in rows:
         comfort = not is_rough[row[0]]
-        excess = a_w_mps2[row] / UNCOMFORTABLE_MPS2 if comfort else mean.iri_m_per_km[row] / above_m_per_km
+        excess = a_w_mps2[row] / uncomfortable_mps2 if comfort else mean.iri_m_per_km[row] / above_m_per_km
         worst = int(row[np.argmax(excess)])
         reach_m = len(row) * length_m
-        kind = COMFORT if comfort else BUMP if reach_m <= max(BUMP_M, length_m) else STRETCH
+        kind = COMFORT if comfort else BUMP if reach_m <= max(bump_m, length_m) else STRETCH
         place = PlaceToVisit(kind, tuple(row.tolist()), worst, reach_m, float((felt if comfort else rough)[worst]),
                       int(mean.drives[worst]))
         found.append((-float(excess.max()), worst, place))

@@ -220,17 +220,12 @@ class RoadNetwork:
 
 NO_WAY = -1
 DOUBTFUL = -2
-_BELIEVED = 2.0  # standard deviations that a stretch may lie aside of its way
 _STREETS_M = 10.0  # no two streets of one direction lie nearer to each other
 _NEW_SHARE = 0.3  # how likely a street is one that is not known yet, where one is known within reach
 _KNOWN = log(1 - _NEW_SHARE)
 _UNKNOWN = log(_NEW_SHARE / (2 * (SEARCH_M - _STREETS_M)))  # anywhere within reach, but not there
-_LEAST = 1e-6  # a likelihood that anything has: the model may be wrong
 _CHANGE = log(0.1)  # to leave a street that goes on beside
 _WORST = 25.0  # how much less likely than the best a chain may be and still be followed
-_MOST_CHAINS = 16
-_MOST_EACH = 3  # of them to one street, by different errors of the receiver
-_SURE = 0.8  # as of places to visit: a street that is less likely than this is not to be believed
 GAP_M = 50.0  # between windows: what lay beside before says nothing after
 _STREET_M, _STRAIGHT = 5.0, 0.9  # aside, and cosine: so near the next way continues the one before
 
@@ -304,6 +299,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     start    error to the east and north at the beginning and its covariance (ee, en, nn), as this function gives it for
              the end; None: not known
     """
+    sure = 0.8  # as of places to visit: a street that is less likely than this is not to be believed
     count = len(trace.t_s)
     found = network.candidates(trace)
     if not len(found.window):
@@ -320,7 +316,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     end_e, end_n, end_ee, end_en, end_nn = states[-1].tolist()
     way = np.where(on, network.way[at], NO_WAY)
     aside_m = rel_n * u_east[at] - rel_e * u_north[at]
-    doubtful = on & _too_far(way, aside_m, receiver) | (belief < _SURE)
+    doubtful = on & _too_far(way, aside_m, receiver) | (belief < sure)
     on &= ~doubtful
     way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
     return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
@@ -330,9 +326,10 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
 
 def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> npt.NDArray[np.bool_]:
     """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
+    believed = 2.0  # standard deviations that a stretch may lie aside of its way
     stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
     mean_m = np.bincount(stretch, np.nan_to_num(aside_m)) / np.bincount(stretch)
-    return np.asarray(np.abs(mean_m[stretch]) > _BELIEVED * 2**0.5 * receiver.std_m)
+    return np.asarray(np.abs(mean_m[stretch]) > believed * 2**0.5 * receiver.std_m)
 
 
 def _nowhere(count: int) -> Matched:
@@ -368,7 +365,7 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
                    for number, chain in ahead]
         best = max(map(_score, new))
         likely = (chain for chain in new if chain.score > best - _WORST)
-        chains = sorted(likely, key=_score, reverse=True)[:_MOST_CHAINS]
+        chains = sorted(likely, key=_score, reverse=True)[:16]
         history.append(chains)
         before = here
     path, states = _traced_back(history)
@@ -379,6 +376,7 @@ def _distinct(chains: Sequence[_Chain]) -> list[_Chain]:
     """Of chains that came to one street: the best, and those that say another error, as what comes next may speak for
     them (multiple hypotheses; Reid, "An algorithm for tracking multiple targets", IEEE Trans. Automatic Control 24,
     1979). One that is left out is a rival of the one that it is like."""
+    most_each = 3  # of them to one street, by different errors of the receiver
     ranked = sorted(chains, key=_score, reverse=True)
     kept: list[_Chain] = []
     rivals: list[list[tuple[int, float]]] = []
@@ -386,7 +384,7 @@ def _distinct(chains: Sequence[_Chain]) -> list[_Chain]:
         if chain.score < ranked[0].score - _WORST:
             break
         like = next((number for number, other in enumerate(kept) if _alike(chain.error, other.error)), None)
-        if like is None and len(kept) < _MOST_EACH:
+        if like is None and len(kept) < most_each:
             kept.append(chain)
             rivals.append([])
         else:
@@ -478,12 +476,13 @@ def _beside(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, be
 
 def _clear_of(lists: _Lists, one: int, error: _State, fast: float) -> float:
     """How likely it is that an unknown street keeps its distance from a known one, where this fix lies."""
+    least = 1e-6  # a likelihood that anything has: the model may be wrong
     error_e, error_n, ee, en, nn = error
     left_e, left_n = lists.left_e[one], lists.left_n[one]
     spread = 2 * (ee * left_e**2 + 2 * en * left_e * left_n + nn * left_n**2 + fast)
     aside_m = abs(lists.aside_m[one] - error_e * left_e - error_n * left_n)
     reach = sqrt(spread)
-    return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + _LEAST)
+    return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + least)
 
 
 def _drift_m2(step_s: float, receiver: Receiver) -> float:
@@ -568,7 +567,6 @@ class _Lists:
             network.passes)
 
 
-_APART_M = 100.0  # from which distance on a drive that comes back drives again
 _Error = tuple[float, float, float, float, float]
 
 
@@ -605,6 +603,7 @@ def _learned(network: RoadNetwork, lap: Trace, matched: Matched, founder: int) -
 
 def _laps(trace: Trace) -> list[tuple[int, int]]:
     """Parts of a trace of which none comes back to where it has been, in its direction."""
+    apart_m = 100.0  # from which distance on a drive that comes back drives again
     from scipy.spatial import cKDTree
 
     points = on_sphere(trace.lat_deg, trace.lon_deg)
@@ -612,7 +611,7 @@ def _laps(trace: Trace) -> list[tuple[int, int]]:
     pairs = cKDTree(points).query_pairs(SEARCH_M, output_type="ndarray") if len(points) else np.zeros((0, 2), np.intp)
     early, late = pairs.min(axis=1), pairs.max(axis=1)
     alike = np.einsum("ij,ij->i", heading[early], heading[late]) > np.cos(np.radians(MOST_TURN_DEG))
-    again = alike & (trace.distance_m[late] - trace.distance_m[early] > _APART_M)
+    again = alike & (trace.distance_m[late] - trace.distance_m[early] > apart_m)
     last = np.full(len(points), -1)
     np.maximum.at(last, late[again], early[again])
     cuts = [0]
@@ -628,7 +627,6 @@ def _joined(parts: Sequence[Matched]) -> Matched:
 
 
 ALONG, AGAINST = 1, -1
-_SHORTEST_M = 1.0  # between posts
 
 
 @dataclass(frozen=True, eq=False)
@@ -650,6 +648,7 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
 
     ValueError where the line has no length, or posts do not follow each other along the line by growing measures.
     """
+    shortest_m = 1.0  # between posts
     corners = on_sphere(lat_deg, lon_deg)
     length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     if not length_m[-1] > 0:
@@ -661,7 +660,7 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
     at_m = _abreast(corners, length_m, on_sphere(posts[:, 0], posts[:, 1]))
     order = np.argsort(at_m)
     at_m, known_m = at_m[order], post_m[order]
-    if (np.diff(at_m) < _SHORTEST_M).any() or (np.diff(known_m) <= 0).any():
+    if (np.diff(at_m) < shortest_m).any() or (np.diff(known_m) <= 0).any():
         raise ValueError("expected kilometre posts that follow each other along the line by growing numbers")
     measured = np.interp(length_m, at_m, known_m)
     return measured + np.minimum(length_m - at_m[0], 0.0) + np.maximum(length_m - at_m[-1], 0.0)

@@ -43,8 +43,6 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
 ALONG_M = 30.0
-_FADED = 1e-3
-_POINT_SHARE = pi / 2 - 1
 _ERROR_ROUNDING = 0.0005 * (1 + 3**0.5)  # of a whole and three parts with three decimals
 
 
@@ -95,6 +93,7 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
                                    that it counts in; those of one mean stand together, in the order driven, and are of
                                    different windows
     """
+    point_share = pi / 2 - 1
     of_windows, whole_m = errors.of(window), length_m[window]
     level_std, common_std, place_std = of_windows.parts()
     level_std = level_std * piece_m
@@ -102,13 +101,13 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
     def total(values: Array, of: Ints = group) -> Array:
         return np.asarray(np.bincount(of, values, count), dtype=np.float64)
 
-    walk, point = _scatter_share(iri) * np.maximum(whole_m - piece_m, 0.0), _POINT_SHARE * piece_m
+    walk, point = _scatter_share(iri) * np.maximum(whole_m - piece_m, 0.0), point_share * piece_m
     excess = np.divide(walk * point, walk + point, out=np.zeros(len(group)), where=walk + point > 0)
     own = total(piece_m**2 * of_windows.own_variance + piece_m * excess * np.nan_to_num(iri[window]) ** 2)
     level = total(level_std**2)
     for lag in range(1, len(group)):
         apart_m = np.abs(at_m[window[lag:]] - at_m[window[:-lag]])
-        near = (group[lag:] == group[:-lag]) & (apart_m < -ALONG_M * log(_FADED))
+        near = (group[lag:] == group[:-lag]) & (apart_m < -ALONG_M * log(1e-3))
         if not near.any():
             break
         pairs = 2 * level_std[lag:] * level_std[:-lag] * np.exp(-apart_m / ALONG_M)
@@ -176,7 +175,6 @@ def ride_words(iri_m_per_km: float) -> str:
     if not iri_m_per_km >= 0:
         raise ValueError(f"an IRI is 0 or more, not {iri_m_per_km}")
     return next(words for lowest, words in reversed(RIDES) if iri_m_per_km >= lowest)
-
 
 
 _ROUNDING = 1e-9  # of a measure, in windows

@@ -125,8 +125,6 @@ LONGEST_LAG_US = 9_000_000
 estimate."""
 
 SHORT_WINDOW_SHARE = 0.5
-# Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.
-BRIDGED_ERROR = 0.2
 _BLIND = -1
 
 
@@ -428,10 +426,12 @@ class Pipeline:
 def _iri_errors(estimate: WindowEstimate | None, is_guessed: bool) -> dict[str, float | None]:
     """Columns of the IRI's standard error and its parts [m/km], with what it costs to carry the speed through a loss of
     fix, or to have that of some seconds before: neighbours have the same wrong speed."""
+    # Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.
+    bridged_error = 0.2
     if estimate is None or not isfinite(estimate.iri_m_per_km):
         return dict.fromkeys(("iri_std_m_per_km", "iri_level_std_m_per_km", "iri_common_std_m_per_km",
                               "iri_place_std_m_per_km"))
-    bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_guessed else 0.0
+    bridging = bridged_error * estimate.iri_m_per_km if is_guessed else 0.0
     return {"iri_std_m_per_km": _known(hypot(estimate.iri_std_m_per_km, bridging)),
             "iri_level_std_m_per_km": _known(hypot(estimate.iri_level_std_m_per_km, bridging)),
             "iri_common_std_m_per_km": _known(estimate.iri_common_std_m_per_km),

@@ -295,8 +295,6 @@ def weighted_response(weighting: Weighting, low_pass_hz: float | None) -> Callab
 
 
 LEAST_WORD = "not_uncomfortable"
-REPORTED_FROM_STDS = 2.0
-"""A ride of fewer standard errors hides in the noise."""
 
 
 @dataclass(frozen=True)
@@ -338,8 +336,9 @@ class ComfortColumns:
 def word_of(a_w: Uncertain, most_hidden_mps2: float) -> tuple[str, bool]:
     """The comfort word of a weighted r.m.s. [m/s2], and whether the ride hides in the noise. A ride that does has the
     mildest word if its upper bound allows that, else none; ``most_hidden_mps2`` can hide between two steps."""
+    reported_from_stds = 2.0  # A ride of fewer standard errors hides in the noise.
     is_known = isfinite(a_w.value)
-    if is_known and a_w.value >= REPORTED_FROM_STDS * a_w.std:
+    if is_known and a_w.value >= reported_from_stds * a_w.std:
         return comfort_word(a_w.value), False
-    bound_mps2 = max(a_w.value + REPORTED_FROM_STDS * a_w.std if is_known else 0.0, most_hidden_mps2)
+    bound_mps2 = max(a_w.value + reported_from_stds * a_w.std if is_known else 0.0, most_hidden_mps2)
     return LEAST_WORD if comfort_word(bound_mps2) == LEAST_WORD else "", True

@@ -21,9 +21,6 @@ from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 
-STALE_S = 10.0
-"""A living service renews its status every second; one this old comes from a service that hangs."""
-
 LARGEST_BYTES = 100_000
 """Most that is read of a status file; what is cut there is none."""
 
@@ -195,6 +192,7 @@ def trouble(status: ServiceStatus | None, now_t_us: int, pid_exists: bool) -> st
     now_t_us     monotonic time, of this machine since its last boot [us]
     pid_exists   whether the process of the snapshot runs (``process_exists``)
     """
+    stale_s = 10.0  # A living service renews its status every second; one this old comes from a service that hangs.
     if status is None:
         return "ridelog is not running: it has left no status"
     age_s = (now_t_us - status.updated_t_us) / 1e6
@@ -202,6 +200,6 @@ def trouble(status: ServiceStatus | None, now_t_us: int, pid_exists: bool) -> st
         return "ridelog is not running: its last status is from before this boot"
     if not pid_exists:
         return f"ridelog is not running: process {status.pid} has ended, its last status is {age_s:.0f} s old"
-    if age_s > STALE_S:
+    if age_s > stale_s:
         return f"ridelog hangs: process {status.pid} is there, but its last status is {age_s:.0f} s old"
     return None

@@ -86,9 +86,6 @@ def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, s
 
 
 _READS = "reads"  # how many readings per sample there are, each of which has the noise that is said
-_SAME_WHEELBASE = 3 * WHEELBASE_ERROR
-_SPEEDS_MPS = (10.0, 20.0, 30.0)  # town, road, motorway
-_FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through
 
 
 @dataclass(frozen=True)
@@ -220,13 +217,15 @@ def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
 
 
 def _noise_floor(sensor: Instrument, low_pass_hz: float | None) -> NoiseFloor:
-    f_hz = np.linspace(0.0, GRID_RATE_HZ / 2, _FLOOR_LINES)
+    floor_lines = 1025  # finer than the slowest wave that a weighting lets through
+    f_hz = np.linspace(0.0, GRID_RATE_HZ / 2, floor_lines)
     gain = np.abs(weighted_response(WEIGHTING, low_pass_hz)(f_hz))
     return NoiseFloor(gain, GRID_RATE_HZ, sensor.sensor.step_mps2, sensor.reads)
 
 
 def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, ...]:
     """What the settings allow and somebody should know all the same."""
+    same_wheelbase = 3 * WHEELBASE_ERROR
     vehicle, found = model.vehicle, []
     if vehicle.sensor.left_m:
         side = "left" if vehicle.sensor.left_m > 0 else "right"
@@ -237,7 +236,7 @@ def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, .
         found.append(f"vehicle: {not_known(iri_share_std(model, sensor))}{missing}")
     elif (said := config.wheelbase_m) is not None and vehicle.rear is not None:
         wheelbase_m = vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
-        if abs(wheelbase_m / said - 1) > _SAME_WHEELBASE:
+        if abs(wheelbase_m / said - 1) > same_wheelbase:
             found.append(f"vehicle {vehicle.name}: its wheelbase is {wheelbase_m:.2f} m, and wheelbase_m says "
                          f"{said:g}: it is another car, and the IRI is wrong. Set vehicle: generic, or run ridelog "
                          "learn-car.")
@@ -246,10 +245,11 @@ def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, .
 
 def iri_share_std(model: CarModel, sensor: Instrument) -> float:
     """Share by which the IRI may be off because nobody knows the car: the largest of some speeds."""
+    speeds_mps = (10.0, 20.0, 30.0)  # town, road, motorway
     psd = COMMON_ROAD.psd_of(LOG_WAVES)
     car, off = known_vehicle(model.vehicle, model.effects), cars_off(model.vehicle, model.effects, model.errors)
     shares = []
-    for speed_mps in _SPEEDS_MPS:
+    for speed_mps in speeds_mps:
         response = CarResponse(car.at(speed_mps, WAVE_NUMBERS_CPM, psd),
                                [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in off])
         shares.append(slope_knowledge(response, speed_mps, COMMON_ROAD, sensor.sensor.variance_mps2_2, GRID_RATE_HZ,

@@ -38,11 +38,6 @@ from logger.store.log.row_format import read_log
 from logger.store.log.sidecar import sidecar_or_nothing
 from logger.units import US_PER_S
 
-SAME_UTC_US = 500_000
-SAME_START_M = 1.0
-SAME_START_US = 1_000_000
-OUTSIDE_SHARE = 0.02
-
 _LATE_FLAGS = frozenset({"time_unset"})  # goes from the rows when their file is finished
 
 
@@ -246,7 +241,7 @@ def _anchors(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord]) -> 
     pairs = []
     for wanted in expected:
         near = _nearest(times, wanted.utc_us) if wanted.utc_us is not None else None
-        if near is not None and abs(times[near] - (wanted.utc_us or 0)) <= SAME_UTC_US:
+        if near is not None and abs(times[near] - (wanted.utc_us or 0)) <= 500_000:
             pairs.append((wanted, dated[near][1]))
     return pairs
 
@@ -263,11 +258,11 @@ def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift
         if wanted.distance_start_m is None:
             near = _nearest(starts_us, wanted.t_us + shift_us)
             found = by_time[near] if near is not None else None
-            same = found is not None and abs(found.t_us - wanted.t_us - shift_us) <= SAME_START_US
+            same = found is not None and abs(found.t_us - wanted.t_us - shift_us) <= 1_000_000
         else:
             near = _nearest(starts_m, wanted.distance_start_m)
             found = by_distance[near] if near is not None else None
-            same = found is not None and abs((found.distance_start_m or 0.0) - wanted.distance_start_m) <= SAME_START_M
+            same = found is not None and abs((found.distance_start_m or 0.0) - wanted.distance_start_m) <= 1.0
         if found is not None and same and found.segment not in taken:
             taken.add(found.segment)
             pairs.append((wanted, found))
@@ -405,7 +400,7 @@ _MEASURES: dict[str, Measure] = {
 
 
 def _may_be_outside(count: int) -> int:
-    return max(1, int(OUTSIDE_SHARE * count))
+    return max(1, int(0.02 * count))
 
 
 def _median(values: Sequence[float]) -> float:

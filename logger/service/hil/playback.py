@@ -40,8 +40,6 @@ from logger.store.log.log_writer import ClockMap
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 PROGRESS_EVERY_US = US_PER_S
-HELD_US = 10 * US_PER_S
-"""A decoder gives each sample within this time: a clock that is recovered looks some seconds ahead."""
 
 
 @dataclass(frozen=True)
@@ -202,6 +200,8 @@ def _first(events: Iterable[Event], length_us: int) -> Iterator[Event]:
 
 def _as_lines(events: Iterable[Event], decoder: Decoder) -> Iterator[Event]:
     """Readings of the decoder's events as lines of text, each at its time; other events as they are."""
+    # A decoder gives each sample within this time: a clock that is recovered looks some seconds ahead.
+    held_us = 10 * US_PER_S
     merger = EventMerger()
     taken_us: int | None = None
     for event in events:
@@ -214,7 +214,7 @@ def _as_lines(events: Iterable[Event], decoder: Decoder) -> Iterator[Event]:
         if event.t_us - taken_us >= US_PER_S:
             taken_us = event.t_us
             merger.add(_lines(decoder.take()))
-            yield from merger.until(event.t_us - HELD_US)
+            yield from merger.until(event.t_us - held_us)
     decoder.flush()
     merger.add(_lines(decoder.take()))
     yield from merger.until(LATEST_US)

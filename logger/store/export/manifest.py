@@ -20,7 +20,6 @@ from pathlib import Path
 LINE_BYTES = 200
 """More than any line of ours has: 64 digits of a checksum, two or three numbers, and a name of at most 64."""
 
-_LINES_PER_BLOCK = 1000
 _LAST = re.compile(r"# (\d+) files, list ([0-9a-f]{64})")
 _CUT = "cut short: expected a last line '# N files, list SHA-256'"
 
@@ -30,7 +29,7 @@ def list_blocks(first: str, entries: Iterable[str]) -> Iterator[bytes]:
     digest = hashlib.sha256()
     count = -1
     lines = chain([first], entries)
-    while some := list(islice(lines, _LINES_PER_BLOCK)):
+    while some := list(islice(lines, 1000)):
         block = "".join(f"{line}\n" for line in some).encode("ascii")
         digest.update(block)
         count += len(some)

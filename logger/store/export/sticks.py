@@ -58,7 +58,6 @@ MACHINE_ID = Path("/etc/machine-id")
 
 _IDENTITY = re.compile(rb"([0-9a-f]{12})\n")
 _HOME = re.compile(r'([0-9a-f]{12}) ([0-9a-f]{12}) (".*")')
-_MOST_BYTES = 65_536
 _CARD_FAULTS = {errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
@@ -123,7 +122,7 @@ def _remember(log_folder: DirectoryHandle, home: _Home) -> None:
 def _homes(log_folder: DirectoryHandle) -> Iterator[_Home]:
     """The lines that can be read."""
     try:
-        text = log_folder.read(HOMES_NAME, _MOST_BYTES).decode("ascii")
+        text = log_folder.read(HOMES_NAME, 65_536).decode("ascii")
     except (OSError, ValueError):
         return
     for line in text.splitlines():
@@ -173,8 +172,6 @@ LEAST_KEY_BYTES, MOST_KEY_BYTES = 16, 4096
 _ID_BYTES = 16
 _ID = re.compile(rb"([0-9a-f]{32})\n")
 _UNREADABLE = "unreadable"
-_MOST_LOGGERS = 1000
-"""That are looked at on a stick, which may hold names without end."""
 
 
 @dataclass(frozen=True)
@@ -199,12 +196,13 @@ def trusted_sticks(pairing: Pairing, logs: DirectoryHandle) -> set[str] | None:
 def stick_name(pairing: Pairing, root: DirectoryHandle, logs: DirectoryHandle, identity: str) -> str:
     """What marks call this stick, of which only ``root`` is open; empty where nothing is known of it. The number that
     the card remembers may also lie in the folder of another logger: the card has been put into another machine."""
+    most_loggers = 1000  # That are looked at on a stick, which may hold names without end.
     try:
         if pairing.mode == KEY_FILE:
             return _fingerprint(root.read(KEY_NAME, MOST_KEY_BYTES))
         with root.inside(manifest.FOLDER, make=False) as common:
             first, name = _first_stick(logs), _id_in(common, identity)
-            others = (_id_in(common, other) for other in islice(common.each_name(), _MOST_LOGGERS))
+            others = (_id_in(common, other) for other in islice(common.each_name(), most_loggers))
             return first if first and name != first and first in others else name
     except OSError:
         return ""
@@ -278,8 +276,6 @@ def _fingerprint(key: bytes) -> str:
 FOLDER = Path("/run/ridelog-export")
 BLOCK_DEVICES = Path("/sys/class/block")
 LED_MEMORY = "led-trigger"
-LARGEST_BYTES = 10_000
-"""Most that is read of a note; what is cut there is none."""
 
 WAITING = "plugged in, waits for its turn"
 
@@ -314,9 +310,10 @@ def write_note(path: Path, note: StickNote) -> None:
 
 def read_note(path: Path) -> StickNote | None:
     """A note; None where there is none that can be read. An empty one is that of a stick whose export waits."""
+    largest_bytes = 10_000  # Most that is read of a note; what is cut there is none.
     try:
         with open_regular(path) as file:
-            text = file.read(LARGEST_BYTES)
+            text = file.read(largest_bytes)
         note = StickNote(**json.loads(text)) if text else StickNote(stick_of(path), "waiting", True, WAITING)
     except (OSError, ValueError, TypeError, RecursionError):
         return None

@@ -44,7 +44,6 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
 _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 """What may be a whole number with a comma after each three digits, and is no proof of a decimal comma."""
 _EMPTY = frozenset(("", "nan", "null", "none", "na", "n/a", "-"))
-_SHORTEST_UTF16 = 4
 _KINDS = (
     (b"PK\x03\x04", "a workbook (.xlsx, .ods) or another zip archive: save the sheet as CSV, or unpack it"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls): save the sheet as CSV"),
@@ -250,7 +249,7 @@ def _utf16(data: bytes) -> str | None:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     first = data[:256]
-    if len(first) < _SHORTEST_UTF16 or 0 not in first:
+    if len(first) < 4 or 0 not in first:
         return None
     return next((code for code, zeros, others in (("utf-16-le", first[1::2], first[::2]),
                                                   ("utf-16-be", first[::2], first[1::2]))

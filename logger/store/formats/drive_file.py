@@ -59,7 +59,6 @@ _MEASURES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "roll_rate": ("_rad_per_s", ("body",)),
 }
 _PLACE = ("ahead_m", "left_m")
-_FARTHEST_M = 20.0
 _KINDS = ("accelerometer", "encoder", "potentiometer", "laser", "load_cell")
 # Columns of a rig's record that need no word in run.yaml.
 _OWN_SIGNALS = {one.name: one for one in (
@@ -169,6 +168,7 @@ def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]
 
 
 def _signal(name: str, node: Node) -> Signal:
+    farthest_m = 20.0
     keys = node.mapping(("measures",), ("of", "kind", *_PLACE))
     measures = keys["measures"].choice(*_MEASURES)
     unit, parts = _MEASURES[measures]
@@ -177,7 +177,7 @@ def _signal(name: str, node: Node) -> Signal:
                        f"{unit}, its unit, found {name}")
     of = keys["of"].choice(*parts) if "of" in keys else parts[0]
     kind = keys["kind"].choice(*_KINDS) if "kind" in keys else None
-    place = {key: keys[key].number(-_FARTHEST_M, _FARTHEST_M) for key in _PLACE if key in keys}
+    place = {key: keys[key].number(-farthest_m, farthest_m) for key in _PLACE if key in keys}
     if place and (measures, of) != ("acceleration", "body"):
         raise keys[next(iter(place))].wrong("no place: only an acceleration of the body has one")
     return Signal(name, measures, of, **place, kind=kind)
@@ -208,8 +208,6 @@ COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
 _QUANTITIES = {TIME: bounds.TIME, VERTICAL: bounds.ACCELERATION, SPEED: bounds.SPEED, DISTANCE: bounds.DISTANCE,
                **dict(zip(PLACE, (bounds.LATITUDE, bounds.LONGITUDE), strict=True))}
-_MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
-_LINES_AT_ONCE = 50_000
 _TIME_FORM = "%.13g"  # hundredths of a second, also of a clock that has run since 1970
 _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 
@@ -378,6 +376,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for a speed below 0, and for times beyond
     1e5 s.
     """
+    max_time_s = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
     header, path = (TIME, SPEED), file_in(path, DRIVE)
     _, table, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path),
@@ -386,7 +385,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     )
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
-    time_s = taken(replace(bounds.TIME, largest=_MAX_TIME_S), TIME, table[:, 0], file)
+    time_s = taken(replace(bounds.TIME, largest=max_time_s), TIME, table[:, 0], file)
     speed_mps = taken(bounds.SPEED, SPEED, table[:, 1], file)
     if (back := np.diff(time_s) <= 0).any():
         row = int(np.argmax(back)) + 1
@@ -432,8 +431,9 @@ def write_excitation(path: Path, excitation: Excitation) -> None:
 
 def write_table(path: Path, names: Sequence[str], table: Array, form: str) -> None:
     """Write rows (n, names) below their names, each number in a ``form``, times in their own. OSError if that fails."""
+    lines_at_once = 50_000
     line = ",".join(_TIME_FORM if name == TIME else form for name in names) + "\n"
-    blocks = (table[first : first + _LINES_AT_ONCE] for first in range(0, len(table), _LINES_AT_ONCE))
+    blocks = (table[first : first + lines_at_once] for first in range(0, len(table), lines_at_once))
     write_text(path, chain([",".join(names) + "\n"],
                            (line * len(block) % tuple(block.ravel().tolist()) for block in blocks)), "ascii")
 

@@ -281,12 +281,6 @@ def _form() -> str:
     return f"ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}"
 
 
-_EPOCHS = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e9))
-"""Seconds since 1970 are 1e9 from 2001 to beyond 2200, and no time that begins at zero comes to that."""
-_RATES_HZ = (4.0, 4000.0)
-"""Of accelerometers in loggers: a thousand wide, so that one unit of time fits and no second one."""
-
-
 @dataclass(frozen=True, eq=False)
 class Header:
     """A file's table, of which the names are known; none where no line has them."""
@@ -395,14 +389,18 @@ def _time_of(table: LoggerTable) -> str:
 
 
 def _epoch_unit(times: Array) -> str | None:
+    # Seconds since 1970 are 1e9 from 2001 to beyond 2200, and no time that begins at zero comes to that.
+    epochs = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e9))
     known = times[np.isfinite(times)]
     first = float(known[0]) if len(known) else 0.0
-    return next((unit for unit, least in _EPOCHS if first >= least), None)
+    return next((unit for unit, least in epochs if first >= least), None)
 
 
 def _stepping_unit(times: Array) -> str | None:
+    # Of accelerometers in loggers: a thousand wide, so that one unit of time fits and no second one.
+    rates_hz = (4.0, 4000.0)
     steps = np.diff(np.unique(times[np.isfinite(times)]))
     step = float(np.median(steps)) if len(steps) else 0.0
-    low, high = _RATES_HZ
+    low, high = rates_hz
     return next((unit for unit in ("s", "ms", "us", "ns") if step > 0 and low <= 1 / (step * TIME_UNITS[unit]) < high),
                 None)

@@ -67,7 +67,6 @@ MAX_HEADER_BYTES = 1024 * 1024
 MAX_NUMBERS = 50_000_000
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
 
-_BLOCK_BYTES = 1024 * 1024
 _FIELD_CHARS = 20
 _BINARY = {0: "<i2", 1: "<f4", 2: "<f8"}
 _TEXT = 5
@@ -255,11 +254,12 @@ class _Header:
 
 def _text_numbers(body: bytes, file: str, first_line: int) -> Array:
     """The numbers of whole lines, a block at a time: as words they take many times the memory of the file."""
+    block_bytes = 1024 * 1024
     refuse_long_lines(body, file, first_line=first_line)
     numbers = array("d")
     start = 0
     while start < len(body) and len(numbers) <= MAX_NUMBERS:
-        end = body.find(b"\n", start + _BLOCK_BYTES) + 1 or len(body)
+        end = body.find(b"\n", start + block_bytes) + 1 or len(body)
         block = body[start:end]
         try:
             values = array("d", map(float, block.replace(b",", b" ").split()))
@@ -323,10 +323,6 @@ PLACE = ("lat_deg", "lon_deg")
 PROFILE_NAME = "profile.csv"
 WIDEST_BRIDGED_M = 1.0
 """A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
-# Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
-# is taken for rounding.
-_ROUNDING_M = 0.0006
-_ROUNDING_STEPS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -464,7 +460,10 @@ def _even_spacing(distance: Array, steps: Array, file: str) -> float:
 
 
 def _rounding_m(spacing_m: float) -> float:
-    return min(_ROUNDING_M, _ROUNDING_STEPS * spacing_m)
+    # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps
+    # 5 %, is taken for rounding.
+    rounding_m = 0.0006
+    return min(rounding_m, 0.05 * spacing_m)
 
 
 def _pair(tracks: Sequence[Array]) -> tuple[Array, Array | None]:
@@ -494,7 +493,6 @@ PART_COLUMNS = (TIME, "displacement_m", "velocity_mps")
 _FORCE = re.compile("force(_[a-z0-9_]+)?_n")
 _OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lbf|lb|kgf|kg|v|mm|cm|um|in|ft)",
                          re.IGNORECASE)
-_FEWEST = 4
 
 
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
@@ -507,13 +505,14 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even, for
     elevations and forces that no rig has, and for forces of which is not said what they act on.
     """
+    fewest = 4
     known = {one.name: one for one in forces}
     names, table, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path), partial(_driving, file=str(path)),
         f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}][,force_n][,force_NAME_n], in metres "
         f"and newtons, or of a part alone {','.join(PART_COLUMNS[:2])}")
-    if len(table) < _FEWEST:
-        raise BadInput(f"{place(file, len(table))}: expected at least {_FEWEST} samples, found the end of the file")
+    if len(table) < fewest:
+        raise BadInput(f"{place(file, len(table))}: expected at least {fewest} samples, found the end of the file")
     pushes = tuple(name for name in names if _FORCE.fullmatch(name))
     if unsaid := [name for name in pushes if name not in known]:
         raise BadInput(f"{file}:1: expected a run.yaml beside it that says what {unsaid[0]} acts on, as forces: "

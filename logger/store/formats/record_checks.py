@@ -50,14 +50,8 @@ OWN_RATE = 0.0
 LEAST_RATE_HZ = 100.0
 MOST_RATE_HZ = 10_000.0
 WIDEST_STEP_S = 0.5
-_GRAVITY, _GRAVITY_NEAR, _GRAVITY_CALM = 1.0, 0.03, 0.35
-"""A mean so near to 1 with so little about it is a record in g: 3 % is what sensors are off."""
-_QUIET_MPS2, _LOUD_MPS2 = 0.1, 30.0
-"""R.m.s. about the mean: on a moving car it is more (0.15 on a new motorway, a tenth of it in g) and less."""
 _MOVING_MPS = 3.0
-_LEAST_FOR_ROADS_HZ = 79.9
 _HOLES = 0.02  # of the time
-_MOSTLY = 0.5  # of the samples: the recorder is slow, and did not stop for a while
 
 
 @dataclass(frozen=True)
@@ -163,12 +157,13 @@ def even_record(
 
 def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
     """That the sensor stood still for a while; BadInput where that is too long to draw a line across."""
+    mostly = 0.5  # of the samples: the recorder is slow, and did not stop for a while
     if not held.any():
         return []
     first, end = stretches_of(held)
     begin_s, end_s = t_s[first - 1], t_s[np.minimum(end, len(t_s) - 1)]
     lasted_s, row = end_s - begin_s, int(np.argmax(end_s - begin_s))
-    if (share := float(held.mean())) > _MOSTLY:
+    if (share := float(held.mean())) > mostly:
         raise BadInput(f"{file}: expected every sample to be a new measurement, found {share:.0%} that repeat the one "
                        f"before ({(~held).sum() / (t_s[-1] - t_s[0]):.3g} Hz written at {_rate_hz(t_s):.4g}): record "
                        "at a higher rate")
@@ -200,12 +195,13 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
 def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) -> EvenRecord:
     """A drive's columns (n,) by name (``drive_file.COLUMNS``), as ``even_record``. Repeats are dropped; but what the
     samples do not hold cannot be estimated, so BadInput where fewer than 80 a second are left."""
+    least_for_roads_hz = 79.9
     names = [name for name in columns if name not in (TIME, VERTICAL)]
     moving = np.abs(columns[SPEED]) > _MOVING_MPS
     found = even_record(columns[TIME], {VERTICAL: columns[VERTICAL]}, {name: columns[name] for name in names}, file,
                         asked, moving)
-    if found.resampled is not None and found.resampled.from_hz < _LEAST_FOR_ROADS_HZ:
-        raise BadInput(f"{file}: expected at least {_LEAST_FOR_ROADS_HZ:g} samples a second that were taken, found "
+    if found.resampled is not None and found.resampled.from_hz < least_for_roads_hz:
+        raise BadInput(f"{file}: expected at least {least_for_roads_hz:g} samples a second that were taken, found "
                        f"{found.resampled.from_hz:.4g}")
     return found
 
@@ -275,18 +271,22 @@ def _true_rate_hz(repeats: RepeatedSamples, t_s: Array) -> float:
 def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     """What makes one doubt that samples (n, axes) are in m/s2. BadInput where they are in g, as gravity is in them, or
     are all 0."""
+    # A mean so near to 1 with so little about it is a record in g: 3 % is what sensors are off.
+    GRAVITY, gravity_near, gravity_calm = 1.0, 0.03, 0.35
+    # R.m.s. about the mean: on a moving car it is more (0.15 on a new motorway, a tenth of it in g) and less.
+    quiet_mps2, loud_mps2 = 0.1, 30.0
     counted = samples if moving is None or not moving.any() else samples[moving]
     mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
     for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
-        if abs(gravity - _GRAVITY) < _GRAVITY_NEAR and rms < _GRAVITY_CALM:
+        if abs(gravity - GRAVITY) < gravity_near and rms < gravity_calm:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
                            "has it: --unit g takes them as g, --unit mps2 as they are")
     if np.ptp(counted[:, 0]) == 0.0 or (moving is not None and not moving.any()):
         return []
     numbers = {"rms_mps2": rms}
-    if rms < _QUIET_MPS2:
+    if rms < quiet_mps2:
         return [Doubt("quiet", f"{rms:.2g} m/s2 r.m.s. is less than a moving car has: is it in g? (--unit g)", numbers)]
-    if rms > _LOUD_MPS2:
+    if rms > loud_mps2:
         return [Doubt("loud", f"{rms:.3g} m/s2 r.m.s. is more than any car has: is it in m/s2?", numbers)]
     return []
 
@@ -325,11 +325,8 @@ def end_doubts(name: str, values: Array) -> list[Doubt]:
                   {"at_mps2": one.at, "samples": one.samples}) for one in range_ends(values)]
 
 
-MAX_CHANNELS = 64
-LONGEST_NAME = 100
 NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)
 """Columns of a drive that say where and how the car went."""
-_STANDING_M = 1.0  # a receiver that stands wanders by more, a wheel's counter by less
 
 
 @dataclass(frozen=True)
@@ -347,6 +344,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
+    max_channels = 64
     path = file_in(path, DRIVE)
     file = str(path)
     wished = ",".join(only) if only else "CHANNEL[,CHANNEL...]"
@@ -356,9 +354,9 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
         wanted = tuple(only) or tuple(name for name in names if name not in (TIME, *NOT_SENSORS))
         good = names.count(TIME) == 1 and wanted and all(_is_name(name) and names.count(name) == 1 for name in wanted)
-        return (TIME, *wanted) if good and len(wanted) <= MAX_CHANNELS else None
+        return (TIME, *wanted) if good and len(wanted) <= max_channels else None
 
-    header = f"a header with {TIME},{wished}, each once, at most {MAX_CHANNELS}"
+    header = f"a header with {TIME},{wished}, each once, at most {max_channels}"
     wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
@@ -376,16 +374,17 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
 
 def is_drive(path: Path | str) -> bool:
     """Whether a CSV record is of a car that went somewhere: its speed or its distance says so. BadInput as above."""
+    standing_m = 1.0  # a receiver that stands wanders by more, a wheel's counter by less
     how = tuple(name for name in header_of(Path(path)) if name in (SPEED, DISTANCE))
     if not how:
         return False
     path = file_in(path, DRIVE)
     table = parse_columns(read_bounded(path, MAX_BYTES), str(path),
                           lambda there: how if set(how) <= set(there) else None, ",".join(how))[1]
-    return any(float(np.ptp(one) if name == DISTANCE else one.max()) > _STANDING_M
+    return any(float(np.ptp(one) if name == DISTANCE else one.max()) > standing_m
                for name, one in zip(how, table.T, strict=True))
 
 
 def _is_name(name: str) -> bool:
     """Something that can be shown and typed, of bytes that are text."""
-    return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "\ufffd" not in name
+    return 0 < len(name) <= 100 and name.isprintable() and "\ufffd" not in name

@@ -26,8 +26,6 @@ VERTICAL = "accel_z_mps2"
 USABLE = "usable"
 HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
-# A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
-_ROUNDING_S = 0.00101
 _ROUNDING_STEPS = 0.2
 HOLE_STEPS = 2.5
 """Longer than so many steps is a hole: more than one sample is lost."""
@@ -144,4 +142,7 @@ def _off_even(t_s: Array) -> Array:
 
 def _tolerance_s(step_s: float) -> float:
     """How far a time may be from an even grid, as its digits are rounded [s]."""
-    return min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
+    # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid
+    # between.
+    rounding_s = 0.00101
+    return min(rounding_s, _ROUNDING_STEPS * step_s)

@@ -57,7 +57,6 @@ _AXLE_KEYS = (
     "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m",
 )
 _ANTI_ROLL_KEY = "anti_roll_stiffness_n_m_per_rad"
-_FARTHEST_M = 10.0  # no sensor is bolted farther from its car's centre of gravity
 # What a number may be. Most scale with the body, so that they are limited per kilogram of sprung mass: a car, a lorry
 # and the Golden Car, whose numbers are given for 1 kg, fit; the same numbers in g, t, mm, kN/m or kN s/m do not.
 _LIMITS: Mapping[str, tuple[float, float]] = {
@@ -69,7 +68,6 @@ _LIMITS: Mapping[str, tuple[float, float]] = {
 _ON_BENCH: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1e-9, 1e6), "mass_kg": (1e-9, 1e6)}
 _ON_BENCH_PER_KG = {"inertia": (1e-9, 1e3), "mass": (1e-6, 1e3), "stiffness": (4e-3, 1e9), "damping": (0.0, 1e6)}
 _CAR_PATCH_M, _CAR_WHEELBASE_M = 0.1, 1.0
-_MOST_OF_COMPONENT = 1e12
 _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
     "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
     "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
@@ -77,13 +75,11 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 }
 # 0 stands for none: without a spring a single mass moves freely.
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY, "stiffness_n_per_m", "damping_n_s_per_m")
-_SHORTEST_WHEELBASE_M = 0.01
 # Where a search for an unknown number begins, of a car of the middle class.
 _USUAL = {"sprung_mass_kg": 350.0, "mass_kg": 10.0, "cg_distance_m": 1.35, "track_width_m": 1.5,
           "contact_patch_m": 0.15, _ANTI_ROLL_KEY: 1e4}
 _NUMBERS = {*_LIMITS, *_LIMITS_PER_KG, *(name for own in OWN_NAMES.values() for name in own)}
 _MAY_BE_NOTHING = {name for name in OWN_NAMES["single_mass"] if name != "mass_kg"}
-_ROUNDING = 1e-12
 _SPREAD = re.compile(r"(.+?)\s*(?:\+-|\+/-|±)\s*(.+?)\s*(%?)")  # 875 +- 5%, 875 ± 40
 
 
@@ -310,6 +306,7 @@ def _usual_number(key: str, sprung_mass_kg: float) -> float:
 
 def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Known]]:
     """The vehicle of a file, the nodes of all its keys, and how well its numbers are known where they say it."""
+    shortest_wheelbase_m = 0.01
     top, known = _with_plain_numbers(load_mapping(path))
     model_node = top.mapping().get("model")
     if model_node is None:
@@ -330,9 +327,9 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
     mass_kg = _number_of(keys, "sprung_mass_kg", 1.0, is_car)
     front = _read_axle(keys["front"], model, mass_kg, is_car)
     rear = _read_axle(keys["rear"], model, mass_kg, is_car) if "rear" in keys else None
-    if rear is not None and front.cg_distance_m + rear.cg_distance_m < _SHORTEST_WHEELBASE_M:
+    if rear is not None and front.cg_distance_m + rear.cg_distance_m < shortest_wheelbase_m:
         distance = keys["rear"].mapping()["cg_distance_m"]
-        raise distance.wrong(f"axles at least {_SHORTEST_WHEELBASE_M:g} m apart")
+        raise distance.wrong(f"axles at least {shortest_wheelbase_m:g} m apart")
     body = {key: _number_of(keys, key, mass_kg, is_car)
             for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
     vehicle = Vehicle(
@@ -360,7 +357,8 @@ def _name_of(node: Node) -> str:
 
 def _of_component(node: Node, key: str) -> float:
     """A number of a part, none of which need be there, and of which its preload may have either sign."""
-    return node.number(low=-_MOST_OF_COMPONENT if key == "preload_n" else 0.0, high=_MOST_OF_COMPONENT)
+    most_of_component = 1e12
+    return node.number(low=-most_of_component if key == "preload_n" else 0.0, high=most_of_component)
 
 
 def _looks_car_sized(keys: Mapping[str, Node]) -> bool:
@@ -378,6 +376,7 @@ def _is_car_sized(vehicle: Vehicle) -> bool:
 
 def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car: bool) -> float:
     """The number of a key, within its limits: those of cars, or of anything on a bench."""
+    rounding = 1e-12
     node = keys[key]
     if not sprung_mass_kg:  # of a part that need not have one
         return _of_component(node, key)
@@ -389,7 +388,7 @@ def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car
     per_kg = _LIMITS_PER_KG[key] if is_car else next(one for word, one in _ON_BENCH_PER_KG.items() if word in key)
     low, high = (limit * sprung_mass_kg for limit in per_kg)
     none = key in _MAY_BE_MISSING
-    if low * (1 - _ROUNDING) <= value <= high * (1 + _ROUNDING) or (none and value == 0):
+    if low * (1 - rounding) <= value <= high * (1 + rounding) or (none and value == 0):
         return value
     raise node.wrong(f"a number from {low:g} to {high:g}{' or 0' if none else ''}, for {sprung_mass_kg:g} kg on the "
                      "springs")
@@ -404,8 +403,9 @@ def _read_axle(node: Node, model: str, sprung_mass_kg: float, is_car: bool) -> A
 
 
 def _read_sensor(node: Node, model: str) -> SensorPlace:
+    farthest_m = 10.0  # no sensor is bolted farther from its car's centre of gravity
     keys = node.mapping(optional=("ahead_m", "left_m"))
-    place = {key: value.number(low=-_FARTHEST_M, high=_FARTHEST_M) for key, value in keys.items()}
+    place = {key: value.number(low=-farthest_m, high=farthest_m) for key, value in keys.items()}
     for key, motion, models in (("ahead_m", "pitch", ("half_car", "full_car")), ("left_m", "roll", ("full_car",))):
         if place.get(key) and model not in models:
             raise keys[key].wrong(f"0, because a {model} does not {motion}")
@@ -523,7 +523,6 @@ KEPT = 16  # the oldest goes first
 MAX_BYTES = 1_000_000
 
 _GAIN_PROBES_HZ = np.geomspace(0.01, 100.0, 200)
-_GAIN_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -543,7 +542,7 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
     """
     numbers = asdict(vehicle)
     del numbers["name"], numbers["preload_n"]  # a car has none
-    gain = recorder_gain(_GAIN_PROBES_HZ).round(_GAIN_DIGITS).tolist() if recorder_gain else None
+    gain = recorder_gain(_GAIN_PROBES_HZ).round(6).tolist() if recorder_gain else None
     with_effects = {"effects": {one.effect.name: dict(one.values) for one in effects}} if effects else {}
     return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain,
                         **with_effects})

@@ -118,7 +118,6 @@ def sidecar_path(log: Path) -> Path:
 
 
 COUNTER_NAME = "last-session"
-_COUNTER_BYTES = 64
 COUNTER = re.compile(COUNTER_NAME + r"(-[0-9]+)?")
 
 
@@ -156,7 +155,7 @@ def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
     """The last number given out; 0 when the file is missing, damaged or cannot be read."""
     try:
         with files.open(path) as file:
-            text, _, check = file.read(_COUNTER_BYTES).decode("ascii", "replace").strip().partition(" ")
+            text, _, check = file.read(64).decode("ascii", "replace").strip().partition(" ")
     except FileNotFoundError:
         return 0
     except OSError as error:

@@ -23,7 +23,6 @@ from logger.store.log.row_format import read_log, write_utc
 from logger.store.log.sidecar import read_sidecar
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_JOIN_M = 0.5
 
 
 class Placed(Protocol):
@@ -187,7 +186,7 @@ def _follows(last: WindowRecord, record: WindowRecord) -> bool:
         return False
     ground_m = apart_m(last, record)
     near_m = 5 * max(length_m(last), length_m(record))
-    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and ground_m is not None and ground_m < near_m
+    return abs(record.distance_start_m - last.distance_end_m) < 0.5 and ground_m is not None and ground_m < near_m
 
 
 def length_m(record: WindowRecord) -> float:

@@ -45,8 +45,6 @@ from logger.store.log.sidecar import (
     without_utc,
 )
 
-_BLOCK_ROWS = 256
-
 
 @dataclass(frozen=True)
 class Repaired:
@@ -305,7 +303,7 @@ def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]
     for row in rows:
         lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
                      else format_row(_with_utc(row.record, clock)))
-        if len(lines) >= _BLOCK_ROWS:
+        if len(lines) >= 256:
             yield _joined(lines)
             lines.clear()
     yield _joined(lines)

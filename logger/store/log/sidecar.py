@@ -180,9 +180,7 @@ UNCHECKED = "taken_over_unchecked"
 SETTINGS_LOST = "settings_lost"
 """In a sidecar that a repair has made where there was none that could be read."""
 
-_FORMAT = 1
 _SEAL = frozenset({"format", "sha256"})
-LATEST_UTC_US = 4_102_444_800_000_000  # 2100-01-01
 
 
 @dataclass(frozen=True)
@@ -259,7 +257,7 @@ def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: st
 
 def _sealed(content: dict[str, Any]) -> dict[str, Any]:
     """Content with its checksum. There are two keys, so that no single damage makes it one that never had any."""
-    sealed = content | {"format": _FORMAT}
+    sealed = content | {"format": 1}
     return sealed | {"sha256": json_sha256(sealed)}
 
 
@@ -295,6 +293,7 @@ def _is_hole(hole: object) -> bool:
 
 def clock_of(sidecar: dict[str, Any]) -> ClockMap | None:
     """The clock map that a sidecar holds, if any that can be. That of an open part holds the session's newest."""
+    latest_utc_us = 4_102_444_800_000_000  # 2100-01-01
     stored = sidecar.get("clock_map")
     offset_us = stored.get("offset_us") if isinstance(stored, dict) else None
-    return ClockMap(offset_us) if type(offset_us) is int and 0 <= offset_us < LATEST_UTC_US else None
+    return ClockMap(offset_us) if type(offset_us) is int and 0 <= offset_us < latest_utc_us else None
