@@ -74,10 +74,8 @@ class Register:
         byte = self.read(bus, chip)
         for field, value in values.items():
             if field.extract(byte) != value:
-                raise BadReply(
-                    f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X}: "
-                    f"{field.name} reads {field.extract(byte)}, expected {value}"
-                )
+                raise BadReply(f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X}: {field.name} "
+                               f"reads {field.extract(byte)}, expected {value}")
 
     def update(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
         """Set the fields, leave all other bits as they are, and check that the chip took them.
@@ -104,10 +102,8 @@ class ToggleRegister:
         """Flip the state by one read. True: the chip runs now. BadReply when the answer is neither 0x00 nor 0xFF."""
         answer = bus.read_byte_data(chip, self.address)
         if answer not in (0x00, 0xFF):
-            raise BadReply(
-                f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X} "
-                f"answered 0x{answer:02X}, expected 0x00 or 0xFF"
-            )
+            raise BadReply(f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X} answered "
+                           f"0x{answer:02X}, expected 0x00 or 0xFF")
         return answer == 0xFF
 
 
@@ -119,15 +115,11 @@ def bus_fault(error: OSError, chip: int) -> DeviceError:
     if error.errno in NOT_ACKNOWLEDGED:
         return NotPresent(f"nothing answers at I2C address 0x{chip:02X}: check the sensor's power, ground, SDA and SCL")
     if error.errno == errno.ETIMEDOUT:
-        return Timeout(
-            f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, "
-            "and take the sensor's power away for a moment if it stays"
-        )
+        return Timeout(f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, and take "
+                       "the sensor's power away for a moment if it stays")
     if error.errno == errno.EBUSY:
-        return NotPresent(
-            f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod) or remove its overlay, "
-            "or read the sensor through it (driver: iio)"
-        )
+        return NotPresent(f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod) or remove its "
+                          "overlay, or read the sensor through it (driver: iio)")
     return BadReply(f"I2C transfer with 0x{chip:02X} failed: {error}")
 
 
@@ -169,9 +161,8 @@ class ConfiguredChip:
     registers_to_check   so many ``check_next`` see every setting once
     """
 
-    def __init__(
-        self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[RegisterField, int]]]
-    ) -> None:
+    def __init__(self, name: str, bus: I2cBus,
+                 settings: Sequence[tuple[Register, Mapping[RegisterField, int]]]) -> None:
         self.name = name
         self.registers_to_check = len(settings)
         self._bus = bus

@@ -258,9 +258,8 @@ class FixedFramer(_Framer):
 
     PATIENCE = 3
 
-    def __init__(
-        self, length: int, plausible: Plausible, oriented: Plausible | None = None, sync: bytes = b"", group: int = 16
-    ) -> None:
+    def __init__(self, length: int, plausible: Plausible, oriented: Plausible | None = None, sync: bytes = b"",
+                 group: int = 16) -> None:
         super().__init__()
         self._length = length
         self._plausible = plausible

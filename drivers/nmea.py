@@ -226,20 +226,10 @@ class _Epoch:
         if self.vtg is not None and self.vtg.vouches:
             speed_mps = self.vtg.speed_mps if speed_mps is None else speed_mps
             course_deg = self.vtg.course_deg if course_deg is None else course_deg
-        return Fix(
-            t_us=self.t_us,
-            valid=True,
-            utc_us=utc_us,
-            time_of_day_us=self.time_of_day_us,
-            lat_deg=position.lat_deg,
-            lon_deg=position.lon_deg,
-            speed_mps=speed_mps,
-            course_deg=course_deg,
-            altitude_m=self.gga.altitude_m if self.gga else None,
-            satellites=self.satellites(),
-            hdop=self.hdop(),
-            may_wait=self.may_wait,
-        )
+        return Fix(t_us=self.t_us, valid=True, utc_us=utc_us, time_of_day_us=self.time_of_day_us,
+                   lat_deg=position.lat_deg, lon_deg=position.lon_deg, speed_mps=speed_mps, course_deg=course_deg,
+                   altitude_m=self.gga.altitude_m if self.gga else None, satellites=self.satellites(), hdop=self.hdop(),
+                   may_wait=self.may_wait)
 
     def no_fix(self) -> Fix:
         """The epoch when nobody vouches for it: only how well the receiver sees the sky."""
@@ -258,10 +248,8 @@ SELDOM_US = 5_500_000
 """Between fixes so far apart the motion is not known (the longest rhythm that is taken is 5 s, and some jitter)."""
 TELLING_INTERVALS = 3
 TELLING_FIXES = 10
-_MISSING = {
-    "speed": ("no row has a distance", "RMC or VTG sentences too"),
-    "date": ("no row has a time", "RMC with its date, or ZDA sentences too"),
-}
+_MISSING = {"speed": ("no row has a distance", "RMC or VTG sentences too"),
+            "date": ("no row has a time", "RMC with its date, or ZDA sentences too")}
 """What so many fixes in a row may lack, what that does, and what brings it."""
 
 
@@ -327,15 +315,10 @@ class NmeaDecoder:
     @property
     def counters(self) -> NmeaCounters:
         """What came in so far."""
-        return NmeaCounters(
-            sentences=self._checks[Checksum.GOOD],
-            bad_checksum=self._checks[Checksum.BAD],
-            no_checksum=self._checks[Checksum.MISSING],
-            malformed=self._malformed,
-            ubx_frames=self._framer.ubx_frames,
-            dropped_bytes=self._framer.dropped_bytes,
-            refused_dates=self._refused_dates,
-        )
+        return NmeaCounters(sentences=self._checks[Checksum.GOOD], bad_checksum=self._checks[Checksum.BAD],
+                            no_checksum=self._checks[Checksum.MISSING], malformed=self._malformed,
+                            ubx_frames=self._framer.ubx_frames, dropped_bytes=self._framer.dropped_bytes,
+                            refused_dates=self._refused_dates)
 
     def feed(self, t_us: int, data: bytes) -> list[Fix]:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]; return the fixes that are complete."""

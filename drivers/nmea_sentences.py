@@ -152,28 +152,15 @@ def _rmc(fields: list[bytes]) -> Rmc:
     _expect(11 <= len(fields) <= 13 and fields[1] in (b"A", b"V", b""))
     mode = fields[11] if len(fields) > 11 else b""
     day, illegal = _short_date(fields[8])
-    return Rmc(
-        _time_of_day_us(fields[0]),
-        fields[1] == b"A" and mode in MODES_WITH_FIX,
-        *_position(fields[2:6]),
-        _speed_mps(fields[6], KNOT_MPS),
-        _course_deg(fields[7]),
-        day,
-        illegal,
-    )
+    return Rmc(_time_of_day_us(fields[0]), fields[1] == b"A" and mode in MODES_WITH_FIX, *_position(fields[2:6]),
+               _speed_mps(fields[6], KNOT_MPS), _course_deg(fields[7]), day, illegal)
 
 
 def _gga(fields: list[bytes]) -> Gga:
     """time, lat, N/S, lon, E/W, quality, satellites, HDOP, altitude, M, geoid, M, age, station"""
     _expect(len(fields) == 14 and fields[9] in (b"M", b""))
-    return Gga(
-        _time_of_day_us(fields[0]),
-        (_whole(fields[5], 8) or 0) in QUALITIES_WITH_FIX,
-        *_position(fields[1:5]),
-        _whole(fields[6], 99),
-        _dop(fields[7]),
-        _number(fields[8], -1000.0, 20000.0),
-    )
+    return Gga(_time_of_day_us(fields[0]), (_whole(fields[5], 8) or 0) in QUALITIES_WITH_FIX, *_position(fields[1:5]),
+               _whole(fields[6], 99), _dop(fields[7]), _number(fields[8], -1000.0, 20000.0))
 
 
 def _gll(fields: list[bytes]) -> Gll:

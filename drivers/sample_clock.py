@@ -66,10 +66,8 @@ def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
     ``longest_us``: of the samples themselves all teeth are seen, not every second or third."""
     nearly = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
     step = 1.0 / (STEPS_PER_CYCLE * (instants_us[-1] - instants_us[0]))
-    frequencies = [
-        np.arange((1 - nearly) / multiple_us, (1 + nearly) / multiple_us, step)
-        for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)
-    ]
+    frequencies = [np.arange((1 - nearly) / multiple_us, (1 + nearly) / multiple_us, step)
+                   for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)]
     tried = np.concatenate([np.empty(0), *frequencies])
     return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > 0.7
 

@@ -134,10 +134,8 @@ class ChipSource:
 
     note = ""
 
-    def __init__(
-        self, name: str, open_bus: Callable[[], I2cBus], make_chip: Callable[[I2cBus], Chip],
-        now_us: Callable[[], int], pace: Pace,
-    ) -> None:
+    def __init__(self, name: str, open_bus: Callable[[], I2cBus], make_chip: Callable[[I2cBus], Chip],
+                 now_us: Callable[[], int], pace: Pace) -> None:
         self.name = name
         self._open_bus = open_bus
         self._make_chip = make_chip
@@ -228,10 +226,8 @@ class SerialSource:
     note = ""
     waiting_since_us = None
 
-    def __init__(
-        self, name: str, open_port: Callable[[], BytePort], now_us: Callable[[], int], wait_s: float,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
+    def __init__(self, name: str, open_port: Callable[[], BytePort], now_us: Callable[[], int], wait_s: float,
+                 sleep: Callable[[float], None] = time.sleep) -> None:
         self.name = name
         self._open_port = open_port
         self._now_us = now_us

@@ -45,9 +45,8 @@ class ScaleCalibration:
     @property
     def mps2_per_count(self) -> Triple:
         """Scale of X, Y, Z [m/s2 per count]."""
-        x, y, z = (
-            STANDARD_GRAVITY_MPS2 / (one - zero) for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)
-        )
+        x, y, z = (STANDARD_GRAVITY_MPS2 / (one - zero) for zero,
+                   one in zip(self.zero_g_raw, self.one_g_raw, strict=True))
         return x, y, z
 
 
@@ -260,15 +259,10 @@ class _Keys:
 def _profile(keys: _Keys) -> WireProfile:
     framing = keys.choice("framing", ["frames", "lines"])
     layout = _frame_layout(keys.inner("frame")) if framing == "frames" else _line_layout(keys.inner("line"))
-    profile = WireProfile(
-        name=keys.text("name"),
-        version=keys.whole("version", 1, 1_000_000),
-        verified=keys.flag("verified"),
-        source=keys.text("source"),
-        rate_hz=keys.number("rate_hz", 1, 10_000),
-        clock_tolerance=keys.number("clock_tolerance_ppm", 1, 50_000) * 1e-6,
-        layout=layout,
-    )
+    profile = WireProfile(name=keys.text("name"), version=keys.whole("version", 1, 1_000_000),
+                          verified=keys.flag("verified"), source=keys.text("source"),
+                          rate_hz=keys.number("rate_hz", 1, 10_000),
+                          clock_tolerance=keys.number("clock_tolerance_ppm", 1, 50_000) * 1e-6, layout=layout)
     keys.finish()
     return profile
 
@@ -290,15 +284,9 @@ def _frame_layout(keys: _Keys) -> FrameLayout:
     zero, one = (keys.numbers(key, 3, -32768, 65535) for key in ("zero_g_raw", "one_g_raw"))
     if any(abs(a - b) < 1 for a, b in zip(zero, one, strict=True)):
         raise keys.wrong("one_g_raw", "counts that differ by one or more from those of zero_g_raw")
-    layout = FrameLayout(
-        length_bytes=length,
-        sync=sync,
-        word=keys.choice("word", list(WORDS)),
-        offsets=(x, y, z),
-        valid_raw=(low, high),
-        upright_axis=None if axis == "none" else AXES.index(axis),
-        calibration=ScaleCalibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])),
-    )
+    layout = FrameLayout(length_bytes=length, sync=sync, word=keys.choice("word", list(WORDS)), offsets=(x, y, z),
+                         valid_raw=(low, high), upright_axis=None if axis == "none" else AXES.index(axis),
+                         calibration=ScaleCalibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])))
     keys.finish()
     return layout
 

@@ -188,10 +188,8 @@ class Bma220Settings:
         if self.bandwidth_hz is not None:
             _choose("bandwidth_hz", self.bandwidth_hz, FILTER_CODES)
             if self.bandwidth_hz > self.rate_hz:
-                raise SettingsError(
-                    f"bandwidth_hz {self.bandwidth_hz} is above the sampling rate of {self.rate_hz} Hz: "
-                    "the signal would be mostly aliases; choose a smaller one or leave it out"
-                )
+                raise SettingsError(f"bandwidth_hz {self.bandwidth_hz} is above the sampling rate of {self.rate_hz} "
+                                    "Hz: the signal would be mostly aliases; choose a smaller one or leave it out")
         if not self.addresses or not all(0x08 <= address <= 0x77 for address in self.addresses):
             raise SettingsError(f"addresses are 7-bit I2C addresses from 0x08 to 0x77, not {self.addresses}")
 
@@ -463,9 +461,8 @@ class _Bma220(Accelerometer[Bma220Config]):
         return "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
 
 
-def chip_source(
-    open_bus: Callable[[], I2cBus], settings: Bma220Settings, now_us: Callable[[], int], sleep: Callable[[float], None]
-) -> ChipSource:
+def chip_source(open_bus: Callable[[], I2cBus], settings: Bma220Settings, now_us: Callable[[], int],
+                sleep: Callable[[float], None]) -> ChipSource:
     """One burst of the chip on that bus per poll, at its sampling rate."""
     pace = Deadlines(US_PER_S // settings.rate_hz, now_us, sleep)
     return ChipSource("bma220", open_bus, lambda bus: Bma220(bus, settings, sleep), now_us, pace)

@@ -66,9 +66,8 @@ class _FrameReader:
     def __init__(self, layout: FrameLayout) -> None:
         set_by_gravity = layout.upright_axis is not None and not layout.sync
         self._layout = layout
-        self.framer = FixedFramer(
-            layout.length_bytes, layout.plausible, layout.oriented if set_by_gravity else None, layout.sync
-        )
+        self.framer = FixedFramer(layout.length_bytes, layout.plausible, layout.oriented if set_by_gravity else None,
+                                  layout.sync)
 
     def read(self, data: bytes) -> list[_Found]:
         return [self._samples(frame) for frame in self.framer.feed(data)]
@@ -106,13 +105,9 @@ class _LineReader:
     def _samples(self, lines: list[Frame]) -> _Found:
         values = np.array([_triple(line.data, self._layout) for line in lines], dtype=np.float64)
         largest = np.abs(values).max(axis=1)
-        return _Found(
-            lines[0].after_loss,
-            np.array([line.start for line in lines], dtype=np.int64),
-            values * self._layout.unit_mps2,
-            largest >= self._layout.range_units,
-            largest <= 2 * self._layout.range_units,
-        )
+        return _Found(lines[0].after_loss, np.array([line.start for line in lines], dtype=np.int64),
+                      values * self._layout.unit_mps2, largest >= self._layout.range_units,
+                      largest <= 2 * self._layout.range_units)
 
 
 def _triple(line: bytes, layout: LineLayout) -> Triple:

@@ -120,14 +120,10 @@ def axis_figures(weighted_mps2: Floats, rate_hz: float) -> AxisFigures:
     Solution: plain functions of the weighted samples, the standard's rule for which of them to use, and running r.m.s.
     values that work on a stream and do not drift however long the stream is.
     """
-    return AxisFigures(
-        duration_s=len(weighted_mps2) / rate_hz,
-        a_w_mps2=a_w(weighted_mps2),
-        mtvv_mps2=float(RunningRms(rate_hz).process(weighted_mps2).max()),
-        mtvv_exponential_mps2=float(ExponentialRms(rate_hz).process(weighted_mps2).max()),
-        vdv_mps175=vdv(weighted_mps2, 1.0 / rate_hz),
-        crest_factor=crest_factor(weighted_mps2),
-    )
+    return AxisFigures(duration_s=len(weighted_mps2) / rate_hz, a_w_mps2=a_w(weighted_mps2),
+                       mtvv_mps2=float(RunningRms(rate_hz).process(weighted_mps2).max()),
+                       mtvv_exponential_mps2=float(ExponentialRms(rate_hz).process(weighted_mps2).max()),
+                       vdv_mps175=vdv(weighted_mps2, 1.0 / rate_hz), crest_factor=crest_factor(weighted_mps2))
 
 
 class ExponentialRms:
@@ -337,10 +333,9 @@ class RideComfort:
         return end_hz if end_hz < self.weighting.counts_up_to_hz else None
 
 
-def ride_comfort(
-    accel_mps2: dict[str, Array | None], rate_hz: float, weighting: Weighting, horizontal: Weighting | None,
-    daily_hours: float | None = None, taken_hz: float | None = None, seen_to_hz: float | None = None,
-) -> RideComfort:
+def ride_comfort(accel_mps2: dict[str, Array | None], rate_hz: float, weighting: Weighting,
+                 horizontal: Weighting | None, daily_hours: float | None = None, taken_hz: float | None = None,
+                 seen_to_hz: float | None = None) -> RideComfort:
     """Weigh the axes of a record that belong together and take their figures.
 
     accel_mps2     (n,) by axis, ``z``, ``x`` and ``y``; None: not recorded
@@ -372,8 +367,7 @@ def ride_comfort(
         for axis, accel in others.items():
             axes[axis], by[axis] = axis_figures(_weighed(horizontal, accel, rate_hz), rate_hz), horizontal
     hours = daily_hours if daily_hours is not None else duration_s / 3600.0
-    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz,
-                       seen_to_hz)
+    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz, seen_to_hz)
 
 
 def _weighed(weighting: Weighting, accel_mps2: Array, rate_hz: float) -> Array:

@@ -305,8 +305,7 @@ def arrow_table(layer: Layer, file: str) -> pyarrow.Table:
     except ImportError as error:
         raise BadInput(EXTRA.format(file, error)) from None
     columns = list(zip(*(one.values for one in layer.features), strict=True)) or [()] * len(layer.fields)
-    table = {field.name: _column(pyarrow, field, values)
-             for field, values in zip(layer.fields, columns, strict=True)}
+    table = {field.name: _column(pyarrow, field, values) for field, values in zip(layer.fields, columns, strict=True)}
     table[GEOMETRY] = pyarrow.array([wkb(one.geometry) for one in layer.features], pyarrow.binary())
     return pyarrow.table(table)
 

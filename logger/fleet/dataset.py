@@ -46,13 +46,11 @@ _EPOCH_MONTH = 1970 * 12
 _ROWS_PATH = re.compile(r"month=[0-9]{4}-[0-9]{2}/cell=-?[0-9]{1,20}/[0-9]{6,12}-[0-9]{1,9}\.parquet")
 _LEDGER_PATH = re.compile(r"ledger/[0-9]{6,12}\.parquet")
 
-ROW_TYPES = {
-    "road": "int64", "car": "int64", "session": "int32", "segment": "int32", "crc32": "int64", "drive": "int32",
-    "utc_us": "int64", "lat_deg": "float64", "lon_deg": "float64", "heading_deg": "float32", "speed_mps": "float32",
-    "length_m": "float32", "iri_m_per_km": "float32", "iri_std_m_per_km": "float32", "a_w_mps2": "float32",
-    "flags": "string", "pass_windows": "int32", "pass_iri_m_per_km": "float64", "pass_iri_std_m_per_km": "float64",
-    "pass_a_w_mps2": "float64",
-}
+ROW_TYPES = {"road": "int64", "car": "int64", "session": "int32", "segment": "int32", "crc32": "int64",
+             "drive": "int32", "utc_us": "int64", "lat_deg": "float64", "lon_deg": "float64", "heading_deg": "float32",
+             "speed_mps": "float32", "length_m": "float32", "iri_m_per_km": "float32", "iri_std_m_per_km": "float32",
+             "a_w_mps2": "float32", "flags": "string", "pass_windows": "int32", "pass_iri_m_per_km": "float64",
+             "pass_iri_std_m_per_km": "float64", "pass_a_w_mps2": "float64"}
 """Columns of a row; NaN is written as not known."""
 _LEDGER = ("car", "session", "log", "sha256", "rows", "damaged_lines", "undated", "unplaced", "trimmed", "repeated")
 

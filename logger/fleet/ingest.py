@@ -98,9 +98,8 @@ def keep_names(dataset: Path, names: Iterable[str], key: bytes) -> None:
 
 
 _COUNTS = ("segment", "drive")
-_NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km",
-            "iri_std_m_per_km", "a_w_mps2", "duration_s", "iri_level_std_m_per_km", "iri_common_std_m_per_km",
-            "iri_place_std_m_per_km")
+_NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km", "iri_std_m_per_km",
+            "a_w_mps2", "duration_s", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
 _LARGEST_COUNT = 2**31 - 1
 """Of a dataset's column; no logger counts so far."""
 _HEADERS = tuple(one.encode() for one in HEADERS)
@@ -168,8 +167,7 @@ def _checks(data: bytes, wanted: bytes) -> npt.NDArray[np.int64] | None:
     return np.array(checks, dtype=np.int64)
 
 
-def _quick(header: bytes, logs: Sequence[bytes], checks: npt.NDArray[np.int64]
-           ) -> dict[str, npt.NDArray[Any]] | None:
+def _quick(header: bytes, logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]] | None:
     """All rows of intact logs, read at once: a reading has a cost of its own; None where a row is not what Arrow
     reads."""
     import pyarrow
@@ -290,8 +288,7 @@ def headings(lat_deg: Array, lon_deg: Array, drive: npt.NDArray[np.intp]) -> Arr
     return np.where(moved_m >= 1.0, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
 
 
-def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], trim_m: float
-            ) -> npt.NDArray[np.bool_]:
+def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], trim_m: float) -> npt.NDArray[np.bool_]:
     """Which rows lie farther from the ends of their drive than is cut; rows without a distance count as none."""
     if not trim_m:
         return np.ones(len(drive), dtype=np.bool_)
@@ -520,7 +517,6 @@ class _Past:
 
         for number in sorted(self._commits.get((session.car, session.number), ())):
             for file in self._dataset.manifest.commits[number].files:
-                table = parquet.read_table(
-                    self._dataset.folder / file.path, columns=list(_MARKS), partitioning=None,
-                    filters=[("car", "=", session.car), ("session", "=", session.number)])
+                table = parquet.read_table(self._dataset.folder / file.path, columns=list(_MARKS), partitioning=None,
+                                           filters=[("car", "=", session.car), ("session", "=", session.number)])
                 yield np.stack([table[name].to_numpy() for name in _MARKS], axis=1).astype(np.int64)

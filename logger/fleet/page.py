@@ -158,11 +158,10 @@ def _roads(roads: RoadTable) -> list[str]:
         return ["No road to show"]
     lines = [f"Roughest {roads.by}s",
              "  place                    IRI [m/km]      cars  passes  a_w [m/s2]  last seen   visit"]
-    return lines + [
-        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} "
-        f"{error_words(roads.iri_std_m_per_km[one]):7}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
-        f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
-        f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
+    return lines + [f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} "
+                    f"{error_words(roads.iri_std_m_per_km[one]):7}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
+                    f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
+                    f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
 
 
 def _changes(roads: RoadTable) -> list[str]:
@@ -177,10 +176,9 @@ def _changes(roads: RoadTable) -> list[str]:
         return [f"No {roads.by} has become worse, as far as these drives show", *power]
     lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,
              "  place                    IRI [m/km]   a year [m/km]    p"]
-    return lines + [
-        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
-        f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
-        f"{roads.p_value[one]:.1g}" for one in order]
+    return lines + [f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
+                    f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
+                    f"{roads.p_value[one]:.1g}" for one in order]
 
 
 def error_words(std: float) -> str:
@@ -210,10 +208,9 @@ def roads_layer(roads: RoadTable) -> Layer:
         known = [value if not isinstance(value, float) or isfinite(value) else None for value in values]
         condition = federal_condition(row["iri_m_per_km"]) if isfinite(row["iri_m_per_km"]) else None
         last_utc = iso_utc(last_us // DAY_US * DAY_US)  # a time of day would tell whose drive it was
-        features.append(Feature(
-            roads.by, iri_title(row["iri_m_per_km"]), (*known, condition, last_utc, visit or None),
-            _line(row["lat_deg"], row["lon_deg"], row["heading_deg"], _DRAWN_M.get(roads.by, 0.0)),
-            (row["lon_deg"], row["lat_deg"]), last_utc, False, ""))
+        features.append(Feature(roads.by, iri_title(row["iri_m_per_km"]), (*known, condition, last_utc, visit or None),
+                                _line(row["lat_deg"], row["lon_deg"], row["heading_deg"], _DRAWN_M.get(roads.by, 0.0)),
+                                (row["lon_deg"], row["lat_deg"]), last_utc, False, ""))
     return Layer(f"{roads.by}s", FIELDS, tuple(features))
 
 
@@ -298,17 +295,15 @@ def _of_segments(segments: RoadTable, history: History, x: Array, y: Array) -> I
     steps = steps[order]
     first = np.searchsorted(history.segment[order], np.arange(len(x) + 1))
     for name, rows in _by_tile(column, row, DEEPEST):
-        yield name, {
-            "x": np.round((x[rows] * 2**DEEPEST - column[rows]) * _STEPS).astype(int).tolist(),
-            "y": np.round((y[rows] * 2**DEEPEST - row[rows]) * _STEPS).astype(int).tolist(),
-            "h": np.round(segments.heading_deg[rows]).astype(int).tolist(),
-            "m": _hundredths(segments.iri_m_per_km[rows]), "s": _hundredths(segments.iri_std_m_per_km[rows]),
-            "t": _hundredths(segments.trend_m_per_km_per_year[rows]),
-            "u": _hundredths(segments.trend_std_m_per_km_per_year[rows]),
-            "c": segments.worse[rows].astype(int).tolist(),
-            "k": segments.cars[rows].tolist(), "n": segments.passes[rows].astype(int).tolist(),
-            "d": (segments.last_us[rows] // DAY_US).tolist(),
-            "q": [steps[first[one] : first[one + 1]].tolist() for one in rows.tolist()]}
+        yield name, {"x": np.round((x[rows] * 2**DEEPEST - column[rows]) * _STEPS).astype(int).tolist(),
+                     "y": np.round((y[rows] * 2**DEEPEST - row[rows]) * _STEPS).astype(int).tolist(),
+                     "h": np.round(segments.heading_deg[rows]).astype(int).tolist(),
+                     "m": _hundredths(segments.iri_m_per_km[rows]), "s": _hundredths(segments.iri_std_m_per_km[rows]),
+                     "t": _hundredths(segments.trend_m_per_km_per_year[rows]),
+                     "u": _hundredths(segments.trend_std_m_per_km_per_year[rows]),
+                     "c": segments.worse[rows].astype(int).tolist(), "k": segments.cars[rows].tolist(),
+                     "n": segments.passes[rows].astype(int).tolist(), "d": (segments.last_us[rows] // DAY_US).tolist(),
+                     "q": [steps[first[one] : first[one + 1]].tolist() for one in rows.tolist()]}
 
 
 def names_of(x: Array, y: Array, level: int) -> list[str]:
@@ -359,11 +354,10 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
             "deepest": DEEPEST, "roots": names_of(x, y, level), "segment_m": SEGMENT_M,
             "limits": list(_LIMITS_M_PER_KM)}
-    return document("A fleet's roads", [
-        heading("A fleet's roads", under), _tiles(figures, sections), _map(), _rough(sections), _worse(sections),
-        _cars(figures), data_block("data", data),
-    ], style=asset("page.css") + _STYLE, loads=True,
-        script='"use strict";\n' + "".join(map(asset, _SHARED)) + asset("fleet.js", "logger.fleet"))
+    return document("A fleet's roads", [heading("A fleet's roads", under), _tiles(figures, sections), _map(),
+                                        _rough(sections), _worse(sections), _cars(figures), data_block("data", data)],
+                    style=asset("page.css") + _STYLE, loads=True, script='"use strict";\n'
+                    + "".join(map(asset, _SHARED)) + asset("fleet.js", "logger.fleet"))
 
 
 def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
@@ -472,8 +466,7 @@ def write_report(figures: FleetFigures, steps: History, pieces: RoadPieces | Non
             tiles = write_tiles(figures.roads, steps, new / _TILES)
             for name, roads in (("segments.parquet", figures.roads), ("sections.parquet", sections),
                                 ("sections.csv", sections)):
-                write_file(new / name, format_of(out / name).content(
-                    roads_layer(roads).printable(), str(out / name)))
+                write_file(new / name, format_of(out / name).content(roads_layer(roads).printable(), str(out / name)))
             write_text(new / INDEX, fleet_page(figures, sections))
     except OSError as error:
         raise BadInput(f"--out {out}: expected a folder that can be written ({error.strerror or error})") from None

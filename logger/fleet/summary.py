@@ -307,8 +307,7 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
     return FleetFigures(grouped(segments, by, pieces, shared), cars, tuple(map(name_of, cars.tolist())), car_passes,
-                        biases, shared, windows,
-                        int((~published).sum()))
+                        biases, shared, windows, int((~published).sum()))
 
 
 def _sample(engine: Engine, since_us: int | None, until_us: int | None, passes: int) -> Mapping[str, npt.NDArray[Any]]:

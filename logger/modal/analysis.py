@@ -56,9 +56,7 @@ def decays(samples: Array) -> bool:
     return power[0] > 3.0 * power[1] and power[1] > 0.8 * power[2]
 
 
-def find_modes(
-    samples: Array, rate_hz: float, inputs: Array | None = None, decay: bool | None = None,
-) -> ModalResult:
+def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, decay: bool | None = None) -> ModalResult:
     """Modes of a record (samples, channels); inputs (samples, m) where they were measured.
 
     decay    whether it is a free decay; None to see for oneself

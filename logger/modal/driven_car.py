@@ -171,8 +171,7 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
         raise UnlikeCar("the fit of this car's parameters to the record does not converge")
     bands_hz, share = _shares(pieces, spectrum)
     covariance = np.asarray(np.linalg.inv(information)[:-2, :-2], dtype=np.float64)
-    return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance,
-                  float(x[-2]), bands_hz, share)
+    return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance, float(x[-2]), bands_hz, share)
 
 
 def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[Array, Array, Array, float, bool]:

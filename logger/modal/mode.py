@@ -172,9 +172,7 @@ def _moves(pole: complex, larger: list[OrderPoles]) -> Array:
     return np.array([(move.real, move.imag) for move in within]).reshape(-1, 2)
 
 
-def _why_not(
-    pole: complex, frequency_std_hz: float, damping_std: float, moves: Array, models: int
-) -> str:
+def _why_not(pole: complex, frequency_std_hz: float, damping_std: float, moves: Array, models: int) -> str:
     hz, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
     reasons = {
         "parts of the record do not have it": not np.isfinite(frequency_std_hz),

@@ -94,8 +94,7 @@ def segment_products(samples: Array, lags: int, segments: int) -> Segments:
             break
         leaving, coming = samples[starts + a], samples[ends + a]  # (segments, q)
         later = span[:lags - 1 - a]
-        row = (row[:, :, :-1]
-               - leaving[:, :, None, None] * samples[(starts + a)[:, None] + later][:, None]
+        row = (row[:, :, :-1] - leaving[:, :, None, None] * samples[(starts + a)[:, None] + later][:, None]
                + coming[:, :, None, None] * samples[(ends + a)[:, None] + later][:, None])
     return Segments(sums.reshape(segments, lags * q, lags * q), length, q)
 

@@ -90,9 +90,8 @@ class _Frame:
     def rows(self, about: int, powers: bool = False) -> Html:
         """Faint lines across, with their values at the left; ``powers``: values are those of ten."""
         ticks = _powers(self.y_low, self.y_high, about) if powers else nice_ticks(self.y_low, self.y_high, about)
-        return concatenated(self.across("grid", tick)
-                            + _words(self.box.left - 8, self.y(tick) + 4, _number(tick, powers), "end")
-                            for tick in ticks)
+        return concatenated(self.across("grid", tick) + _words(self.box.left - 8, self.y(tick) + 4,
+                                                               _number(tick, powers), "end") for tick in ticks)
 
     def columns(self, about: int, unit: float = 1.0, powers: bool = False) -> Html:
         """Values below, so many ``unit`` being 1."""
@@ -332,9 +331,8 @@ def page(title: str, of: str, text: str, charts: Sequence[Chart]) -> Html:
     of      what it is a result of, such as a file
     text    what the command prints
     """
-    return document(f"{title}: {of}", [
-        heading(title, of), *map(_part, text.split("\n\n")),
-        section("Pictures", concatenated(map(chart, charts)))])
+    return document(f"{title}: {of}", [heading(title, of), *map(_part, text.split("\n\n")),
+                                       section("Pictures", concatenated(map(chart, charts)))])
 
 
 def _part(text: str) -> Html:

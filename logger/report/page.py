@@ -179,11 +179,10 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
 
 
 def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
-    rows = [(number_button(index, number), str(place.drive),
-             _instant(place.utc_us), _geo(place), distance_words(place.along_m), iri_words(place),
-             _number(place.speed_mps, 0, factor=3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
-             " ".join(place.flags))
-            for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
+    rows = [(number_button(index, number), str(place.drive), _instant(place.utc_us), _geo(place),
+             distance_words(place.along_m), iri_words(place), _number(place.speed_mps, 0, factor=3.6),
+             _number(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags)) for number,
+            (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
         return EMPTY
     heads = ("#", "Drive", "When (UTC)", "Coordinates", "Distance", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
@@ -267,9 +266,8 @@ def _sensor_note(sensor: Any) -> str:
 
 
 def _settings_section(files: Sequence[LoggedFile]) -> Html:
-    different = _different(
-        {key: value for key, value in file.sidecar.items() if key not in ("log", "clock_map")}
-        for file in files if file.sidecar)
+    different = _different({key: value for key, value in file.sidecar.items() if key not in ("log", "clock_map")}
+                           for file in files if file.sidecar)
     if not different:
         return EMPTY
     texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:10]]
@@ -543,8 +541,7 @@ def _begins(drives: Sequence[Sequence[WindowRecord]]) -> Array:
 def _base_columns(base: Sequence[MapLine], origin_deg: float, lat_deg: Array, lon_deg: Array) -> list[Column]:
     """The roads beneath, those that come near to the way: as far around it as it is wide, 1 km at least."""
     near = _near(lat_deg, lon_deg)
-    kept = [(way.lat_deg, lon) for way in base
-            if near(way.lat_deg, lon := _unwrapped(way.lon_deg, origin_deg))]
+    kept = [(way.lat_deg, lon) for way in base if near(way.lat_deg, lon := _unwrapped(way.lon_deg, origin_deg))]
     begins = [np.arange(len(lat)) == 0 for lat, _ in kept]
     return [("lat_deg", _DEG / 10, 1, np.concatenate([lat for lat, _ in kept] or [np.zeros(0)])),
             ("lon_deg", _DEG / 10, 1, np.concatenate([lon for _, lon in kept] or [np.zeros(0)])),
@@ -558,6 +555,5 @@ def _near(lat_deg: Array, lon_deg: Array) -> Callable[[Array, Array], bool]:
     west, east = np.nanmin(lon_deg), np.nanmax(lon_deg)
     around = max(north - south, (east - west) * np.cos(np.radians(south)), 0.01)
     aside = around / max(np.cos(np.radians(south)), 0.01)
-    return lambda lat, lon: bool(
-        lat.size and lat.max() > south - around and lat.min() < north + around
-        and lon.max() > west - aside and lon.min() < east + aside)
+    return lambda lat, lon: bool(lat.size and lat.max() > south - around and lat.min() < north + around
+                                 and lon.max() > west - aside and lon.min() < east + aside)

@@ -117,8 +117,7 @@ def places_passed(drives: Sequence[Sequence[WindowRecord]]) -> PlacesPassed | No
         way[index], middle_m[index] = matched.way, matched.along_m
     half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
     passes = passes_of(way, middle_m - half_m, middle_m + half_m, number, np.zeros(len(rows)),
-                       column(rows, lambda one: one.iri_m_per_km if counts(one) else None),
-                       iri_errors(rows), WINDOW_M)
+                       column(rows, lambda one: one.iri_m_per_km if counts(one) else None), iri_errors(rows), WINDOW_M)
     mean = means(passes, scatter_of(passes))
     key = place_key(way, middle_m, WINDOW_M)
     several = mean.drives > 1

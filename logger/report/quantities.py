@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from logger.roads.iri import Area
     from logger.vehicle.effect import Chosen
 
-_SYMBOLS = {
-    "n": "N", "kg": "kg", "w": "W", "j": "J", "pa": "Pa", "hz": "Hz", "m": "m", "mm": "mm", "km": "km", "s": "s",
-    "ms": "ms", "rad": "rad", "deg": "deg", "mps": "m/s",
-}
+_SYMBOLS = {"n": "N", "kg": "kg", "w": "W", "j": "J", "pa": "Pa", "hz": "Hz", "m": "m", "mm": "mm", "km": "km",
+            "s": "s", "ms": "ms", "rad": "rad", "deg": "deg", "mps": "m/s"}
 _UNIT = rf"(?:{'|'.join(_SYMBOLS)})[2-9]?"
 # The end of a name: N s2 of ``_n_s2``, kg m2, or one unit; then what that is per, if anything. Products begin with one
 # of the first five, so that the ``m`` of ``_m_kg`` belongs to the name.
@@ -114,11 +112,9 @@ class DisplayUnits:
     way: tuple[str, float]
 
 
-UNITS = {
-    "si": DisplayUnits(("m", 1.0), 1, ("m", 1.0), 2, ("m/km", 1.0), 2, ("km/h", KMH_MPS), ("km", 1000.0)),
-    "us": DisplayUnits(("mi", MILE_M), 3, ("ft", FOOT_M), 1, ("in/mi", INCH_PER_MILE_M_PER_KM), 0, ("mph", MPH_MPS),
-                       ("mi", MILE_M)),
-}
+UNITS = {"si": DisplayUnits(("m", 1.0), 1, ("m", 1.0), 2, ("m/km", 1.0), 2, ("km/h", KMH_MPS), ("km", 1000.0)),
+         "us": DisplayUnits(("mi", MILE_M), 3, ("ft", FOOT_M), 1, ("in/mi", INCH_PER_MILE_M_PER_KM), 0,
+                            ("mph", MPH_MPS), ("mi", MILE_M))}
 
 
 WIDTH = 100

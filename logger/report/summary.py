@@ -19,10 +19,8 @@ from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.store.log.log_reader import along_m, apart_m, end_utc_us, iso_utc, length_m, split_drives, utc
 
-IRI_CLASSES: Mapping[str, str] = {
-    "A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor", "F": "extremely poor",
-    "G": "extremely poor", "H": "extremely poor",
-}
+IRI_CLASSES: Mapping[str, str] = {"A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor",
+                                  "F": "extremely poor", "G": "extremely poor", "H": "extremely poor"}
 """ISO 8608 letters, best first, in words: of all roads, also of earth. A highway of class A may be poor by 23 CFR 490,
 so the words stand beside no agency's condition."""
 
@@ -181,12 +179,11 @@ def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: 
 
 def _roughest(records: Sequence[WindowRecord]) -> tuple[RoughWindow, ...]:
     numbered = [(number, record) for number, drive in enumerate(split_drives(records), start=1) for record in drive]
-    candidates = [
-        RoughWindow(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
-              record.iri_std_m_per_km, record.a_w_mps2, record.comfort, record.flags)
-        for (drive, record), along in zip(numbered, along_m(records), strict=True)
-        if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)
-    ]
+    candidates = [RoughWindow(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps,
+                              record.iri_m_per_km, record.iri_std_m_per_km, record.a_w_mps2, record.comfort,
+                              record.flags) for (drive, record),
+                  along in zip(numbered, along_m(records), strict=True) if record.iri_m_per_km is not None
+                  and not _DOUBTFUL.intersection(record.flags)]
     found: list[RoughWindow] = []
     for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
         if all(_apart_m(place, other) >= 50.0 for other in found):

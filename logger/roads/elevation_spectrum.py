@@ -226,17 +226,10 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
     ends = [road_class(float(np.exp(log_gd + sigma * log_std))) for sigma in (-two_sigma, two_sigma)]
     letters = "".join(CLASS_GD_N0_CM3)
     gd_n0_cm3 = float(np.exp(log_gd))
-    return Roughness(
-        gd_n0_cm3=gd_n0_cm3,
-        gd_n0_std_cm3=gd_n0_cm3 * float(log_std),
-        waviness=float(waviness),
-        waviness_std=float(waviness_std),
-        road_class=road_class(gd_n0_cm3),
-        classes=tuple(letters[letters.index(ends[0]):letters.index(ends[1]) + 1]),
-        lowest_cpm=float(bands.edges_cpm[0]),
-        highest_cpm=float(bands.edges_cpm[-1]),
-        bands=bands,
-    )
+    return Roughness(gd_n0_cm3=gd_n0_cm3, gd_n0_std_cm3=gd_n0_cm3 * float(log_std), waviness=float(waviness),
+                     waviness_std=float(waviness_std), road_class=road_class(gd_n0_cm3),
+                     classes=tuple(letters[letters.index(ends[0]):letters.index(ends[1]) + 1]),
+                     lowest_cpm=float(bands.edges_cpm[0]), highest_cpm=float(bands.edges_cpm[-1]), bands=bands)
 
 
 _STEP_CPM = 1 / 2048

@@ -81,9 +81,8 @@ class GoldenCarFilter:
     elevation 250 mm ahead, so values come that much later; the first ones come once 11 m are known.
     """
 
-    def __init__(
-        self, spacing_m: float, make_filter: Callable[[Array], BlockFilter | FixedFilter] = BlockFilter
-    ) -> None:
+    def __init__(self, spacing_m: float,
+                 make_filter: Callable[[Array], BlockFilter | FixedFilter] = BlockFilter) -> None:
         self._filter = make_filter(golden_car_sections(spacing_m))
         self._spacing_m = spacing_m
         self._base = max(1, int(TIRE_BASE_M / spacing_m + 0.5))
@@ -425,8 +424,7 @@ def likely_unit(by_speed_m: float, by_distance_m: float) -> str:
 def limit_hint(limit_m_per_km: float) -> str:
     """What an IRI from which on a road is to be called rough may mean where no road has it; else nothing."""
     return "" if not HIGHEST_LIMIT_M_PER_KM < limit_m_per_km < np.inf else (
-        f", which roads seldom reach; {limit_m_per_km:g} in/mi are "
-        f"{limit_m_per_km * INCH_PER_MILE_M_PER_KM:.4g} m/km")
+        f", which roads seldom reach; {limit_m_per_km:g} in/mi are {limit_m_per_km * INCH_PER_MILE_M_PER_KM:.4g} m/km")
 
 
 def _likely(iri_m_per_km: float) -> list[str]:

@@ -62,16 +62,13 @@ def iri_class(iri_m_per_km: float) -> str:
     return letter
 
 
-def displacement_psd(
-    wave_number_cpm: npt.ArrayLike, gd_n0_cm3: float, waviness: float = STANDARD_WAVINESS
-) -> Array:
+def displacement_psd(wave_number_cpm: npt.ArrayLike, gd_n0_cm3: float, waviness: float = STANDARD_WAVINESS) -> Array:
     """Displacement spectrum Gd(n) [m3] at wave numbers in cycles per metre (Eq 2.1)."""
     return gd_n0_cm3 * CM3_M3 * (np.asarray(wave_number_cpm, dtype=float) / REFERENCE_N0_CPM) ** -waviness
 
 
-def generate(
-    gd_n0_cm3: float, length_m: float, spacing_m: float, seed: int, waviness: float = STANDARD_WAVINESS
-) -> Array:
+def generate(gd_n0_cm3: float, length_m: float, spacing_m: float, seed: int,
+             waviness: float = STANDARD_WAVINESS) -> Array:
     """Elevations [m] of a random road at 0, spacing, 2 spacing ... up to its length; one seed is one road.
 
     Eq 4.1 and 4.2 over 0.011 to 2.83 cycles per metre. Gd(n0) in cm3: one of ``CLASS_GD_N0_CM3``, or by

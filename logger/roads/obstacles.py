@@ -12,9 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 
-def speed_bump(
-    distance_m: npt.ArrayLike, start_m: float, height_m: float, width_m: float
-) -> npt.NDArray[np.float64]:
+def speed_bump(distance_m: npt.ArrayLike, start_m: float, height_m: float, width_m: float) -> npt.NDArray[np.float64]:
     """Elevation of a speed bump at the given distances [m], zero outside of it.
 
     One whole period of a raised cosine (Eq 4.41 of Blum 2015 with time written as distance over speed, Eq 4.42).
@@ -45,9 +43,7 @@ def ramp(distance_m: npt.ArrayLike, start_m: float, height_m: float, length_m: f
     return height_m * np.clip((np.asarray(distance_m, dtype=float) - start_m) / length_m, 0.0, 1.0)
 
 
-def plate(
-    distance_m: npt.ArrayLike, start_m: float, height_m: float, length_m: float, edge_m: float = 0.0
-) -> Array:
+def plate(distance_m: npt.ArrayLike, start_m: float, height_m: float, length_m: float, edge_m: float = 0.0) -> Array:
     """Something flat that lies on the road: a cleat, a steel plate, a speed table with ramps of ``edge_m`` [m].
 
     The length counts from foot to foot. ValueError unless it is above 0 and holds both edges.
@@ -60,14 +56,11 @@ def plate(
     return ramp(distance_m, start_m, height_m, edge_m) - ramp(distance_m, end_m - edge_m, height_m, edge_m)
 
 
-def pothole(
-    distance_m: npt.ArrayLike, start_m: float, depth_m: float, length_m: float, edge_m: float = 0.0
-) -> Array:
+def pothole(distance_m: npt.ArrayLike, start_m: float, depth_m: float, length_m: float, edge_m: float = 0.0) -> Array:
     """A hole with a flat bottom and edges that slope over ``edge_m`` [m]. ValueError as ``plate``."""
     return plate(distance_m, start_m, -depth_m, length_m, edge_m)
 
 
-OBSTACLES: dict[str, Callable[..., Array]] = {
-    "bump": speed_bump, "plate": plate, "pothole": pothole, "ramp": ramp, "step": step,
-}
+OBSTACLES: dict[str, Callable[..., Array]] = {"bump": speed_bump, "plate": plate, "pothole": pothole, "ramp": ramp,
+                                              "step": step}
 """By the names that users call them."""

@@ -188,8 +188,7 @@ def means(passes: Passes, scatter: Scatter) -> Means:
     common = np.sqrt(common**2 + scatter.alike * np.maximum(mean_own**2 - square, 0.0))
     return Means(key, np.bincount(cell, minlength=len(key)).astype(np.intp),
                  np.bincount(cell, weight * passes.iri_m_per_km, len(key)) / total, np.sqrt(1.0 / total + common**2),
-                 common,
-                 np.where(np.isfinite(first), first, np.nan), np.where(np.isfinite(last), last, np.nan))
+                 common, np.where(np.isfinite(first), first, np.nan), np.where(np.isfinite(last), last, np.nan))
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,8 +56,7 @@ class Trace:
 
     def part(self, start: int, end: int) -> Trace:
         """Windows from one to before another."""
-        return Trace(self.lat_deg[start:end], self.lon_deg[start:end], self.distance_m[start:end],
-                     self.t_s[start:end])
+        return Trace(self.lat_deg[start:end], self.lon_deg[start:end], self.distance_m[start:end], self.t_s[start:end])
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,8 +319,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     on &= ~doubtful
     way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
     return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
-                   np.where(on, aside_m, np.nan)), (
-                       end_e, end_n, end_ee, end_en, end_nn)
+                   np.where(on, aside_m, np.nan)), (end_e, end_n, end_ee, end_en, end_nn)
 
 
 def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> npt.NDArray[np.bool_]:
@@ -361,8 +359,7 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
         new += [found for one in here for found in _distinct(
             [_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead])]
         if not here:
-            new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=())
-                   for number, chain in ahead]
+            new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=()) for number, chain in ahead]
         best = max(map(_score, new))
         likely = (chain for chain in new if chain.score > best - _WORST)
         chains = sorted(likely, key=_score, reverse=True)[:16]
@@ -423,8 +420,7 @@ def _score(chain: _Chain) -> float:
     return chain.score
 
 
-def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range,
-        receiver: Receiver) -> _Chain:
+def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, receiver: Receiver) -> _Chain:
     """A chain that goes on, or begins, on a known street."""
     score, last, known, reference, (error_e, error_n, ee, en, nn), *_ = chain
     point = lists.point[one]
@@ -560,11 +556,10 @@ class _Lists:
         """Those of so many windows."""
         u_east, u_north = network.plane_heading()
         e, n = u_east[found.point], u_north[found.point]
-        return cls(
-            np.searchsorted(found.window, np.arange(count + 1)).tolist(), network.way[found.point].tolist(),
-            found.point.tolist(), (network.along_m[found.point] + found.east_m * e + found.north_m * n).tolist(),
-            (found.north_m * e - found.east_m * n).tolist(), (-n).tolist(), e.tolist(), network.way, network.founder,
-            network.passes)
+        return cls(np.searchsorted(found.window, np.arange(count + 1)).tolist(), network.way[found.point].tolist(),
+                   found.point.tolist(), (network.along_m[found.point] + found.east_m * e + found.north_m * n).tolist(),
+                   (found.north_m * e - found.east_m * n).tolist(), (-n).tolist(), e.tolist(), network.way,
+                   network.founder, network.passes)
 
 
 _Error = tuple[float, float, float, float, float]

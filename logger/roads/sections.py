@@ -248,17 +248,15 @@ def sections(windows: SectionWindows, edges_m: Array) -> RoadSections:
     iri = windows.iri_m_per_km[window]
     known = np.isfinite(iri)
     known_m = total(np.where(known, piece_m, 0.0))
-    errors = errors_of_means(
-        windows.iri_errors, windows.iri_m_per_km, (windows.start_m + windows.end_m) / 2,
-        windows.end_m - windows.start_m, window[known], piece_m[known], section[known], count)
+    errors = errors_of_means(windows.iri_errors, windows.iri_m_per_km, (windows.start_m + windows.end_m) / 2,
+                             windows.end_m - windows.start_m, window[known], piece_m[known], section[known], count)
     time_s, square = (share * windows.duration_s[window]), windows.mean_square[window]
     felt_s = total(np.where(np.isfinite(square), time_s, 0.0))
     driven_m = total(piece_m)
     worst, worst_at_m = _worst(windows, window, section, count)
-    return RoadSections(
-        edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
-        errors, np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
-        worst, worst_at_m)
+    return RoadSections(edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m), errors,
+                        np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)),
+                        worst, worst_at_m)
 
 
 def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -254,11 +254,9 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     }
     read = {key: readers[key](entry) for key, entry in node.mapping(optional=readers).items()}
     usual = AccelerometerConfig()
-    config = AccelerometerConfig(
-        read.get("driver", usual.driver), read.get("vertical_axis", usual.vertical_axis),
-        {name: read.get(name, settings) for name, settings in usual.sections.items()},
-        read.get("noise_mps2", usual.noise_mps2),
-    )
+    config = AccelerometerConfig(read.get("driver", usual.driver), read.get("vertical_axis", usual.vertical_axis),
+                                 {name: read.get(name, settings) for name, settings in usual.sections.items()},
+                                 read.get("noise_mps2", usual.noise_mps2))
     try:
         config.kind.check_chosen(config.settings)
     except SettingsError as error:
@@ -308,10 +306,7 @@ _log = _section(LogConfig, {
 })
 
 
-_pairing = _section(Pairing, {
-    "mode": lambda node: node.choice(*MODES),
-    "key_file": Node.path,
-})
+_pairing = _section(Pairing, {"mode": lambda node: node.choice(*MODES), "key_file": Node.path})
 
 
 def _pipeline(node: Node) -> PipelineConfig:

@@ -108,11 +108,10 @@ class LearntQuantity(Generic[Known]):
             return None
 
 
-NOISE = LearntQuantity(
-    "sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"), "noise_std_mps2",
-    LEAST_NOISE_MPS2, MOST_NOISE_MPS2, LEAST_STD_SHARE,
-    lambda known: (known.belief.noise_rms_mps2, known.belief.std_mps2, known.drives),
-    lambda noise, std, drives: KnownNoise(NoiseBelief(log(noise), std / noise), drives))
+NOISE = LearntQuantity("sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"),
+                       "noise_std_mps2", LEAST_NOISE_MPS2, MOST_NOISE_MPS2, LEAST_STD_SHARE,
+                       lambda known: (known.belief.noise_rms_mps2, known.belief.std_mps2, known.drives),
+                       lambda noise, std, drives: KnownNoise(NoiseBelief(log(noise), std / noise), drives))
 DELAY = LearntQuantity(
     "receiver-delay", "the receiver's delay", ("latency_s", "latency_std_s", "latency_drives"), "latency_s",
     0.0, MOST_DELAY_S, 0.0, lambda known: (known.delay_s, known.std_s, known.drives), CarriedDelay)

@@ -173,16 +173,8 @@ class MainLoop:
     ``beat`` is called every ``beat_s`` [s] or so, after the pipeline has moved: status file and watchdog hang on it.
     """
 
-    def __init__(
-        self,
-        core: EventCore,
-        storage: Storage,
-        listeners: list[Listener],
-        events: deque[Event],
-        sync_s: float,
-        beat_s: float,
-        beat: Callable[[int], None],
-    ) -> None:
+    def __init__(self, core: EventCore, storage: Storage, listeners: list[Listener], events: deque[Event],
+                 sync_s: float, beat_s: float, beat: Callable[[int], None]) -> None:
         self._core = core
         self._storage = storage
         self._listeners = listeners

@@ -58,12 +58,9 @@ class RoughnessQueue:
         """Samples of one leg with their travelled distance [m]; the leg before has ended (``end_leg``)."""
         if leg != self._leg:
             self._leg, self._expected = leg, -1
-        estimates = self._estimator.push(
-            samples.each_mps2,
-            samples.each_usable & (samples.present & ~samples.interpolated).reshape(-1, 1),
-            samples.each_at_end,
-            distance_m,
-        )
+        estimates = self._estimator.push(samples.each_mps2,
+                                         samples.each_usable & (samples.present & ~samples.interpolated).reshape(-1, 1),
+                                         samples.each_at_end, distance_m)
         self._take(estimates)
 
     def end_leg(self) -> None:
@@ -159,10 +156,9 @@ class Pipeline:
     """The whole way from readings to records of one service run. ``alignment``, the use of the range and the
     spectra that are kept learn beside it and change no row."""
 
-    def __init__(
-        self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
-        alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse, spectra: SpectraKeeper,
-    ) -> None:
+    def __init__(self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
+                 alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse,
+                 spectra: SpectraKeeper) -> None:
         self._settings = settings
         self._chain = chain
         self._relation = relation
@@ -330,9 +326,8 @@ class Pipeline:
             return
         oldest_us = int(self._pending[0].t_us[0]) if self._pending else last_us
         opened = self._cutter.oldest_open()
-        self.odometer.forget_before(
-            min(oldest_us, opened[0]) if opened else oldest_us, opened[1] if opened else float("inf")
-        )
+        self.odometer.forget_before(min(oldest_us, opened[0]) if opened else oldest_us,
+                                    opened[1] if opened else float("inf"))
 
     def _records(self) -> list[WindowRecord]:
         records = [self._record(waiting, estimate) for waiting, estimate in self._roughness.ready()]

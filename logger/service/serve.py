@@ -61,19 +61,9 @@ log = logging.getLogger(__name__)
 class StatusReporter:
     """Looks at the parts of the service and puts together what they say."""
 
-    def __init__(
-        self,
-        config: Config,
-        core: EventCore,
-        storage: Storage,
-        pipeline: Pipeline,
-        accelerometer: Supervisor,
-        gps: Supervisor,
-        counters: Mapping[str, Callable[[], dict[str, int]]],
-        notices: tuple[str, ...] = (),
-        learning: ReceiverLearning | None = None,
-        noise: NoiseLearning | None = None,
-    ) -> None:
+    def __init__(self, config: Config, core: EventCore, storage: Storage, pipeline: Pipeline, accelerometer: Supervisor,
+                 gps: Supervisor, counters: Mapping[str, Callable[[], dict[str, int]]], notices: tuple[str, ...] = (),
+                 learning: ReceiverLearning | None = None, noise: NoiseLearning | None = None) -> None:
         self._config = config
         self._core = core
         self._storage = storage

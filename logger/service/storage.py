@@ -53,9 +53,8 @@ class Storage:
         self._looked_us = now_us()
         self._look()
         self.log = BufferedLog(self._begin, now_us)
-        self._recording = (
-            DumpRecording(directory, header, lambda: self.log.session, now_us, self._files) if header else None
-        )
+        self._recording = (DumpRecording(directory, header, lambda: self.log.session, now_us,
+                                         self._files) if header else None)
 
     def record(self, event: Event) -> None:
         """Keep the raw bytes, if asked to."""

@@ -342,9 +342,8 @@ class Odometer:
     def forget_before(self, t_us: int, distance_m: float) -> None:
         """Drop knots that neither instants from ``t_us`` on nor places from ``distance_m`` on will need."""
         keep = 0
-        while (
-            keep + 2 < len(self._t_us) and self._t_us[keep + 1] <= t_us and self._distance_m[keep + 1] <= distance_m
-        ):
+        while (keep + 2 < len(self._t_us) and self._t_us[keep + 1] <= t_us
+               and self._distance_m[keep + 1] <= distance_m):
             keep += 1
         if keep:
             for knots in (self._t_us, self._speed_mps, self._distance_m, self._lat_deg, self._lon_deg, self._leg):

@@ -152,16 +152,10 @@ def pipeline(config: Config, sensor: Instrument, model: CarModel, receiver: Carr
     """
     receiver = receiver or delay_at_start(config.gps, None)
     low_pass_hz = config.pipeline.low_pass_hz
-    settings = PipelineSettings(
-        window_m=config.pipeline.window_m,
-        blind_window_s=config.pipeline.blind_window_s,
-        bridge_s=config.gps.bridge_s,
-        slow_mps=config.pipeline.slow_mps,
-        stationary_mps=config.pipeline.stationary_mps,
-        drive_end_s=config.pipeline.drive_end_s,
-        latency_s=receiver.delay_s,
-        front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
-    )
+    settings = PipelineSettings(window_m=config.pipeline.window_m, blind_window_s=config.pipeline.blind_window_s,
+                                bridge_s=config.gps.bridge_s, slow_mps=config.pipeline.slow_mps,
+                                stationary_mps=config.pipeline.stationary_mps, drive_end_s=config.pipeline.drive_end_s,
+                                latency_s=receiver.delay_s, front_axle_ahead_m=config.gps.antenna_behind_front_axle_m)
     axis = Axis.from_word(config.accelerometer.vertical_axis)
     vehicle, effects = model.vehicle, model.effects
     try:

@@ -157,9 +157,8 @@ def _files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
     inside = [path, *inside_of(path)]
-    files = {file for file in inside if file.is_file()
-             and (LogName.of(file) or file.name == manifest.NAME
-                  or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
+    files = {file for file in inside if file.is_file() and (LogName.of(file) or file.name == manifest.NAME
+                                                            or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
     files |= set(other_recordings(inside))
     # An export without its manifest cannot be checked: one that is not there is looked for all the same.
     files |= {folder / manifest.NAME for folder in inside if folder.is_dir() and is_of_export(folder.resolve())}
@@ -219,8 +218,7 @@ def _take_row(findings: _Findings, row: Row, is_open: bool) -> None:
         findings.first = row.record
         findings.damaged_before_first = findings.damaged_since_last
     else:
-        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}",
-                 findings.holes)
+        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}", findings.holes)
     findings.last = row.record
     findings.damaged_since_last = 0
 

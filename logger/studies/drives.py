@@ -92,10 +92,8 @@ def bridge(start_m: float, height_m: float = STEP_M) -> Shape:
     return lambda place_m: step(place_m, start_m, height_m)
 
 
-def record_of(
-    obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None,
-    spacing_m: float = SPACING_M,
-) -> Run:
+def record_of(obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None,
+              spacing_m: float = SPACING_M) -> Run:
     """A drive over an obstacle at a steady speed, with the obstacle as its known profile. None: that of Table 4.2."""
     time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     distance_m = speed_mps * time_s

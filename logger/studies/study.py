@@ -243,9 +243,8 @@ class Result:
 
 def _of_numbers(title: str, values: Sequence[Value]) -> Table:
     ours = "from the print" if values[0].of_print else "ours"
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (one.name, *_items(one, values), one.printed, one.ours, one.difference, one.tolerance, _stands(one))
-        for one in values)
+    rows: tuple[tuple[Cell, ...], ...] = tuple((one.name, *_items(one, values), one.printed, one.ours, one.difference,
+                                                one.tolerance, _stands(one)) for one in values)
     return Table(title, (Column("value"), *_of(values), Column("printed", ".6g"), Column(ours, ".6g"), Column(
         "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
 

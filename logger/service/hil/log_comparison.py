@@ -318,13 +318,9 @@ def _difference(tolerance: RowTolerance, measure: Measure, pairs: Sequence[Pair]
     found = [(measure(wanted, row), tolerance.limit(wanted)) for wanted, row in pairs]
     known = [(value, limit) for value, limit in found if value is not None]
     finite = [value for value, _ in known if value != inf]
-    return Difference(
-        tolerance=tolerance,
-        compared=len(known),
-        p95=float(np.percentile(finite, 95)) if finite else nan,
-        largest=float(max(finite, default=nan)),
-        outside=sum(bool(value > limit) for value, limit in known),
-    )
+    return Difference(tolerance=tolerance, compared=len(known), p95=float(np.percentile(finite, 95)) if finite else nan,
+                      largest=float(max(finite, default=nan)),
+                      outside=sum(bool(value > limit) for value, limit in known))
 
 
 def _of(attribute: str) -> Measure:

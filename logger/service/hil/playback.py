@@ -94,10 +94,8 @@ def wired(header: DumpHeader, events: Iterable[Event], seconds: float | None, pl
     return Wired(replace(header, accelerometer=lines), _as_lines(events, decoder), bridged=kind.title)
 
 
-def send(
-    events: Iterable[Event], ports: Mapping[str, BytePort], now_us: Callable[[], int],
-    sleep: Callable[[float], None], progress: Callable[[float], None],
-) -> Sent:
+def send(events: Iterable[Event], ports: Mapping[str, BytePort], now_us: Callable[[], int],
+         sleep: Callable[[float], None], progress: Callable[[float], None]) -> Sent:
     """Write each event to the port of its source at its time, the first one now.
 
     ``sleep`` takes seconds; ``progress`` is called about once a second with the time played [s]. A chunk that is late

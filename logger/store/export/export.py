@@ -133,10 +133,8 @@ that is pulled has at most a ninth of its files to be read once more, which are 
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
 
-_STICK_IS_LOST = {
-    errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOTCONN,
-    errno.ENOMEDIUM, errno.ESHUTDOWN,
-}
+_STICK_IS_LOST = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.EROFS, errno.ENOSPC, errno.EDQUOT,
+                  errno.ENOTCONN, errno.ENOMEDIUM, errno.ESHUTDOWN}
 
 
 @dataclass(frozen=True)

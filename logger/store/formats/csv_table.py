@@ -44,18 +44,14 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
 _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 """What may be a whole number with a comma after each three digits, and is no proof of a decimal comma."""
 _EMPTY = frozenset(("", "nan", "null", "none", "na", "n/a", "-"))
-_KINDS = (
-    (b"PK\x03\x04", "a workbook (.xlsx, .ods) or another zip archive: save the sheet as CSV, or unpack it"),
-    (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls): save the sheet as CSV"),
-    (b"\x1f\x8b", "a file packed with gzip: unpack it"), (b"PAR1", "a Parquet file: save the table as CSV"),
-    (b"SQLite format 3", "a database (SQLite): save the table as CSV"), (b"%PDF", "a PDF: save the table as CSV"),
-    (b"\x89HDF", "an HDF5 file: save the table as CSV"), (b"MATLAB ", "a MATLAB file: save the table as CSV"),
-)
+_KINDS = ((b"PK\x03\x04", "a workbook (.xlsx, .ods) or another zip archive: save the sheet as CSV, or unpack it"),
+          (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls): save the sheet as CSV"),
+          (b"\x1f\x8b", "a file packed with gzip: unpack it"), (b"PAR1", "a Parquet file: save the table as CSV"),
+          (b"SQLite format 3", "a database (SQLite): save the table as CSV"), (b"%PDF", "a PDF: save the table as CSV"),
+          (b"\x89HDF", "an HDF5 file: save the table as CSV"), (b"MATLAB ", "a MATLAB file: save the table as CSV"))
 """First bytes of files that are no text but might be given for one, and what to do with them."""
-_TAKEN_BY = (
-    ({"t_s", "accel_z_mps2", "speed_mps", "distance_m"}, "a drive: ridelog estimate"),
-    ({"t_s", "accel_z_mps2"}, "an acceleration record: ridelog comfort"),
-)
+_TAKEN_BY = (({"t_s", "accel_z_mps2", "speed_mps", "distance_m"}, "a drive: ridelog estimate"),
+             ({"t_s", "accel_z_mps2"}, "an acceleration record: ridelog comfort"))
 """All columns of the files of the desk that a command takes alone, what such a file is, and the command."""
 _PROFILE = ("distance_m", "elevation_m")
 

@@ -378,11 +378,9 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     """
     max_time_s = 1e5  # a day and more; of later times the ten digits of a drive do not distinguish samples
     header, path = (TIME, SPEED), file_in(path, DRIVE)
-    _, table, file = parse_columns(
-        read_bounded(path, MAX_BYTES), str(path),
-        lambda names: header if all(names.count(name) == 1 for name in header) else None,
-        f"a header with {','.join(header)}, each once",
-    )
+    _, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path),
+                                   lambda names: header if all(names.count(name) == 1 for name in header) else None,
+                                   f"a header with {','.join(header)}, each once")
     if len(table) < 2:
         raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
     time_s = taken(replace(bounds.TIME, largest=max_time_s), TIME, table[:, 0], file)

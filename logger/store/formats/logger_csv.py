@@ -124,12 +124,9 @@ Named = Mapping[str, tuple[LayoutColumn, ...]]
 _ENTRY = re.compile(rf"\s*({'|'.join(ROLES)})\s*=")
 _AT_THE_END = re.compile(r"(?:[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*:?|_([a-z0-9]+))\s*$", re.IGNORECASE)
 """A unit in brackets, or after an underscore as in ``speed_mps``."""
-_LIKELY = {
-    "t": r"t|time.*|timestamp.*|seconds.*|.*\btime",
-    **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES},
-    "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
-    "speed": r".*(speed|velocity).*",
-}
+_LIKELY = {"t": r"t|time.*|timestamp.*|seconds.*|.*\btime",
+           **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES},
+           "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*", "speed": r".*(speed|velocity).*"}
 
 
 @dataclass(frozen=True)
@@ -235,8 +232,7 @@ def _by_layout(there: list[str], stem: str) -> Recognised | None:
     fitting = []
     for layout in LAYOUTS:
         wanted = {role: plain(column.header) for role, column in layout.columns.items()}
-        if all(there.count(one) == 1 for one in wanted.values()) and (
-                layout.stem in ("", stem.lower())):
+        if all(there.count(one) == 1 for one in wanted.values()) and (layout.stem in ("", stem.lower())):
             fitting.append(layout)
     if not fitting:
         return None

@@ -110,8 +110,7 @@ def _subsystem(path: Path, held: Array) -> list[Array]:
 def _rows(matrices: list[_Matrix] | tuple[_Matrix, ...]) -> Iterator[Array]:
     """Every row of floating numbers in nested cells, structures and objects."""
     for one in matrices:
-        if one.numbers is not None and one.is_floating and len(one.numbers) >= 3 and np.isfinite(
-                one.numbers).all():
+        if one.numbers is not None and one.is_floating and len(one.numbers) >= 3 and np.isfinite(one.numbers).all():
             yield one.numbers
         yield from _rows(one.inside)
 

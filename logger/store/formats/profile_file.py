@@ -70,11 +70,9 @@ SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
 _FIELD_CHARS = 20
 _BINARY = {0: "<i2", 1: "<f4", 2: "<f8"}
 _TEXT = 5
-_UNITS_M = {
-    "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0,
-    "ft": FOOT_M, "feet": FOOT_M, "foot": FOOT_M, "in": FOOT_M / 12, "inch": FOOT_M / 12, "inches": FOOT_M / 12,
-    "mil": FOOT_M / 12_000, "mils": FOOT_M / 12_000,
-}
+_UNITS_M = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0,
+            "ft": FOOT_M, "feet": FOOT_M, "foot": FOOT_M, "in": FOOT_M / 12, "inch": FOOT_M / 12, "inches": FOOT_M / 12,
+            "mil": FOOT_M / 12_000, "mils": FOOT_M / 12_000}
 _LEFT = re.compile(r"\b(left|lft|lwp|l[ ._]*(elev|prof))", re.IGNORECASE)
 _RIGHT = re.compile(r"\b(right|rgt|rwp|r[ ._]*(elev|prof))", re.IGNORECASE)
 

@@ -114,10 +114,8 @@ class EvenRecord:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def even_record(
-    t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Array], file: str, asked: RecordRules,
-    moving: Bools | None = None,
-) -> EvenRecord:
+def even_record(t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Array], file: str, asked: RecordRules,
+                moving: Bools | None = None) -> EvenRecord:
     """A record with times (n,) [s], judged and, where that was asked for, mended.
 
     accel     (n,) by name, vertical first; in m/s2 or, where ``asked`` says so, in g
@@ -209,10 +207,9 @@ def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) ->
 _MEND = " (--resample lays samples on an even grid)"
 
 
-def _resampled(
-    t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
-    repeats: RepeatedSamples | None, held: Bools, file: str, rate_hz: float, doubts: list[Doubt],
-) -> EvenRecord:
+def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
+               repeats: RepeatedSamples | None, held: Bools, file: str, rate_hz: float,
+               doubts: list[Doubt]) -> EvenRecord:
     from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 
     times_s = even_times_of(t_s, file)
@@ -311,10 +308,9 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
         long = t_s[end - 1] - t_s[first - 1] > WIDEST_STEP_S if len(first) else np.zeros(0, dtype=np.bool_)
         if long.any():
             lasts_s = float((t_s[end - 1] - t_s[first - 1])[long].sum())
-            doubts.append(Doubt("held", f"{name} alone stands still for {lasts_s:.3g} s, first at "
-                                f"{t_s[first[long][0] - 1]:.6g} s: what is said of it is too low; check that "
-                                "it was read",
-                                {"axis": name, "seconds": lasts_s}))
+            doubts.append(
+                Doubt("held", f"{name} alone stands still for {lasts_s:.3g} s, first at {t_s[first[long][0] - 1]:.6g} "
+                      "s: what is said of it is too low; check that it was read", {"axis": name, "seconds": lasts_s}))
     return doubts
 
 

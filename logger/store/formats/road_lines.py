@@ -180,8 +180,7 @@ def _metres(path: Path | str, named: dict[str, Any], key: str) -> float | None:
     value = named.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (
-            abs(value) <= DISTANCE.largest / 1000):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (abs(value) <= DISTANCE.largest / 1000):
         raise BadInput(f"{path}: {key}: expected a number of kilometres, found {json.dumps(value)[:40]}")
     return 1000.0 * value
 

@@ -53,16 +53,13 @@ _MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
     "full_car": (*_CAR_KEYS, "pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
 }
 _COMMON_KEYS = ("name", "model")
-_AXLE_KEYS = (
-    "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m",
-)
+_AXLE_KEYS = ("unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
+              "tire_stiffness_n_per_m")
 _ANTI_ROLL_KEY = "anti_roll_stiffness_n_m_per_rad"
 # What a number may be. Most scale with the body, so that they are limited per kilogram of sprung mass: a car, a lorry
 # and the Golden Car, whose numbers are given for 1 kg, fit; the same numbers in g, t, mm, kN/m or kN s/m do not.
-_LIMITS: Mapping[str, tuple[float, float]] = {
-    "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.01, 5.0), "cg_distance_m": (0.0, 20.0),
-    "contact_patch_m": (0.0, 1.0),
-}
+_LIMITS: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.01, 5.0),
+                                              "cg_distance_m": (0.0, 20.0), "contact_patch_m": (0.0, 1.0)}
 # What stands on a bench may have any size: masses from a microgram (or what stands for one, in a circuit) to a thousand
 # tonnes, which swing at 0.01 Hz to 5 kHz. What is as large as a car, by its tires or its wheelbase, is one.
 _ON_BENCH: Mapping[str, tuple[float, float]] = {"sprung_mass_kg": (1e-9, 1e6), "mass_kg": (1e-9, 1e6)}
@@ -71,8 +68,7 @@ _CAR_PATCH_M, _CAR_WHEELBASE_M = 0.1, 1.0
 _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
     "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
     "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
-    "tire_stiffness_n_per_m": (5.0, 50_000.0), _ANTI_ROLL_KEY: (0.01, 10_000.0),
-}
+    "tire_stiffness_n_per_m": (5.0, 50_000.0), _ANTI_ROLL_KEY: (0.01, 10_000.0)}
 # 0 stands for none: without a spring a single mass moves freely.
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY, "stiffness_n_per_m", "damping_n_s_per_m")
 # Where a search for an unknown number begins, of a car of the middle class.
@@ -140,14 +136,8 @@ def read_model(path: Path | str) -> CarModel:
     vehicle, keys, known = _read(path)
     effects = read_effects(keys["effects"], vehicle) if "effects" in keys else ()
     given = _read_given(keys["given"], vehicle, known) if "given" in keys else None
-    return CarModel(
-        vehicle,
-        effects,
-        tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
-        given,
-        _read_errors(keys, vehicle, effects) if "standard_errors" in keys else None,
-        known,
-    )
+    return CarModel(vehicle, effects, tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
+                    given, _read_errors(keys, vehicle, effects) if "standard_errors" in keys else None, known)
 
 
 def check_on_road(vehicle: Vehicle) -> None:
@@ -395,10 +385,8 @@ def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car
 
 
 def _read_axle(node: Node, model: str, sprung_mass_kg: float, is_car: bool) -> Axle:
-    keys = node.mapping(
-        required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
-        optional=(_ANTI_ROLL_KEY,) if model == "full_car" else (),
-    )
+    keys = node.mapping(required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
+                        optional=(_ANTI_ROLL_KEY,) if model == "full_car" else ())
     return Axle(**{"cg_distance_m": 0.0} | {key: _number_of(keys, key, sprung_mass_kg, is_car) for key in keys})
 
 
@@ -476,14 +464,12 @@ class _Dumper(yaml.SafeDumper):
     """Writes plain values, as YAML's safe dumper does."""
 
 
-_Dumper.add_representer(
-    _OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(), flow_style=True)
-)
+_Dumper.add_representer(_OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(),
+                                                                                flow_style=True))
 
 
-_Dumper.add_representer(
-    _OneLineList, lambda dumper, row: dumper.represent_sequence("tag:yaml.org,2002:seq", row, flow_style=True)
-)
+_Dumper.add_representer(_OneLineList,
+                        lambda dumper, row: dumper.represent_sequence("tag:yaml.org,2002:seq", row, flow_style=True))
 
 
 def _vehicle_keys(vehicle: Vehicle) -> dict[str, Any]:

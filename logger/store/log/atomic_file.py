@@ -123,15 +123,13 @@ class FolderLock:
         except BlockingIOError:
             os.close(self._descriptor)
             raise BadInput(
-                f"{folder}: another ridelog writes here (see ridelog status); expected a folder of its own"
-            ) from None
+                f"{folder}: another ridelog writes here (see ridelog status); expected a folder of its own") from None
 
     def __enter__(self) -> FolderLock:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
         os.close(self._descriptor)
 
 

@@ -61,10 +61,8 @@ from logger.store.log.row_format import HEADER, format_row
 from logger.store.log.sidecar import SIDECAR_BYTES, ClockMap, Tally, read_sidecar, store_sidecar
 from logger.units import US_PER_S
 
-__all__ = [
-    "COUNTER_NAME", "SIDECAR_BYTES", "ClockMap", "FileSystem", "LogName", "Repaired", "SegmentLog", "Tally",
-    "next_session", "read_sidecar", "repair",
-]
+__all__ = ["COUNTER_NAME", "SIDECAR_BYTES", "ClockMap", "FileSystem", "LogName", "Repaired", "SegmentLog", "Tally",
+           "next_session", "read_sidecar", "repair"]
 
 CLOCK_STEP_US = 100_000
 """A clock map that has moved by less than this need not reach the disk before the file is finished."""
@@ -117,8 +115,7 @@ class SegmentLog:
         self._dirty = True
         self._do(self._files.write, row)
         self._bytes += len(row)
-        self._tally = replace(self._tally, rows=self._tally.rows + 1,
-                              unset=self._tally.unset + (record.utc_us is None))
+        self._tally = replace(self._tally, rows=self._tally.rows + 1, unset=self._tally.unset + (record.utc_us is None))
 
     def sync(self) -> None:
         """Wait until all rows are on the disk."""

@@ -199,8 +199,7 @@ def _f2_7(effort: Workload) -> Result:
         scatters.append(scatter)
         values += about((PROFILES[name], SPECTRA[name]), [
             Value(f"class {name} road, Gd(n0) [cm3]", gd, found.gd_n0_cm3, gd / 2)])
-        values += about(SPECTRA[name], [
-            Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15)])
+        values += about(SPECTRA[name], [Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15)])
         values += about(SPECTRA[name], [
             Statement(f"class {name}: scatter of the smoothed over that of the raw spectrum", "smoothed, it is easier "
                       "to put into a class", scatter[1] / scatter[0], most=0.5)])
@@ -209,8 +208,7 @@ def _f2_7(effort: Workload) -> Result:
         lines += [Line(f"{name}, raw", n[inside][thin], raw.psd_m3[inside][thin]),
                   Line(f"{name}, smoothed", bands.centre_cpm, bands.psd_m3)]
         shown = np.arange(0, 100.0, 0.25)
-        roads.append(Line(f"class {name}", shown,
-                          1000 * np.interp(shown, spacing_m * np.arange(len(road)), road)))
+        roads.append(Line(f"class {name}", shown, 1000 * np.interp(shown, spacing_m * np.arange(len(road)), road)))
     values += about(tuple(SPECTRA.values()), [Statement(
         "least of all bands' ratios of the spectra, class D over class B", "shifted upward at all wave numbers",
         float((levels[1] / levels[0]).min()), least=1.0)])
@@ -234,11 +232,9 @@ def _f2_7(effort: Workload) -> Result:
 
 
 F2_7 = Study("fig_2_7", "Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
-              "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", _f2_7,
-              items=(*alike(PROFILES.values(), Word.AGREES,
-                            "A road made for the caption's class is found to be of it."),
-                     *alike(SPECTRA.values(), Word.AGREES,
-                            "The spectra fall, shift and smooth as the text describes.")))
+             "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", _f2_7,
+             items=(*alike(PROFILES.values(), Word.AGREES, "A road made for the caption's class is found to be of it."),
+                    *alike(SPECTRA.values(), Word.AGREES, "The spectra fall, shift and smooth as the text describes.")))
 
 
 NAMES = ("f1", "f2", "f3", "f4", "Q4", "f5", "Q5", "f6", "Q6")
@@ -344,9 +340,8 @@ def _f2_18(effort: Workload) -> Result:
     f_hz = np.geomspace(0.02, 400.0, effort.count(400, 60))
     levels = {weighting.name: 20 * np.log10(np.abs(weighting.response(f_hz)))
               for weighting, _ in effort.each(PRINTED_T2_7)}
-    rows = tuple((name, float(f_hz[level.argmax()]), float(level.max()),
-                  float(f_hz[level > level.max() - 3].min()), float(f_hz[level > level.max() - 3].max()))
-                 for name, level in levels.items())
+    rows = tuple((name, float(f_hz[level.argmax()]), float(level.max()), float(f_hz[level > level.max() - 3].min()),
+                  float(f_hz[level > level.max() - 3].max())) for name, level in levels.items())
     table = Table("The curves (printed as pictures only)", (
         Column("weighting"), Column("largest at [Hz]", ".3g"), Column("there [dB]", "+.2f"),
         Column("within 3 dB of it from [Hz]", ".3g"), Column("to [Hz]", ".3g")), rows)

@@ -246,9 +246,8 @@ def _f4_34(effort: Workload) -> Result:
     lines = tuple(Line(f"{section:g} m sections", np.arange(section / 2, _LENGTH_M_F4_34, section), one)
                   for section, one in zip(SECTIONS_M, found[0], strict=True))
     picture = Picture(Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m", "distance [m]",
-                             "a_w [m/s2]", lines),
-                      "a_w of each metre, up to nearly 1.5 m/s2 (Fig 4.34), and of each 10 m, in which the step is "
-                      "still clear (Fig 4.35)")
+                             "a_w [m/s2]", lines), "a_w of each metre, up to nearly 1.5 m/s2 (Fig 4.34), and of each "
+                      "10 m, in which the step is still clear (Fig 4.35)")
     each, tens = (float(one.max()) for one in found[0])
     quiet = float(np.delete(found[0][1], int(found[0][1].argmax())).max())
     return Result((table,), verdict, (picture,), (
@@ -313,10 +312,8 @@ def _f4_36(effort: Workload) -> Result:
                "slowly beyond, as a metre gets shorter than the blow. Where a metre begins moves its a_w by a tenth "
                "either way. The lines for comfort are those of Table 2.5 here, a little uncomfortable from 0.315 and "
                "uncomfortable from 0.8 m/s2, for the text does not say which ones were drawn.")
-    lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height,
-                  row in zip(heights_m, peaks, strict=True))
-    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit))
-                   for limit, word in LIMITS)
+    lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height, row in zip(heights_m, peaks, strict=True))
+    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit)) for limit, word in LIMITS)
     picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
                       "dots for heights and speeds, and two lines across: comfortable below the green one, a "
                       "noticeable discomfort above the red one")

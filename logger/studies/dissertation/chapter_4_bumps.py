@@ -141,11 +141,10 @@ def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tu
 
 
 T4_4 = Study("table_4_4", "Mass and both stiffnesses together, from 25 starts", "Table 4.4, section 4.4.4",
-              "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of "
-              "IRI 5 m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).", _t4_4,
-              items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER,
-                          "From every start ours ends at one estimate, where the printed errors differ among "
-                          "themselves."))
+             "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of "
+             "IRI 5 m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).", _t4_4,
+             items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER, "From every start ours ends at one "
+                         "estimate, where the printed errors differ among themselves."))
 
 
 def _f4_19(effort: Workload) -> Result:
@@ -199,16 +198,14 @@ def _f4_19(effort: Workload) -> Result:
 F4_19 = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m", "Fig 4.19, section 4.4.1.1",
               "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the input leaves out; sensor noise 0.05 m/s2.", _f4_19,
-              items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE,
-                          "Bump, speed and road of the figures are not printed; simulated, the response is as "
-                          "described."))
+              items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE, "Bump, speed and road of the figures are "
+                          "not printed; simulated, the response is as described."))
 
 
 def _f4_21(effort: Workload) -> Result:
     windows_m = tuple(float(end) for end in range(5, 101, 5))
     very_close = 0.02  # two standard errors of ours on such a road are twice that
-    whole = record_of(bump(1.0), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS,
-                      Conditions(iri_m_per_km=5.0))
+    whole = record_of(bump(1.0), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS, Conditions(iri_m_per_km=5.0))
     windows = effort.some(windows_m, 4)
     white, ours = zip(*([fitted(until(whole, window), {MASS: 800.0}, ours=way) for way in (False, True)]
                         for window in effort.each(windows)), strict=True)
@@ -264,17 +261,15 @@ def _f4_22(effort: Workload) -> Result:
     table = Table("Mass, by where the fit starts", (Column("start [kg]", ".1f"), Column("printed end [kg]"),
                   Column("our end [kg]", ".4f"), Column("error [%]", "+.3f")), rows)
     verdict = (f"All {len(starts)} starts, from {starts[0]:.0f} to {starts[-1]:.0f} kg, end within {np.ptp(ends):.1g} "
-               f"kg of each other; the source's 20 lie within 6 % of 875 kg. The estimate itself, {ends.mean():.1f} "
-               f"+- {standard_error:.1f} kg, is off by what a road of IRI 5 m/km that the fit does not know makes of "
-               "it.")
+               f"kg of each other; the source's 20 lie within 6 % of 875 kg. The estimate itself, {ends.mean():.1f} +- "
+               f"{standard_error:.1f} kg, is off by what a road of IRI 5 m/km that the fit does not know makes of it.")
     picture = Picture(Curves("Where a fit of the mass ends", "start [kg]", "end [kg]",
                              (Line("start", starts, starts), Line("end", starts, ends, dots=True)),
                              (TRUTH[MASS], "875 kg")), "the masses from 20 starts, all within 6 % of 875 kg")
     values = (Statement("largest error of any start [%]", "all within 6 % of 875 kg",
                         100 * float(np.abs(ends / TRUTH[MASS] - 1).max()), 0.0, printed_within_percent,
-                        Word.NOT_REPRODUCIBLE),
-              Statement("the ends differ by up to [kg]", "effective from every start", float(np.ptp(ends)), 0.0, 0.01,
-                        Word.NOT_REPRODUCIBLE))
+                        Word.NOT_REPRODUCIBLE), Statement("the ends differ by up to [kg]", "effective from every start",
+                                                          float(np.ptp(ends)), 0.0, 0.01, Word.NOT_REPRODUCIBLE))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -360,9 +355,8 @@ def _f4_27(effort: Workload) -> Result:
                "fraction of a per cent.")
     picture = Picture(Field("Size of the error of the mass, by what the bump is taken for", "width taken [m]",
                             "height taken [mm]", np.array(widths), 1000 * np.array(heights), np.abs(errors),
-                            "error [%]", printed_limit_percent),
-                      "errors up to 50 % over heights of 3 to 9 in and widths of 6 to 11 ft, from two sides: a dark "
-                      "blue region of right masses that slants")
+                            "error [%]", printed_limit_percent), "errors up to 50 % over heights of 3 to 9 in and "
+                      "widths of 6 to 11 ft, from two sides: a dark blue region of right masses that slants")
     right_m = [float(np.interp(0.0, -row, widths)) for row in errors]  # the wider, the lighter the car
     return Result((Table("Their way: error of the mass, fitted alone (printed as a picture only)",
                          columns, rows), ours),

@@ -57,8 +57,7 @@ COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, co
 def _t4_1(effort: Workload) -> Result:
     printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
-    (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _
-               in effort.each(range(1)))
+    (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _ in effort.each(range(1)))
     verdict = ("The printed frequencies are those of the coupled car without its damper, to their last figure. The "
                "printed damping ratio is, nearly, that of a body on spring and tire in series with the damper beside "
                "them: 0.395, which rounds to 0.39. As the car rings, its wheel swinging along, the body's damping is a "
@@ -105,16 +104,14 @@ def _t4_2(effort: Workload) -> Result:
     printed_hz = (1.1, 11.0)
     printed_mass_kg = 875.0
     names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), printed_hz
-    (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None),
-                      (0.30, None, None, None))
+    (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None), (0.30, None, None, None))
                for _ in effort.each(range(1)))
     by_eq = (1524.07 / 1.15 + 2 * 72.57) / 2
-    verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. "
-               "The damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, "
-               "rounded. The mass does not follow from the text: by Eq 4.36 half a car with two people has "
-               f"{by_eq:.0f} kg, not {printed_mass_kg:.0f}; 875 is taken as the published car. The inertia is in kg "
-               "m2, not kg/m2; and the pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are "
-               "right.")
+    verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. The "
+               "damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, rounded. "
+               f"The mass does not follow from the text: by Eq 4.36 half a car with two people has {by_eq:.0f} kg, not "
+               f"{printed_mass_kg:.0f}; 875 is taken as the published car. The inertia is in kg m2, not kg/m2; and the "
+               "pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are right.")
     values = (*quoted_values(rows, damping_within=0.015),
               Value("half of the car with two people, Eq 4.36 [kg]", printed_mass_kg, by_eq, 1.0, Word.MISPRINT,
                     of_print=True))
@@ -135,8 +132,7 @@ def _t4_3(effort: Workload) -> Result:
     length_m, spacing_m = 1000.0, 0.05
     roads = effort.count(60, 4)
     # One seed is one set of phases: the roads of all classes are alike but for their level.
-    found = np.array([[iri(generate(gd, length_m, spacing_m, seed), spacing_m) for _, gd,
-                       _ in PRINTED_T4_3]
+    found = np.array([[iri(generate(gd, length_m, spacing_m, seed), spacing_m) for _, gd, _ in PRINTED_T4_3]
                       for seed in effort.each(range(roads))])
     mean, std = found.mean(axis=0), found.std(axis=0)
     gds = np.array([gd for _, gd, _ in PRINTED_T4_3])
@@ -148,9 +144,8 @@ def _t4_3(effort: Workload) -> Result:
         Column("ours, computed [m/km]", ".3f")), rows)
     power = float(np.polyfit(np.log(gds), np.log(mean), 1)[0])
     factor = float((mean / np.sqrt(gds)).mean())
-    relation = Table("IRI = c Gd^b",
-                     (Column("number"), Column("printed, Eq 4.39", ".4f"), Column("ours, generated", ".4f"),
-                                      Column("ours, computed", ".4f")),
+    relation = Table("IRI = c Gd^b", (Column("number"), Column("printed, Eq 4.39", ".4f"),
+                                      Column("ours, generated", ".4f"), Column("ours, computed", ".4f")),
                      (("c", IRI_PER_ROOT_GD, factor, iri_of_road(1.0, length_m).value), ("b", 0.5, power, 0.5)))
     verdict = (f"The relation agrees: {factor:.4f} beside the printed {IRI_PER_ROOT_GD}, and the power is one half "
                "because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 to "
@@ -186,8 +181,7 @@ def _f4_3(effort: Workload) -> Result:
     rows = []
     values: list[Check] = []
     for gd in effort.each(gd_cm3):
-        rms_mm = np.array([1000 * float(np.std(generate(gd, length_m, spacing_m, seed))) for seed
-                           in range(roads)])
+        rms_mm = np.array([1000 * float(np.std(generate(gd, length_m, spacing_m, seed))) for seed in range(roads)])
         expected = 1000 * _rms_m(gd)
         quality = dict(printed).get(gd)
         rows.append((gd, road_class(gd), quality, expected, float(rms_mm.mean()), float(rms_mm.std())))
@@ -263,11 +257,10 @@ def _f4_16(effort: Workload) -> Result:
     values = about(("Fig 4.16", "Fig 4.17"), [
         Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
         Value("b of IRI = c Gd^b", printed_power, power, 3 * power_std)])
-    table = Table(f"Power laws through {roads} roads each", (
-        Column("set"), Column("c", ".4f"), Column("b", ".4f")),
-        (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
-         ("ours, all", factor, power), ("printed, Eq 4.39", IRI_PER_ROOT_GD, printed_power),
-         ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
+    table = Table(f"Power laws through {roads} roads each", (Column("set"), Column("c", ".4f"), Column("b", ".4f")),
+                  (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
+                   ("ours, all", factor, power), ("printed, Eq 4.39", IRI_PER_ROOT_GD, printed_power),
+                   ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
     verdict = (f"Four sets of {roads} roads lie about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
                "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
                "errors of the regression (the length of the printed roads is not given; ours have 500 m and differ by "
@@ -326,10 +319,9 @@ def _f4_18(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-F4_18 = Study("fig_4_18", "Roads generated for an IRI, and the IRI that they have", "Fig 4.18, section 4.3.4",
-              "Two sets of random roads of 500 m for an IRI of 1 to 20 m/km by Eq 4.40; exact IRI in place of ProVAL.",
-              _f4_18,
-              items=(Item("Fig 4.18", Word.AGREES,
-                          "Roads made for an IRI have it, within the chance of roads of that length."),))
+F4_18 = Study(
+    "fig_4_18", "Roads generated for an IRI, and the IRI that they have", "Fig 4.18, section 4.3.4",
+    "Two sets of random roads of 500 m for an IRI of 1 to 20 m/km by Eq 4.40; exact IRI in place of ProVAL.", _f4_18,
+    items=(Item("Fig 4.18", Word.AGREES, "Roads made for an IRI have it, within the chance of roads of that length."),))
 
 STUDIES = (T4_1, T4_2, T4_3, F4_3, F4_16, F4_18)

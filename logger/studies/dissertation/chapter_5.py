@@ -184,8 +184,7 @@ def _line(number: int) -> Line:
     powers, step_hz = summed_spectrum(reading[:, None], five_storey.RATE_HZ, 4)
     power = powers.mean(axis=0)
     shown = slice(1, int(8.0 / step_hz))
-    return Line(SENSORS[number].name, np.asarray(step_hz * np.arange(len(power)), float)[shown],
-                power[shown])
+    return Line(SENSORS[number].name, np.asarray(step_hz * np.arange(len(power)), float)[shown], power[shown])
 
 
 T5_2 = Study("table_5_2",
@@ -217,12 +216,11 @@ def _t5_4(effort: Workload) -> Result:
         Column("ours from a simulated record [Hz]", ".4f"), Column("standard deviation [Hz]", ".4f"),
         Column("its damping [%]", ".2f")), rows)
     verdict = (f"Modes 1 and 3 of the model agree to {_off(frequencies, 0):.2f} and {_off(frequencies, 2):.2f} %, the "
-               "rounding of its dimensions, with a stiffness half way between 12EI/h^3 and 3EI/h^3 (the source has "
-               "the labels of the two swapped). The printed 2.500 Hz of mode 2 cannot be: whatever the stiffness, "
-               "these masses have it at 3.488 times the first, 2.600 Hz with the printed first; the 1.88 % beside it "
-               "are the difference of 2.548 from 2.500, so the slip stands in the model's value. From a simulated "
-               "record of five PS-2119 all modes come back, each with its standard deviation, chosen without a "
-               "person.")
+               "rounding of its dimensions, with a stiffness half way between 12EI/h^3 and 3EI/h^3 (the source has the "
+               "labels of the two swapped). The printed 2.500 Hz of mode 2 cannot be: whatever the stiffness, these "
+               "masses have it at 3.488 times the first, 2.600 Hz with the printed first; the 1.88 % beside it are the "
+               "difference of 2.548 from 2.500, so the slip stands in the model's value. From a simulated record of "
+               "five PS-2119 all modes come back, each with its standard deviation, chosen without a person.")
     printed_hz = five_storey.PRINTED_MODEL_HZ
     values = (
         *about("Table 5.3", [

@@ -105,13 +105,11 @@ def _t6_1(effort: Workload) -> Result:
     per_percent = _per_percent_of_speed(cases)
     verdict = ("A width or a speed that is 5 % off moves the source's mass by some 5 and 11 %, a height by little; "
                f"with all three off by 5 % r.m.s. its errors are {_rms_t6_1(theirs):.0f} % r.m.s. Of the printed "
-               "trials "
-               f"the second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
+               f"trials the second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
                f"({by_trial['Table 6.1']:.0f} %) asks for twice as much, or for a speed that is "
-               f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * speedometer:.0f} "
-               "% off at 16 km/h (UNECE R39). Bumps 3 and 4 are too light in both trials, so they differ from the "
-               f"first two. Estimating bump and speed together with the mass leaves {_rms_t6_1(ours):.1f} %, which is "
-               "the "
+               f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * speedometer:.0f} % "
+               "off at 16 km/h (UNECE R39). Bumps 3 and 4 are too light in both trials, so they differ from the first "
+               f"two. Estimating bump and speed together with the mass leaves {_rms_t6_1(ours):.1f} %, which is the "
                "road's roughness, and its standard error says so.")
     values: tuple[Check, ...] = (*(one for item, rms in by_trial.items() for one in about(item, [
         Statement("speed that would have to be off for the printed r.m.s. error [%]", "changes in speed are a possible "
@@ -164,12 +162,11 @@ def _rms_t6_1(values: np.ndarray) -> float:
 
 
 T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed are not quite what was taken",
-              "Table 6.1 (and 6.2), section 6.2.1",
-              "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
-              "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for their way, as in 6.2.1.", _t6_1,
-              items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE,
-                          "The records were never published; errors of that kind follow from a bump and a speed that "
-                          "are some per cent off."))
+             "Table 6.1 (and 6.2), section 6.2.1",
+             "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
+             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for their way, as in 6.2.1.", _t6_1,
+             items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE, "The records were never published; errors "
+                         "of that kind follow from a bump and a speed that are some per cent off."))
 
 
 PRINTED_T6_3 = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
@@ -251,11 +248,10 @@ def _drive(step_m: float, iri: float, seed: int) -> _Found:
     theirs = fitted(record, {MASS: TRUTH[MASS]}, False, taken)
     known = fitted(record, place, True, taken)
     both = _identified(record, {MASS: TRUTH[MASS], **place}, taken)
-    return _Found(
-        REFUSED if _identified(record, {MASS: TRUTH[MASS]}, RoadInput()) is None else "answers",
-        error_percent(theirs, MASS),
-        None if both is None else (error_percent(both, MASS), standard_error_percent(both, MASS)),
-        (1000 * (known.parameters["step.height_m"] - step_m), 1000 * known.standard_errors["step.height_m"]))
+    return _Found(REFUSED if _identified(record, {MASS: TRUTH[MASS]}, RoadInput()) is None else "answers",
+                  error_percent(theirs, MASS),
+                  None if both is None else (error_percent(both, MASS), standard_error_percent(both, MASS)),
+                  (1000 * (known.parameters["step.height_m"] - step_m), 1000 * known.standard_errors["step.height_m"]))
 
 
 def _identified(record: Run, start: dict[str, float], road: RoadInput) -> Fit | None:
@@ -276,13 +272,11 @@ def _rms_t6_3(values: Sequence[tuple[float, ...]]) -> list[float]:
     return [float(value) for value in np.sqrt((np.array(values) ** 2).mean(axis=0))]
 
 
-T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2",
-              "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
-              "with steps of 0.01 g, steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step "
-              "is estimated, too.", _t6_3,
-              items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE,
-                          "The records were never published; a flat input tells nothing of the mass, and ours refuses "
-                          "it."))
+T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source measured, "
+             "and its records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
+             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step is estimated, too.", _t6_3,
+             items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE, "The records were never published; a flat "
+                         "input tells nothing of the mass, and ours refuses it."))
 
 
 _UNIT_M = 0.01
@@ -321,9 +315,8 @@ def _t6_5(effort: Workload) -> Result:
     limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit))
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)
     values = tuple(Statement(f"location {number}: {what}, {end}", f"{word.replace('_', ' ')}: {reason}",
-                             float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE)
-                   for (number, _, word, reason), what, row, (least, most, end, place) in zip(
-                       PRINTED, sizes, rows, to_be_found, strict=True))
+                             float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE) for (number, _, word, reason),
+                   what, row, (least, most, end, place) in zip(PRINTED, sizes, rows, to_be_found, strict=True))
     picture = Picture(Curves("a_w of the worst window by size", "height of the step, depth of the manhole [mm]",
                              "a_w [m/s2]", (Line("step, 25 mph", depths, factors[0] * depths),
                                             Line("manhole, 20 mph", depths, factors[1] * depths), *limits)),
@@ -342,8 +335,7 @@ def _manhole(start_m: float) -> Shape:
 def _a_w_per_unit(shape: Shape, mph: int) -> float:
     """Of the worst window over something of 10 mm [m/s2]."""
     quiet = Conditions(noise_mps2=1e-3)
-    a_w: Array = per_window(record_of(shape, mph * MPH_MPS, 8.0, quiet), quiet,
-                            low_pass_hz=LOW_PASS_HZ).a_w_mps2
+    a_w: Array = per_window(record_of(shape, mph * MPH_MPS, 8.0, quiet), quiet, low_pass_hz=LOW_PASS_HZ).a_w_mps2
     return float(a_w.max())
 
 

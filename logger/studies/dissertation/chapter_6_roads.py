@@ -100,9 +100,8 @@ def _f6_6(effort: Workload) -> Result:
                 for mph, factor in zip(SPEEDS_MPH, factors, strict=True))
     axes, gd_axes = ("r.m.s. acceleration [m/s2]", "IRI [m/km]"), ("Gd(n0) [cm3]", "r.m.s. acceleration [m/s2]")
     less = "less response at every roughness and speed than in Fig 6.6"
-    loads = tuple(Picture(Curves(f"{figure}: IRI by r.m.s., {what}", *axes, _fan(slopes)), less)
-                  for figure, what, slopes in (("Fig 6.7", "two people more", two),
-                                               ("Fig 6.8", "twice the mass", heavy)))
+    loads = tuple(Picture(Curves(f"{figure}: IRI by r.m.s., {what}", *axes, _fan(slopes)), less) for figure, what,
+                  slopes in (("Fig 6.7", "two people more", two), ("Fig 6.8", "twice the mass", heavy)))
     pictures = (Picture(Curves("Fig 6.4: r.m.s. acceleration by degree of roughness", *gd_axes, rms),
                         "dots of simulated roads and a power trendline for each speed, the faster the higher"),
                 Picture(Curves("Fig 6.5: the same, logarithmic", *gd_axes, rms, log_x=True, log_y=True),
@@ -291,12 +290,11 @@ def _f6_16(effort: Workload) -> Result:
         (float(mph[number]), one.a_w_per_iri.slope, 100 * one.a_w_per_iri.spread, checks.get(number),
          *(_word(one.a_w_per_iri.slope * level) for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
-    verdict = ("Comfort falls in proportion to roughness, and with speed, as the text says. The "
-               "printed pictures have no numbers in the text. For this car a straight line through the origin holds "
-               f"for each speed, because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} "
-               "times as steep, not seven times: a road of waviness 2 shakes a car with the root of its speed, 2.6 "
-               "times, and most of the rest is the tire, whose patch of 250 mm swallows the short waves that a slow "
-               "car's wheels would answer.")
+    verdict = ("Comfort falls in proportion to roughness, and with speed, as the text says. The printed pictures have "
+               "no numbers in the text. For this car a straight line through the origin holds for each speed, because "
+               f"it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, not seven "
+               "times: a road of waviness 2 shakes a car with the root of its speed, 2.6 times, and most of the rest "
+               "is the tire, whose patch of 250 mm swallows the short waves that a slow car's wheels would answer.")
     pictures = (
         Picture(Curves("Fig 6.16: comfort by IRI at each speed", "IRI [m/km]", "a_w [m/s2]",
                        tuple(Line(f"{one:.0f} mph", levels, row) for one, row in zip(mph, a_w, strict=True)),
@@ -321,11 +319,9 @@ def _word(a_w_mps2: float) -> str:
 
 F6_16 = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
               "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, "
-              "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of "
-              "time.", _f6_16,
-              items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES,
-                          "Comfort falls in proportion to roughness, and with speed; the pictures have no numbers in "
-                          "the text."))
+              "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of time.",
+              _f6_16, items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Comfort falls in proportion to roughness, "
+                                  "and with speed; the pictures have no numbers in the text."))
 
 
 PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 30), **dict.fromkeys((5, 8, 9), 25),
@@ -472,9 +468,8 @@ def _row_f6_23(mph: int, found: list[Figures], again: Array) -> tuple[Cell, ...]
                            for name in ("exact_m_per_km", "by_rms_m_per_km", "iri_m_per_km"))
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
     return (float(mph), float(len(found)), float(exact.mean()), "too high" if slow else "reasonable",
-            *(100 * float(one.mean() / exact.mean() - 1) for one in (by_rms, ours)),
-            float(again.mean()), _standard_error(again), float(len(again)),
-            *(rms_error(one, exact) for one in (by_rms, ours)))
+            *(100 * float(one.mean() / exact.mean() - 1) for one in (by_rms, ours)), float(again.mean()),
+            _standard_error(again), float(len(again)), *(rms_error(one, exact) for one in (by_rms, ours)))
 
 
 def _map(title: str, values: dict[int, Array], name: str, top: float) -> Field:

@@ -330,13 +330,11 @@ def _sensor_position(effort: Workload) -> Result:
     PLACES_M = (-1.0, -0.5, 0.0, 0.5, 1.0)
     estimated_mph = 30
     speeds = np.array(speeds_mph) * MPH_MPS
-    felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms
-                     for place in PLACES_M])
+    felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms for place in PLACES_M])
     change = 100 * (felt / felt[PLACES_M.index(0.0)] - 1)
     table = Table("R.m.s. acceleration by where the sensor sits, over that at the centre of gravity (printed: nothing)",
                   (Column("speed [mph]", ".0f"), *(Column(f"{place:+g} m ahead [%]", "+.1f") for place in PLACES_M)),
-                  tuple((float(mph), *map(float, row)) for mph,
-                        row in zip(speeds_mph, change.T, strict=True)))
+                  tuple((float(mph), *map(float, row)) for mph, row in zip(speeds_mph, change.T, strict=True)))
     road = random_road(3.0, 230.0, 5)
     rows = []
     for place in effort.each(effort.some(PLACES_M)):
@@ -384,8 +382,7 @@ SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the c
 def _speed(effort: Workload) -> Result:
     iri = 3.0
     limits = ErrorBound(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
-    roads = [random_road(iri, 230.0, 21 + number, waviness) for number,
-             waviness in enumerate(WAVINESS)]
+    roads = [random_road(iri, 230.0, 21 + number, waviness) for number, waviness in enumerate(WAVINESS)]
     rows = []
     for one_mph in effort.each(effort.some(SPEEDS_MPH)):
         cut = [per_window(drive_over(road, one_mph * MPH_MPS, PS_2119), PS_2119) for road in roads]
@@ -407,9 +404,8 @@ def _speed(effort: Workload) -> Result:
                f"waves mixed otherwise, are up to {relation:.0f} % apart by the r.m.s. relation and {spread:.0f} % by "
                f"ridelog estimate, whose windows are off by {own.min():.2f} to {own.max():.2f} m/km at 10 to 70 mph "
                f"beside {by_relation.min():.2f} to {by_relation.max():.2f}. The least possible error, for one who knew "
-               "spectrum, noise and car exactly, stands beside it; what is missing to it is what had to be learnt "
-               "from the drive. The car's parameters were known here: of a car that is not, ridelog identify comes "
-               "first.")
+               "spectrum, noise and car exactly, stands beside it; what is missing to it is what had to be learnt from "
+               "the drive. The car's parameters were known here: of a car that is not, ridelog identify comes first.")
     picture = Picture(Curves("R.m.s. error of a window of 25 ft by speed", "speed [mph]", "error [m/km]",
                              (Line("ridelog estimate", mph, own), Line("least possible", mph, least),
                               Line("r.m.s. relation", mph, by_relation))), "nothing: future work")

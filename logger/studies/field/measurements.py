@@ -46,8 +46,7 @@ def _five_modes(effort: Workload) -> Result:
     printed_hz = (0.889, 2.601, 4.096, 5.275, 6.031)
     # What its SSI-dat gives at order 16, the true frequencies being named by hand.
     printed_damping = (0.028, 0.018, 0.018, 0.024, 0.022)
-    building = with_damping_ratios(*chain(np.full(5, 25.91), np.full(5, 10_000.0)),
-                                   np.full(5, printed_true_damping))
+    building = with_damping_ratios(*chain(np.full(5, 25.91), np.full(5, 10_000.0)), np.full(5, printed_true_damping))
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
     missed, extra, records, count = 0, 0, [], effort.count(5, 2)
     for seed in effort.each(range(count)):
@@ -65,11 +64,9 @@ def _five_modes(effort: Workload) -> Result:
     values += _beside("frequency of mode {} found [Hz]", printed_hz, PRINTED_TRUE_HZ, hz, hz_std)
     values += _beside("damping ratio of mode {} found", printed_damping, (printed_true_damping,) * 5, damping,
                       damping_std)
-    values += [Statement(f"modes missed in {count} records", "found where they are named by hand", float(missed),
-                         0,
-                         0, Word.BETTER),
-               Statement("modes that are not there", "found where they are named by hand", float(extra), 0, 0,
-                         Word.BETTER)]
+    values += [Statement(f"modes missed in {count} records", "found where they are named by hand", float(missed), 0, 0,
+                         Word.BETTER), Statement("modes that are not there", "found where they are named by hand",
+                                                 float(extra), 0, 0, Word.BETTER)]
     worst = 100 * float(max(abs(one / printed_true_damping - 1) for one in printed_damping))
     ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / printed_true_damping - 1).max(axis=1)))
     verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} found that are not there, "
@@ -99,8 +96,7 @@ def _record(building: Masses, seed: int) -> Array:
 
 def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours: Array, std: Array) -> list[Value]:
     """Two estimates of one truth differ by what both are off: theirs by what the print shows, ours by chance."""
-    return [Value(name.format(mode), theirs, float(mine),
-                  abs(theirs - truth) + 3.0 * float(error) + _HALF_DIGIT)
+    return [Value(name.format(mode), theirs, float(mine), abs(theirs - truth) + 3.0 * float(error) + _HALF_DIGIT)
             for mode, (theirs, truth, mine, error) in enumerate(zip(printed, true, ours, std, strict=True), start=1)]
 
 

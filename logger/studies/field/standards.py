@@ -36,9 +36,8 @@ def _iri_check_profile(effort: Workload) -> Result:
                     1e-5) for where, printed in effort.each(PRINTED_IRI_CHECK_PROFILE)])]
     _, *ends = straight_step(*quarter_car(GOLDEN_CAR).state_space(), spacing_m / STANDARD_SPEED_MPS)
     exact = float((ends[0] + ends[1])[0, 0])  # held over the step, as in the print
-    values += about("IRI input coefficient", [
-        Value("first input coefficient at 0.25 m", 5.476107e-3, exact, 5e-10,
-              Word.MISPRINT)])
+    values += about("IRI input coefficient",
+                    [Value("first input coefficient at 0.25 m", 5.476107e-3, exact, 5e-10, Word.MISPRINT)])
     peak = int(running.argmax())
     table = Table("Where the running IRI is largest", (
         Column("printed [m]", ".2f"), Column("ours [m]", ".2f"), Column("ours [m/km]", ".5f")),
@@ -100,14 +99,11 @@ GOLDEN_CAR_GAIN = Study(
 
 
 HZ = ("0.5", "0.63", "0.8", "1", "1.25", "1.6", "2", "2.5", "3.15", "4", "5", "6.3", "8", "10", "12.5", "16", "20",
-      "25",
-      "31.5", "40", "50", "63", "80")
-PRINTED_ISO_2631_FACTORS = {
-    "wk": ("418", "459", "477", "482", "484", "494", "531", "631", "804", "967", "1039", "1054", "1036", "988", "902",
-           "768", "636", "513", "405", "314", "246", "186", "132"),
-    "wd": ("853", "944", "992", "1011", "1008", "968", "890", "776", "642", "512", "409", "323", "253", "212", "161",
-           "125", "100", "80.0", "63.2", "49.4", "38.8", "29.5", "21.1"),
-}
+      "25", "31.5", "40", "50", "63", "80")
+PRINTED_ISO_2631_FACTORS = {"wk": ("418", "459", "477", "482", "484", "494", "531", "631", "804", "967", "1039", "1054",
+                                   "1036", "988", "902", "768", "636", "513", "405", "314", "246", "186", "132"),
+                            "wd": ("853", "944", "992", "1011", "1008", "968", "890", "776", "642", "512", "409", "323",
+                                   "253", "212", "161", "125", "100", "80.0", "63.2", "49.4", "38.8", "29.5", "21.1")}
 """Factors times 1000, as printed, at the nominal frequencies."""
 MISPRINTED = ("wd", "10")
 _ITEMS = {"wk": "ISO 2631-1 Table 3, Wk", "wd": "ISO 2631-1 Table 3, Wd"}
@@ -176,9 +172,8 @@ def _iso_8041_bursts(effort: Workload) -> Result:
             found[name].append(ours)
             rows.append((words, name, printed, ours, ours / printed - 1))
             values.append(Value(f"{name}, {words} [m/s2]", printed, ours, _SHARE_ISO_8041_BURSTS[name] * printed))
-    table = Table("Bursts, weighted r.m.s.", (
-        Column("teeth"), Column("weighting"), Column("printed [m/s2]", ".5f"), Column("ours [m/s2]", ".5f"),
-        Column("off by", "+.2%")), tuple(rows))
+    table = Table("Bursts, weighted r.m.s.", (Column("teeth"), Column("weighting"), Column("printed [m/s2]", ".5f"),
+                                              Column("ours [m/s2]", ".5f"), Column("off by", "+.2%")), tuple(rows))
     worst = {name: max(abs(row[4]) for row in rows if row[1] == name) for name in found}
     verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. The weighting is the formula of the "
                "standard itself on the whole record; a plain bilinear transform at 100 Hz is off by more above 8 Hz.")
