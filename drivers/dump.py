@@ -117,7 +117,6 @@ class DumpReader:
         return self._events
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
     def _parse(self, first: list[bytes]) -> Iterator[Event]:

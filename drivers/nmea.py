@@ -218,7 +218,6 @@ class _Epoch:
         return all(one.vouches and one.lat_deg is not None for one in asked if one is not None)
 
     def fix(self, utc_us: int | None) -> Fix:
-        """The epoch as a valid fix."""
         position = self.rmc or self.gga or self.gll
         assert position is not None
         speed_mps = self.rmc.speed_mps if self.rmc else None
@@ -314,7 +313,6 @@ class NmeaDecoder:
 
     @property
     def counters(self) -> NmeaCounters:
-        """What came in so far."""
         return NmeaCounters(sentences=self._checks[Checksum.GOOD], bad_checksum=self._checks[Checksum.BAD],
                             no_checksum=self._checks[Checksum.MISSING], malformed=self._malformed,
                             ubx_frames=self._framer.ubx_frames, dropped_bytes=self._framer.dropped_bytes,

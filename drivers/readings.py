@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.errors import SettingsError, shortened
+
+if TYPE_CHECKING:
+    from drivers.plain_yaml import Node
 
 
 class Event(NamedTuple):
@@ -160,29 +162,6 @@ def folder_name(word: str) -> str:
     return word
 
 
-class SettingNode(Protocol):
-    """A value of a settings file, with its line. Each asking method raises the reader's own error when the value is
-    something else; ``wrong`` makes that error: file, line, what was expected, what was found.
-
-    Problem: an instrument's settings belong into its own file, but how a settings file is read and how a wrong value is
-    refused with its line belongs to the program that reads it. Solution: an instrument declares for each key what may
-    stand there; the reader knows these few kinds. Only what fits none of them brings a function of its own
-    (``Special``), and that asks a ``SettingNode``.
-    """
-
-    @property
-    def content(self) -> Any: ...
-    @property
-    def plain(self) -> bool: ...
-    def wrong(self, expected: str) -> Exception: ...
-    def mapping(self, required: Iterable[str] = (), optional: Iterable[str] = ()) -> Mapping[str, Self]: ...
-    def items(self) -> Sequence[Self]: ...
-    def text(self) -> str: ...
-    def number(self, low: float | None = None, high: float | None = None) -> float: ...
-    def integer(self, low: int | None = None, high: int | None = None) -> int: ...
-    def path(self, after: str = "") -> Path: ...
-
-
 @dataclass(frozen=True)
 class Whole:
     """A whole number from ``low`` to ``high``."""
@@ -220,7 +199,7 @@ class Text:
 class Special:
     """What ``read`` makes of the value. ``examples``: pieces of YAML that it takes."""
 
-    read: Callable[[SettingNode], Any]
+    read: Callable[[Node], Any]
     examples: tuple[str, ...]
 
 

@@ -309,7 +309,6 @@ class SampleClock:
         return self._base_us + self._step_us * np.arange(self._index, self._index + count, dtype=np.float64)
 
     def _expect(self, period_us: float, tolerance: float) -> None:
-        """The period is about this."""
         self._found_us = self._period_us = period_us
         self._is_new_rate = True
         self._shortest_us = period_us * (1 - tolerance)
@@ -589,7 +588,6 @@ class DatedSamples:
         self._late_us = np.empty(0, dtype=np.int64)
 
     def add(self, samples: UndatedSamples) -> None:
-        """More samples, in order."""
         if samples.after_loss:
             self._times.append(self.clock.restart())
         self._times.append(self.clock.feed(samples.arrivals_us))

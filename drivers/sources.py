@@ -70,7 +70,6 @@ class Deadlines:
         self.missed = 0
 
     def wait(self) -> None:
-        """Sleep until the next instant."""
         now_us = self._now_us()
         self._next_us = (self._next_us or now_us) + self._step_us
         wait_us = self._next_us - now_us
@@ -99,7 +98,6 @@ class Scattered:
         self._rng = random.Random(0)
 
     def wait(self) -> None:
-        """Sleep until the next look."""
         self._sleep((self._step_us + self._interval_us * self._rng.random()) / US_PER_S)
 
 
@@ -159,7 +157,6 @@ class ChipSource:
         return self._held[0][1].t_us if self._held else None
 
     def open(self) -> None:
-        """Open the bus and start the chip."""
         self._bus = self._open_bus()
         self._device = self._make_chip(self._bus)
         self._device.start()
@@ -238,7 +235,6 @@ class SerialSource:
         self._port: BytePort | None = None
 
     def open(self) -> None:
-        """Open the port."""
         self._port = self._open_port()
 
     def poll(self) -> list[Event]:
@@ -258,11 +254,9 @@ class SerialSource:
             self._sleep(GATHER_S + SCATTER_S * self._rng.random())
 
     def flush(self) -> list[Event]:
-        """Nothing is held back."""
         return []
 
     def close(self) -> None:
-        """Let go of the port."""
         port, self._port = self._port, None
         if port is not None:
             port.close()

@@ -36,7 +36,6 @@ class RecentBytes:
         self._data = bytearray()
 
     def note(self, data: bytes) -> None:
-        """More bytes."""
         self._data += data
         if len(self._data) > 2 * RECENT_BYTES:
             del self._data[:-RECENT_BYTES]

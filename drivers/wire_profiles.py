@@ -7,21 +7,17 @@ they mean. Shipped ones lie in ``drivers/profiles``, anyone may name another by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from yaml import YAMLError
-from yaml.constructor import SafeConstructor
 
 from drivers.disk import open_regular
 from drivers.errors import SettingsError, shortened
-from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
+from drivers.plain_yaml import Node, parse_mapping
 from drivers.readings import STANDARD_GRAVITY_MPS2
 
 WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
@@ -163,140 +159,61 @@ def load_profile(name_or_path: str | Path) -> WireProfile:
     if len(text) > profile_bytes_max:
         raise SettingsError(f"{place}: expected at most {profile_bytes_max} bytes")
     try:
-        top = compose_plain(text.decode())
-        lines = dict(lines_of(top)) if top is not None else {}
-        content = SafeConstructor().construct_document(top) if top is not None else None
-    except NotPlainError as error:
-        raise SettingsError(f"{place}:{error.line}: {error}") from None
-    except (YAMLError, ValueError, OverflowError):  # dates and the like that cannot be; text that is no UTF-8
-        raise SettingsError(f"{place}: expected YAML in UTF-8, with numbers and words as values") from None
-    return _profile(_Keys(place, "", content, lines))
+        return _profile(parse_mapping(text.decode(), place, Node))
+    except UnicodeDecodeError:
+        raise SettingsError(f"{place}: expected YAML in UTF-8") from None
 
 
-class _Keys:
-    """The keys of one mapping in a profile file: each asked for once, none left over."""
-
-    def __init__(self, place: str, path: str, content: object, lines: Mapping[str, int]) -> None:
-        self._place = place
-        self._path = path
-        self._lines = lines
-        self._line = lines.get(path.rstrip("."), 1)
-        if not isinstance(content, Mapping):
-            raise SettingsError(f"{place}:{self._line}: {path.rstrip('.') or 'file'}: expected keys with values")
-        self._content: dict[Any, Any] = dict(content)
-
-    def wrong(self, key: str, expected: str) -> SettingsError:
-        line = self._lines.get(f"{self._path}{key}", self._line)
-        return SettingsError(f"{self._place}:{line}: {self._path}{key}: expected {expected}")
-
-    def _take(self, key: str, expected: str) -> Any:
-        if key not in self._content:
-            raise self.wrong(key, f"{expected}, but the key is missing")
-        return self._content.pop(key)
-
-    def has(self, key: str) -> bool:
-        return key in self._content
-
-    def inner(self, key: str) -> _Keys:
-        return _Keys(self._place, f"{self._path}{key}.", self._take(key, "keys with values"), self._lines)
-
-    def text(self, key: str) -> str:
-        value = self._take(key, "text")
-        if not isinstance(value, str):
-            raise self.wrong(key, "text")
-        return value.strip()
-
-    def flag(self, key: str) -> bool:
-        value = self._take(key, "true or false")
-        if not isinstance(value, bool):
-            raise self.wrong(key, "true or false")
-        return value
-
-    def choice(self, key: str, options: list[str]) -> str:
-        expected = " or ".join(options)
-        value = self._take(key, expected)
-        if value not in options:
-            raise self.wrong(key, expected)
-        return str(value)
-
-    def number(self, key: str, low: float, high: float) -> float:
-        expected = f"a number from {low:g} to {high:g}"
-        return self._checked(key, self._take(key, expected), low, high, expected)
-
-    def whole(self, key: str, low: int, high: int) -> int:
-        expected = f"a whole number from {low} to {high}"
-        return self._whole(key, self._take(key, expected), low, high, expected)
-
-    def numbers(self, key: str, count: int, low: float, high: float) -> list[float]:
-        expected = f"a list of {count} numbers from {low:g} to {high:g}"
-        return [self._checked(key, value, low, high, expected) for value in self._list(key, count, expected)]
-
-    def wholes(self, key: str, count: int, low: int, high: int) -> list[int]:
-        expected = f"a list of {count} whole numbers from {low} to {high}"
-        return [self._whole(key, value, low, high, expected) for value in self._list(key, count, expected)]
-
-    def _list(self, key: str, count: int, expected: str) -> list[object]:
-        values = self._take(key, expected)
-        if not isinstance(values, list) or len(values) != count:
-            raise self.wrong(key, expected)
-        return values
-
-    def _checked(self, key: str, value: object, low: float, high: float, expected: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise self.wrong(key, expected)
-        return float(value)
-
-    def _whole(self, key: str, value: object, low: int, high: int, expected: str) -> int:
-        if not isinstance(value, int):
-            raise self.wrong(key, expected)
-        return int(self._checked(key, value, low, high, expected))
-
-    def finish(self) -> None:
-        for key in self._content:
-            raise self.wrong(shortened(str(key))[1:-1], "no such key")
+_KEYS = ("name", "version", "verified", "source", "framing", "rate_hz", "clock_tolerance_ppm")
+_FRAME_KEYS = ("length_bytes", "sync", "word", "offsets", "valid_raw", "upright_axis", "zero_g_raw", "one_g_raw")
 
 
-def _profile(keys: _Keys) -> WireProfile:
-    framing = keys.choice("framing", ["frames", "lines"])
-    layout = _frame_layout(keys.inner("frame")) if framing == "frames" else _line_layout(keys.inner("line"))
-    profile = WireProfile(name=keys.text("name"), version=keys.whole("version", 1, 1_000_000),
-                          verified=keys.flag("verified"), source=keys.text("source"),
-                          rate_hz=keys.number("rate_hz", 1, 10_000),
-                          clock_tolerance=keys.number("clock_tolerance_ppm", 1, 50_000) * 1e-6, layout=layout)
-    keys.finish()
-    return profile
+def _profile(top: Node) -> WireProfile:
+    framing = top.mapping(_KEYS, ("frame", "line"))["framing"].choice("frames", "lines")
+    key, layout = ("frame", _frame_layout) if framing == "frames" else ("line", _line_layout)
+    keys = top.mapping((*_KEYS, key))
+    return WireProfile(name=keys["name"].text(), version=keys["version"].integer(1, 1_000_000),
+                       verified=keys["verified"].boolean(), source=keys["source"].text().strip(),
+                       rate_hz=keys["rate_hz"].number(1, 10_000),
+                       clock_tolerance=keys["clock_tolerance_ppm"].number(1, 50_000) * 1e-6, layout=layout(keys[key]))
 
 
-def _frame_layout(keys: _Keys) -> FrameLayout:
-    length = keys.whole("length_bytes", 6, 256)
-    sync_text = keys.text("sync")
+def _items(node: Node, count: int) -> tuple[Node, ...]:
+    """The nodes of a list of so many numbers."""
+    if len(node.items()) != count:
+        raise node.wrong(f"a list of {count} numbers")
+    return node.items()
+
+
+def _frame_layout(node: Node) -> FrameLayout:
+    keys = node.mapping(_FRAME_KEYS)
+    length = keys["length_bytes"].integer(6, 256)
     try:
-        sync = bytes.fromhex(sync_text)
+        sync = bytes.fromhex(str(keys["sync"].content))
     except ValueError:
-        raise keys.wrong("sync", "bytes in hex, or empty") from None
+        raise keys["sync"].wrong("bytes in hex, or empty") from None
     if len(sync) > length - 6:
-        raise keys.wrong("sync", "start bytes that leave six bytes of the frame for X, Y, Z")
-    x, y, z = keys.wholes("offsets", 3, len(sync), length - 2)
-    low, high = keys.wholes("valid_raw", 2, -32768, 65535)
+        raise keys["sync"].wrong("start bytes that leave six bytes of the frame for X, Y, Z")
+    x, y, z = (one.integer(len(sync), length - 2) for one in _items(keys["offsets"], 3))
+    low, high = (one.integer(-32768, 65535) for one in _items(keys["valid_raw"], 2))
     if low >= high:
-        raise keys.wrong("valid_raw", "the lower count first")
-    axis = keys.choice("upright_axis", [*AXES, "none"])
-    zero, one = (keys.numbers(key, 3, -32768, 65535) for key in ("zero_g_raw", "one_g_raw"))
-    if any(abs(a - b) < 1 for a, b in zip(zero, one, strict=True)):
-        raise keys.wrong("one_g_raw", "counts that differ by one or more from those of zero_g_raw")
-    layout = FrameLayout(length_bytes=length, sync=sync, word=keys.choice("word", list(WORDS)), offsets=(x, y, z),
-                         valid_raw=(low, high), upright_axis=None if axis == "none" else AXES.index(axis),
-                         calibration=ScaleCalibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])))
-    keys.finish()
-    return layout
+        raise keys["valid_raw"].wrong("the lower count first")
+    axis = keys["upright_axis"].choice(*AXES, "none")
+    zero, one_g = ([one.number(-32768, 65535) for one in _items(keys[key], 3)] for key in ("zero_g_raw", "one_g_raw"))
+    if any(abs(a - b) < 1 for a, b in zip(zero, one_g, strict=True)):
+        raise keys["one_g_raw"].wrong("counts that differ by one or more from those of zero_g_raw")
+    return FrameLayout(length_bytes=length, sync=sync, word=keys["word"].choice(*WORDS), offsets=(x, y, z),
+                       valid_raw=(low, high), upright_axis=None if axis == "none" else AXES.index(axis),
+                       calibration=ScaleCalibration((zero[0], zero[1], zero[2]), (one_g[0], one_g[1], one_g[2])))
 
 
-def _line_layout(keys: _Keys) -> LineLayout:
+def _line_layout(node: Node) -> LineLayout:
     most_numbers = 40  # of one digit in a line of 80 characters
-    layout = LineLayout(UNITS_MPS2[keys.choice("unit", list(UNITS_MPS2))], keys.number("range", 1e-3, 1e4))
-    if keys.has("numbers") or keys.has("columns"):
-        numbers = keys.whole("numbers", 3, most_numbers)
-        x, y, z = keys.wholes("columns", 3, 1, numbers)
-        layout = replace(layout, numbers=numbers, columns=(x, y, z))
-    keys.finish()
-    return layout
+    keys = node.mapping(("unit", "range"), ("numbers", "columns"))
+    layout = LineLayout(UNITS_MPS2[keys["unit"].choice(*UNITS_MPS2)], keys["range"].number(1e-3, 1e4))
+    if len(keys) == 2:
+        return layout
+    keys = node.mapping(("unit", "range", "numbers", "columns"))
+    numbers = keys["numbers"].integer(3, most_numbers)
+    x, y, z = (one.integer(1, numbers) for one in _items(keys["columns"], 3))
+    return replace(layout, numbers=numbers, columns=(x, y, z))

@@ -382,7 +382,6 @@ class ScanPort:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
 
     def close(self) -> None:
-        """Let go."""
         os.close(self._descriptor)
 
 

@@ -165,15 +165,12 @@ class SerialAccelerometer(Accelerometer[Settings]):
         """Path of the port, and its baud rate."""
 
     def place(self, settings: Settings) -> str:
-        """The path of the port."""
         return self.line(settings)[0]
 
     def source(self, settings: Settings, machine: Machine) -> Source:
-        """The bytes of the port."""
         port, baud = self.line(settings)
         return SerialSource(self.name, lambda: machine.open_serial(port, baud), machine.now_us, SERIAL_WAIT_S,
                             machine.sleep)
 
     def advice(self, state: str) -> str:
-        """What to look at on a serial line."""
         return serial_advice(state)

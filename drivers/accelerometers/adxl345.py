@@ -169,7 +169,6 @@ class _Adxl345(Accelerometer[Adxl345Config]):
     keys: ClassVar[Mapping[str, Kind]] = {"i2c_bus": Whole(0, 255), "rate_hz": OneOf(tuple(RATE_CODES))}
 
     def place(self, settings: Adxl345Config) -> str:
-        """The bus."""
         return f"/dev/i2c-{settings.i2c_bus}"
 
     def source(self, settings: Adxl345Config, machine: Machine) -> Source:
@@ -179,11 +178,9 @@ class _Adxl345(Accelerometer[Adxl345Config]):
                                FIFO_ENTRIES)
 
     def decoder(self, settings: Adxl345Config, upright_axis: int) -> Adxl345Decoder:
-        """By the nominal rate."""
         return Adxl345Decoder(settings.rate_hz)
 
     def readings(self, settings: Adxl345Config) -> ReadingQuality:
-        """Steps that the noise covers."""
         return ReadingQuality(NOISE_MPS2)
 
     def facts(self, settings: Adxl345Config) -> dict[str, Any]:
@@ -192,15 +189,12 @@ class _Adxl345(Accelerometer[Adxl345Config]):
                 "bandwidth_hz": settings.rate_hz / 2, "rate_hz": settings.rate_hz}
 
     def header(self, settings: Adxl345Config) -> dict[str, Any]:
-        """The nominal rate."""
         return {"rate_hz": settings.rate_hz}
 
     def recorded(self, said: RecordedWords, settings: Adxl345Config, is_given: bool) -> Adxl345Config:
-        """The rate is the recording's."""
         return replace(settings, rate_hz=said.whole("rate_hz", settings.rate_hz))
 
     def advice(self, state: str) -> str:
-        """What to look at."""
         return ("check its wires (VCC and CS to 3.3 V, SDO to ground or 3.3 V, ground, SDA, SCL) and that I2C is on "
                 "(sudo raspi-config)")
 

@@ -26,7 +26,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import sqrt
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -44,11 +44,13 @@ from drivers.readings import (
     OneOf,
     OrNone,
     RecordedWords,
-    SettingNode,
     Special,
     Whole,
 )
 from drivers.sources import ChipSource, Deadlines, Source
+
+if TYPE_CHECKING:
+    from drivers.plain_yaml import Node
 
 CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)
@@ -355,7 +357,7 @@ def _choose(name: str, value: int, known: Iterable[int]) -> None:
 _DUMP = "dump:"
 
 
-def _bus(node: SettingNode) -> int | Path:
+def _bus(node: Node) -> int | Path:
     """The number of a bus, or the path of a recorded drive."""
     text = node.content
     if isinstance(text, str) and text.startswith(_DUMP):
@@ -382,7 +384,6 @@ class Bma220Config:
 
     @property
     def chip(self) -> Bma220Settings:
-        """The driver's settings."""
         return Bma220Settings(range_g=self.range_g, bandwidth_hz=self.bandwidth_hz, oversample=self.reads)
 
     @property
@@ -408,15 +409,12 @@ class _Bma220(Accelerometer[Bma220Config]):
     event_bytes = SAMPLE_BYTES
 
     def place(self, settings: Bma220Config) -> str:
-        """The bus, or the recording."""
         return f"/dev/i2c-{settings.i2c_bus}" if isinstance(settings.i2c_bus, int) else str(settings.i2c_bus)
 
     def source(self, settings: Bma220Config, machine: Machine) -> Source:
-        """Bursts at the sampling rate."""
         return chip_source(_bus_opener(settings.i2c_bus, machine), settings.chip, machine.now_us, machine.sleep)
 
     def decoder(self, settings: Bma220Config, upright_axis: int) -> Bma220Decoder:
-        """By the range."""
         return Bma220Decoder(settings.range_g)
 
     def readings(self, settings: Bma220Config) -> ReadingQuality:
@@ -437,12 +435,10 @@ class _Bma220(Accelerometer[Bma220Config]):
             oftener=f"oversample: {reads}{_FAST_BUS * (reads > USUAL_OVERSAMPLE)}" if reads > settings.reads else "")
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
-        """Range, scale, filter, rate."""
         return {"verified": True, "range_g": settings.range_g, "mps2_per_count": mps2_per_count(settings.range_g),
                 "bandwidth_hz": settings.chip.filter_hz, "oversample": settings.reads}
 
     def header(self, settings: Bma220Config) -> dict[str, Any]:
-        """Range and rate."""
         return {"range_g": settings.range_g, "oversample": settings.reads}
 
     def recorded(self, said: RecordedWords, settings: Bma220Config, is_given: bool) -> Bma220Config:
@@ -457,7 +453,6 @@ class _Bma220(Accelerometer[Bma220Config]):
         return [registers[k: k + SAMPLE_BYTES] for k in range(0, len(registers), SAMPLE_BYTES)]
 
     def advice(self, state: str) -> str:
-        """What to look at."""
         return "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
 
 

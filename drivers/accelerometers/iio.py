@@ -108,7 +108,6 @@ class IioSource:
                 "evenly, and some may come twice (see docs/installation.md)")
 
     def open(self) -> None:
-        """Find the device and set it up."""
         settings = self._settings
         self._device = IioDevice(self._machine.root, settings.device, settings.rate_hz, settings.scale_mps2)
         self._description = self._device.describe()
@@ -144,14 +143,12 @@ class IioSource:
         return events
 
     def rest(self) -> None:
-        """Until the next look."""
         if self._values:
             self._deadlines.wait()
         else:
             self._scans.rest()
 
     def flush(self) -> list[Event]:
-        """Nothing is held back."""
         return []
 
     def close(self) -> None:
@@ -230,7 +227,6 @@ class IioDecoder:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What came in so far."""
         found = dict(self._before)
         if self._dated is not None:
             clock = self._dated.clock
@@ -327,7 +323,6 @@ class _Iio(Accelerometer[IioConfig]):
     }
 
     def place(self, settings: IioConfig) -> str:
-        """The kernel's device."""
         return f"/sys/bus/iio/devices ({settings.device})"
 
     def source(self, settings: IioConfig, machine: Machine) -> Source:
@@ -335,7 +330,6 @@ class _Iio(Accelerometer[IioConfig]):
         return IioSource(settings, machine)
 
     def decoder(self, settings: IioConfig, upright_axis: int) -> IioDecoder:
-        """By the descriptions that come."""
         return IioDecoder(settings)
 
     def readings(self, settings: IioConfig) -> ReadingQuality:
@@ -363,7 +357,6 @@ class _Iio(Accelerometer[IioConfig]):
                        noise_mps2=settings.noise_mps2 if is_given else noise_mps2)
 
     def advice(self, state: str) -> str:
-        """What to look at."""
         return ("check that the kernel has it (ls /sys/bus/iio/devices; dmesg), its overlay in "
                 "/boot/firmware/config.txt, and its wires")
 

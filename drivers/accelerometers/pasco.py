@@ -23,6 +23,7 @@ import numpy.typing as npt
 from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
+from drivers.plain_yaml import Node
 from drivers.readings import (
     BAUDS,
     STANDARD_GRAVITY_MPS2,
@@ -31,7 +32,6 @@ from drivers.readings import (
     Kind,
     OrNone,
     RecordedWords,
-    SettingNode,
     Special,
     Text,
 )
@@ -205,7 +205,6 @@ class PascoDecoder:
 
     @property
     def counts(self) -> dict[str, int]:
-        """The same by name."""
         return asdict(self.counters)
 
     def feed(self, t_us: int, data: bytes) -> None:
@@ -228,19 +227,19 @@ class PascoDecoder:
         return self._samples.take()
 
 
-def _profile_name(node: SettingNode) -> str:
+def _profile_name(node: Node) -> str:
     """The name of a shipped profile, or a path, relative to the folder of the settings."""
     is_path = "/" in node.text() or node.text().endswith((".yaml", ".yml"))
     return str(node.path()) if is_path else node.text()
 
 
-def _calibration(node: SettingNode) -> ScaleCalibration:
+def _calibration(node: Node) -> ScaleCalibration:
     axes = node.mapping(required=("x", "y", "z"))
     zeros_raw, ones_raw = zip(*(_counts_at_0_and_1_g(axes[axis]) for axis in "xyz"), strict=True)
     return ScaleCalibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
 
 
-def _counts_at_0_and_1_g(node: SettingNode) -> tuple[float, float]:
+def _counts_at_0_and_1_g(node: Node) -> tuple[float, float]:
     """Two points of an axis, extended to the counts at 0 and at 1 g."""
     largest_count = 65536
     least_step_g = 0.1
@@ -293,7 +292,6 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
                                 "accept_unverified: true as well to use it all the same", "profile")
 
     def line(self, settings: PascoConfig) -> tuple[str, int]:
-        """Port and baud rate."""
         return settings.port, settings.baud
 
     def decoder(self, settings: PascoConfig, upright_axis: int) -> PascoDecoder:
@@ -305,7 +303,6 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
         return ReadingQuality(NOISE_MPS2)
 
     def facts(self, settings: PascoConfig) -> dict[str, Any]:
-        """Profile and calibration."""
         profile = load_profile(settings.profile)
         return {"profile": profile.name, "profile_version": profile.version, "verified": profile.verified,
                 "calibration": asdict(settings.calibration) if settings.calibration else None}

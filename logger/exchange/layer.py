@@ -145,7 +145,6 @@ class Layer:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the columns."""
         return tuple(field.name for field in self.fields)
 
     def printable(self) -> Layer:

@@ -88,7 +88,6 @@ class DatasetManifest:
 
     @property
     def rows(self) -> int:
-        """In all files."""
         return sum(one.rows for one in self.commits)
 
 
@@ -101,7 +100,6 @@ class Dataset:
 
     @property
     def is_new(self) -> bool:
-        """Nothing has been committed."""
         return not (self.folder / _MANIFEST).exists()
 
     def files(self, since_us: int | None = None, until_us: int | None = None) -> list[Path]:

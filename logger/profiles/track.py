@@ -170,7 +170,6 @@ class Track:
         return self.elevation_m.ndim == 2
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
-        """As ``WheelTracks``."""
         return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
 
     def resurfaced(self, surface: Alterations) -> Track:

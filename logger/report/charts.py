@@ -76,7 +76,6 @@ class _Frame:
         return self.box.top + (self.box.bottom_px - self.box.top) * (1 - share)
 
     def points(self, points: Iterable[Point]) -> list[str]:
-        """Points of a path."""
         return [f"{self.x(x):.1f} {self.y(y):.1f}" for x, y in points]
 
     def across(self, style: str, value: float) -> Html:
@@ -141,7 +140,6 @@ def nice_step(least: float) -> float:
 
 
 def chart(one: Chart) -> Html:
-    """The figure element of a chart."""
     if isinstance(one, Bars):
         return _bars(one)
     return _figure(_CHART, one.title, _field(one) if isinstance(one, Field) else _curves(one))

@@ -199,7 +199,6 @@ def number_button(row: int, number: int) -> Html:
 
 
 def _numbers(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> list[int]:
-    """Which rows the places are."""
     rows = {(along, record.iri_m_per_km): index
             for index, (along, record) in enumerate(zip(along_m(records), records, strict=True))}
     return [rows[place.along_m, place.iri_m_per_km] for place in places]
@@ -255,7 +254,6 @@ def _warning(text: str) -> Html:
 
 
 def _sensor_note(sensor: Any) -> str:
-    """A sentence on the accelerometer."""
     if not isinstance(sensor, Mapping):
         return f"Sensor: {sensor}"
     name = " ".join(str(sensor[key]) for key in ("driver", "profile", "profile_version") if key in sensor)
@@ -322,7 +320,6 @@ def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources:
 
 
 def _choice(drives: Sequence[str]) -> Html:
-    """All drives, or one of them."""
     if len(drives) < 2:
         return EMPTY
     options = concatenated(html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)

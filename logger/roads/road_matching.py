@@ -553,7 +553,6 @@ class _Lists:
 
     @classmethod
     def of(cls, network: RoadNetwork, found: Candidates, count: int) -> _Lists:
-        """Those of so many windows."""
         u_east, u_north = network.plane_heading()
         e, n = u_east[found.point], u_north[found.point]
         return cls(np.searchsorted(found.window, np.arange(count + 1)).tolist(), network.way[found.point].tolist(),

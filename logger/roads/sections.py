@@ -80,7 +80,6 @@ class WindowErrors:
                 np.where(possible, self.place_std, 0.0))
 
     def of(self, rows: Ints) -> WindowErrors:
-        """Those of some windows."""
         return WindowErrors(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
@@ -198,7 +197,6 @@ class SectionWindows:
     mean_square: Array
 
     def of(self, rows: npt.NDArray[np.intp]) -> SectionWindows:
-        """Some of them."""
         return SectionWindows(self.start_m[rows], self.end_m[rows], self.duration_s[rows], self.iri_m_per_km[rows],
                               self.iri_errors.of(rows), self.mean_square[rows])
 

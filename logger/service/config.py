@@ -50,12 +50,10 @@ class AccelerometerConfig:
 
     @property
     def kind(self) -> Accelerometer[Any]:
-        """What ``driver`` names."""
         return accelerometers()[self.driver]
 
     @property
     def settings(self) -> Any:
-        """The settings of ``driver``."""
         return self.sections[self.driver]
 
 

@@ -1,4 +1,6 @@
-"""Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed."""
+"""Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed; and what
+readings and fixes are judged by as they come.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,9 @@ import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
+from logger.estimation.drive_alignment import DriveAlignment
 from logger.geodesy import ground_distance_m
-from logger.service.timebase import TimedFix
+from logger.service.timebase import Timebase, TimedFix
 from logger.units import US_PER_S
 
 _KEPT = 64
@@ -80,7 +83,6 @@ class Stillness:
         self._lasting = False
 
     def take(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> None:
-        """More of both."""
         for fix in fixes:
             self._take_fix(fix)
         if len(block):
@@ -155,7 +157,6 @@ class Repetition:
         self.share = 0.0
 
     def take(self, block: AccelerationBlock) -> None:
-        """More of them."""
         if not len(block):
             return
         self._t_us = np.concatenate([self._t_us, block.t_us])
@@ -317,3 +318,35 @@ def _apart_m(one: TimedFix, other: TimedFix) -> float:
     if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
         return 0.0
     return ground_distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
+
+
+class JudgedDrive:
+    """When each fix was, how late the receiver is (``alignment``), and what is not believed, by readings and fixes in
+    order of time; ``latency_s``: what the receiver's times are taken to be late by [s]."""
+
+    def __init__(self, alignment: DriveAlignment, latency_s: float) -> None:
+        self._latency_s = latency_s
+        self.alignment = alignment
+        self.timebase = Timebase(latency_s)
+        self.stillness = Stillness()
+        self.repetition = Repetition()
+        self.speed_check = SpeedCheck()
+
+    def judge(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> list[TimedFix]:
+        """More of both; gives the fixes with their times."""
+        timed = []
+        for fix in fixes:
+            one = self.timebase.place(fix)
+            timed.append(one)
+            self.speed_check.take(one)
+            if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
+                self.alignment.take_fix(one.t_us / US_PER_S + self._latency_s, fix.speed_mps)
+        self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
+        self.stillness.take(block, fixes)
+        self.repetition.take(block)
+        return timed
+
+    def doubted(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """Tell of instants (n,) [us] whether what was read at them is not believed."""
+        return (self.stillness.spans.during(t_us) | self.repetition.spans.during(t_us)
+                | self.speed_check.spans.during(t_us))

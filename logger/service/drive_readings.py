@@ -25,9 +25,9 @@ from drivers.readings import AccelerationBlock, Fix
 from logger.dsp.windows import GridSamples, joined
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.records import WindowRecord
-from logger.service.doubted_spans import MOVING_MPS, Repetition, SpeedCheck, Stillness
+from logger.service.doubted_spans import MOVING_MPS, JudgedDrive
 from logger.service.signal_chain import SignalChain
-from logger.service.timebase import Timebase, TimedFix
+from logger.service.timebase import TimedFix
 from logger.units import US_PER_S
 
 CLIPPED_SHARE = 0.2
@@ -49,7 +49,6 @@ class RangeUse:
         self._windows = self._clipped = self._hidden = 0
 
     def take(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> None:
-        """More readings and fixes."""
         for fix in fixes:
             if fix.valid and fix.speed_mps is not None:
                 self._moves = fix.speed_mps > MOVING_MPS
@@ -111,41 +110,27 @@ class GridReadings:
     clipped: npt.NDArray[np.bool_]
 
 
-class DriveReadings:
+class DriveReadings(JudgedDrive):
     """Keeps what a replay gives. ``alignment`` learns of it how late the receiver is."""
 
     drive = 1
 
     def __init__(self, chain: SignalChain, alignment: DriveAlignment, latency_s: float) -> None:
+        super().__init__(alignment, latency_s)
         self._chain = chain
-        self._latency_s = latency_s
         self._parts: list[GridSamples] = []
         self._fresh: list[GridSamples] = []
         self._start_us: int | None = None
-        self._stillness = Stillness()
         self.fixes: list[TimedFix] = []
-        self.alignment = alignment
-        self.repetition = Repetition()
-        self.speed_check = SpeedCheck()
-        self.timebase = Timebase(latency_s)
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
-        """As ``Pipeline.step``."""
         if self._start_us is None:
             self._start_us = now_us
-        for fix in fixes:
-            timed = self.timebase.place(fix)
-            self.fixes.append(timed)
-            self.speed_check.take(timed)
-            if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
-                self.alignment.take_fix(timed.t_us / US_PER_S + self._latency_s, fix.speed_mps)
-        self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
-        self._stillness.take(block, fixes)
-        self.repetition.take(block)
+        self.fixes += self.judge(block, fixes)
         self._fresh += [part for part in self._chain.push(block) + self._chain.advance(self._start_us, now_us)
                         if len(part)]
         while self._fresh and self._fresh[0].t_us[-1] < now_us - _JUDGED_AFTER_US:
-            self._judge(self._fresh.pop(0))
+            self._keep(self._fresh.pop(0))
         return []
 
     def is_settled(self, stepped_us: int, heard_us: int) -> bool:
@@ -153,13 +138,11 @@ class DriveReadings:
         return stepped_us - heard_us > US_PER_S
 
     def skip_to(self, t_us: int) -> None:
-        """As ``Pipeline.skip_to``."""
         self._fresh += [part for part in self._chain.skip_to(t_us) if len(part)]
 
     def finish(self) -> list[WindowRecord]:
-        """As ``Pipeline.finish``."""
         for part in self._fresh + self._chain.flush():
-            self._judge(part)
+            self._keep(part)
         self._fresh = []
         return []
 
@@ -172,9 +155,7 @@ class DriveReadings:
         return GridReadings(samples.t_us / US_PER_S, samples.reading_mps2, samples.present & ~samples.interpolated,
                             samples.clipped)
 
-    def _judge(self, part: GridSamples) -> None:
+    def _keep(self, part: GridSamples) -> None:
         """Keep readings, as missing where the sensor or the speed is known by now not to have been right."""
         if len(part):
-            doubtful = self._stillness.spans.during(part.t_us) | self.repetition.spans.during(part.t_us)
-            doubtful |= self.speed_check.spans.during(part.t_us)
-            self._parts.append(replace(part, present=part.present & ~doubtful))
+            self._parts.append(replace(part, present=part.present & ~self.doubted(part.t_us)))

@@ -60,8 +60,8 @@ class EventCore:
     """
 
     def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Stepped, sink: RowSink) -> None:
-        self._accelerometer = accelerometer
-        self._gps = gps
+        self.accelerometer = accelerometer
+        self.gps = gps
         self._pipeline = pipeline
         self._sink = sink
         self._fixes: list[Fix] = []
@@ -83,7 +83,7 @@ class EventCore:
         t_us, source, data = event
         if self._next_step_us is None:
             self._next_step_us = t_us + STEP_US
-            self._gps.line.begin(t_us)
+            self.gps.line.begin(t_us)
         elif t_us >= self._next_step_us:
             self.advance(t_us)
         self._last_event_us = t_us
@@ -92,13 +92,13 @@ class EventCore:
             self.bad_events += 1
             return
         if source == GPS:
-            self._fixes += self._gps.feed(t_us, data)
+            self._fixes += self.gps.feed(t_us, data)
             return
-        if source != self._accelerometer.name:
+        if source != self.accelerometer.name:
             self.bad_events += 1
             return
         try:
-            self._accelerometer.feed(t_us, data)
+            self.accelerometer.feed(t_us, data)
         except BadReply as error:
             self.bad_events += 1
             log.warning("event at %.6f s passed over: %s", t_us / 1e6, error)
@@ -133,8 +133,8 @@ class EventCore:
     def finish(self) -> None:
         """End of the events: what is inside comes out, the log is closed."""
         if self._next_step_us is not None:
-            self._fixes += self._gps.flush()
-            self._accelerometer.flush()
+            self._fixes += self.gps.flush()
+            self.accelerometer.flush()
             self._write(self._pipeline.step(self._next_step_us, self._take_block(), self._take_fixes()))
             self._write(self._pipeline.finish())
         self._sink.close()
@@ -147,33 +147,18 @@ class EventCore:
     @property
     def accelerometer_doubt(self) -> str:
         """What is wrong with the samples that come; empty: nothing."""
-        return self._accelerometer.doubt or self._pipeline.repetition.doubt
-
-    @property
-    def accelerometer_note(self) -> str:
-        """How its samples come, where a person should know of it; empty: as they should."""
-        return self._accelerometer.note
-
-    @property
-    def accelerometer_unread(self) -> str:
-        """What arrives and what to do, where bytes arrive and no sample comes of them."""
-        return self._accelerometer.unread
-
-    @property
-    def gps_unread(self) -> str:
-        """The same of fixes."""
-        return self._gps.unread
+        return self.accelerometer.doubt or self._pipeline.repetition.doubt
 
     @property
     def gps_doubt(self) -> str:
         """What is wrong with the fixes that come; empty: nothing."""
         if self.last_fix is None or not self.last_fix.valid:
             return ""
-        return self._gps.doubt or self._lateness() or self._pipeline.speed_check.doubt
+        return self.gps.doubt or self._lateness() or self._pipeline.speed_check.doubt
 
     def _lateness(self) -> str:
         """That fixes come late, why, and what to do; empty: they do not."""
-        line, timebase = self._gps.line, self._pipeline.timebase
+        line, timebase = self.gps.line, self._pipeline.timebase
         late = f"its fixes come {timebase.late_us / US_PER_S:.1f} s late"
         if timebase.unsure_until_us is not None:
             late = "nobody knows how late its fixes come, and their rows are flagged gps_late"
@@ -188,7 +173,7 @@ class EventCore:
         return f"{late}: something delays them. Have it send less: RMC and GGA are enough"
 
     def _take_block(self) -> AccelerationBlock:
-        block = self._accelerometer.take()
+        block = self.accelerometer.take()
         self.samples += len(block)
         if len(block):
             self.last_block = block

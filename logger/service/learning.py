@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import degrees, log
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment, heading_deg
@@ -28,6 +28,9 @@ from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, Accel
 from logger.service.signal_chain import Axis
 from logger.store.log.atomic_file import replace_file
 from logger.units import US_PER_S
+
+if TYPE_CHECKING:
+    from logger.service.pipeline import Pipeline
 
 SAVE_EVERY_US = 120 * US_PER_S
 LEAST_STD_SHARE = 1e-3
@@ -170,15 +173,6 @@ def _drives_words(drives: int) -> str:
     return "learnt over 1 drive" if drives == 1 else f"learnt over {drives} drives"
 
 
-class LearnsNoise(Protocol):
-    """That which learns while it drives."""
-
-    @property
-    def noise(self) -> NoiseBelief | None: ...
-    @property
-    def noise_stretches(self) -> int: ...
-
-
 def read_noise(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
     """What earlier drives left of this sensor as it is set; None where there is nothing that can be read."""
     return NOISE.read(folder, lambda fields: fields.get(_OF) == _identity(config))
@@ -202,7 +196,7 @@ def _identity(config: AccelerometerConfig) -> dict[str, Any]:
 class NoiseLearning(CarriedLearning[KnownNoise]):
     """Of the accelerometer's noise, by a ``pipeline`` that learns it; ``config`` of the accelerometer."""
 
-    def __init__(self, folder: Path, pipeline: LearnsNoise, config: AccelerometerConfig, known: KnownNoise | None,
+    def __init__(self, folder: Path, pipeline: Pipeline, config: AccelerometerConfig, known: KnownNoise | None,
                  files: FileSystem | None = None) -> None:
         super().__init__(NOISE, folder, known, files)
         self._pipeline, self._config = pipeline, config

@@ -37,7 +37,6 @@ class EventMerger:
         self._waiting: list[Event] = []
 
     def add(self, events: Iterable[Event]) -> None:
-        """More events, of any source."""
         self._waiting.extend(events)
 
     def until(self, until_us: int) -> list[Event]:
@@ -98,7 +97,7 @@ class Listener(threading.Thread):
     def look(self) -> None:
         """Once. What comes is in the queue before ``waiting_since_us`` says that it does not wait any more."""
         self._events.extend(self._supervisor.step())
-        self.waiting_since_us = self._supervisor.waiting_since_us
+        self.waiting_since_us = self._supervisor.source.waiting_since_us
 
     def stop(self) -> None:
         """Ask it to end and wait for it, but not for one that hangs in its device."""

@@ -29,10 +29,10 @@ from logger.estimation.sensor_noise import NoiseBelief
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
-from logger.service.doubted_spans import Repetition, SpeedCheck, Stillness
+from logger.service.doubted_spans import JudgedDrive
 from logger.service.drive_readings import RangeUse
 from logger.service.signal_chain import GRID_STEP_US, ComfortColumns, SignalChain
-from logger.service.timebase import Odometer, Timebase
+from logger.service.timebase import Odometer
 from logger.units import US_PER_S
 
 
@@ -68,23 +68,8 @@ class RoughnessQueue:
         self._take(self._estimator.finish())
         self._leg = None  # what waits from here on has no estimate to wait for
 
-    def next_drive(self) -> None:
-        """The drive has ended."""
-        self._estimator.next_drive()
-
-    @property
-    def noise(self) -> NoiseBelief | None:
-        """What is believed of the sensor's noise now; None where it is not learnt."""
-        return self._estimator.noise
-
-    @property
-    def noise_stretches(self) -> int:
-        """From how many stretches of road that was learnt."""
-        return self._estimator.noise_stretches
-
     @property
     def is_empty(self) -> bool:
-        """No window waits."""
         return not self._queue
 
     def add(self, waiting: list[Waiting]) -> None:
@@ -152,15 +137,17 @@ def longest_wait_us(bridge_s: float) -> int:
     return round(bridge_s * US_PER_S) + FIX_DELAY_US + LONGEST_LAG_US
 
 
-class Pipeline:
+class Pipeline(JudgedDrive):
     """The whole way from readings to records of one service run. ``alignment``, the use of the range and the
     spectra that are kept learn beside it and change no row."""
 
     def __init__(self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
                  alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse,
                  spectra: SpectraKeeper) -> None:
+        super().__init__(alignment, settings.latency_s)
         self._settings = settings
         self._chain = chain
+        self._estimator = estimator
         self._relation = relation
         self._comfort = comfort
         self._roughness = RoughnessQueue(estimator)
@@ -173,12 +160,7 @@ class Pipeline:
         self._segment = 0
         self._leg = _BLIND
         self.drive = 1
-        self.timebase = Timebase(settings.latency_s)
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
-        self.stillness = Stillness()
-        self.repetition = Repetition()
-        self.speed_check = SpeedCheck()
-        self.alignment = alignment
         self.range_use = range_use
         self._spectra = spectra
 
@@ -195,26 +177,19 @@ class Pipeline:
     @property
     def noise(self) -> NoiseBelief | None:
         """What is believed of the accelerometer's noise now; None where it is not learnt."""
-        return self._roughness.noise
+        return self._estimator.noise
 
     @property
     def noise_stretches(self) -> int:
         """From how many stretches of road that was learnt."""
-        return self._roughness.noise_stretches
+        return self._estimator.noise_stretches
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
         if self._start_us is None:
             self._start_us = now_us
-        for fix in fixes:
-            timed = self.timebase.place(fix)
+        for timed in self.judge(block, fixes):
             self.odometer.add(timed)
-            self.speed_check.take(timed)
-            if fix.valid and fix.speed_mps is not None and self.timebase.unsure_until_us is None:
-                self.alignment.take_fix(timed.t_us / US_PER_S + self._settings.latency_s, fix.speed_mps)
-        self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
-        self.stillness.take(block, fixes)
-        self.repetition.take(block)
         self.range_use.take(block, fixes)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
@@ -225,7 +200,7 @@ class Pipeline:
         records = self._records()
         if ended:
             self._active_us = None
-            self._roughness.next_drive()
+            self._estimator.next_drive()
             self.drive += 1
         self._forget()
         return records
@@ -302,9 +277,7 @@ class Pipeline:
             moving = np.flatnonzero(speed_mps > 0.0)
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
-            doubtful = self.stillness.spans.during(part.t_us) | self.speed_check.spans.during(part.t_us)
-            doubtful |= self.repetition.spans.during(part.t_us)
-            believed = replace(part, present=part.present & ~doubtful)
+            believed = replace(part, present=part.present & ~self.doubted(part.t_us))
             self._spectra.push(part.reading_mps2, speed_mps, believed.present & ~part.interpolated)
             self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))

@@ -118,7 +118,6 @@ class StatusReporter:
         return f"stopped: {self.rows_on_disk} rows written{why}"
 
     def line(self) -> str:
-        """The state in one line."""
         distance_km = self._pipeline.odometer.total_m / 1000.0
         sensors = ", ".join(f"{name} {part.state()}" for name, part in self._sensors.items())
         trouble = f", NOT WRITING: {self._storage.log.trouble}" if self._storage.log.trouble else ""
@@ -158,7 +157,7 @@ class StatusReporter:
             sensor_noise_mps2=noise.belief.noise_rms_mps2 if noise is not None else None,
             sensor_noise_std_mps2=noise.belief.std_mps2 if noise is not None else None,
             counters={
-                "missed_samples": self._sensors["accelerometer"].missed,
+                "missed_samples": self._sensors["accelerometer"].source.missed,
                 "late_samples": self._pipeline.late_samples,
                 "crowded_samples": self._pipeline.crowded_samples,
                 "bad_events": self._core.bad_events,
@@ -205,8 +204,8 @@ class StatusReporter:
         if state == "ok" and reported:
             return reported
         if unread_s >= UNREADABLE_S:
-            unread = self._core.accelerometer_unread if is_accelerometer else self._core.gps_unread
-            return f"for {unread_s:.0f} s: {unread}"
+            decoder = self._core.accelerometer if is_accelerometer else self._core.gps
+            return f"for {unread_s:.0f} s: {decoder.unread}"
         if state != "ok" or not is_accelerometer:
             return None
         frozen_s = self._pipeline.stillness.frozen_s
@@ -233,9 +232,9 @@ class StatusReporter:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=doubt or part.error or None,
             readings=readings,
-            note=part.note or (self._core.accelerometer_note if name == "accelerometer" else ""),
+            note=part.source.note or (self._core.accelerometer.note if name == "accelerometer" else ""),
             counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
-                      "dropped_readings": part.dropped, **self._counters[name]()},
+                      "dropped_readings": part.source.dropped, **self._counters[name]()},
         )
 
 

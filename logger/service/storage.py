@@ -80,13 +80,11 @@ class Storage:
             self._recording.tend()
 
     def close(self) -> None:
-        """End the files."""
         self.log.close()
         if self._recording is not None:
             self._recording.close()
 
     def status(self) -> StorageStatus:
-        """How things stand."""
         trouble = self.log.trouble
         return StorageStatus(
             trouble=trouble,

@@ -38,7 +38,7 @@ class Supervisor:
     """
 
     def __init__(self, source: Source, now_us: Callable[[], int]) -> None:
-        self._source = source
+        self.source = source
         self._now_us = now_us
         self._is_open = False
         self._seen = False
@@ -53,26 +53,6 @@ class Supervisor:
         self.restarts = 0
         self.faults = 0
         self.settings_lost = 0
-
-    @property
-    def dropped(self) -> int:
-        """Readings left out because the device did not vouch for them in the end."""
-        return self._source.dropped
-
-    @property
-    def missed(self) -> int:
-        """Looks at the device that came too late to be made."""
-        return self._source.missed
-
-    @property
-    def note(self) -> str:
-        """What a person should know of how the device is read; empty: nothing."""
-        return self._source.note
-
-    @property
-    def waiting_since_us(self) -> int | None:
-        """Time of the oldest reading that may still come [us]; None: none is held back."""
-        return self._source.waiting_since_us
 
     @property
     def retry_at_us(self) -> int | None:
@@ -95,7 +75,7 @@ class Supervisor:
             return []
         try:
             with as_device_error():
-                events = self._source.poll()
+                events = self.source.poll()
         except SettingsLost as error:
             self._lost(error)
             return []
@@ -114,7 +94,7 @@ class Supervisor:
         """What the device holds back, as far as it vouches for it."""
         events: list[Event] = []
         with suppress(DeviceError), as_device_error():
-            events = self._source.flush()
+            events = self.source.flush()
         return events
 
     def restart(self, doubt: str) -> None:
@@ -133,7 +113,7 @@ class Supervisor:
             return False
         try:
             with as_device_error():
-                self._source.open()
+                self.source.open()
         except DeviceError as error:
             self._give_up(error, now_us)
             return False
@@ -175,4 +155,4 @@ class Supervisor:
     def _let_go(self) -> None:
         self._is_open = False
         with suppress(DeviceError), as_device_error():
-            self._source.close()
+            self.source.close()

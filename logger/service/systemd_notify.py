@@ -50,13 +50,11 @@ class Stop:
         self._asked = False
 
     def set(self) -> None:
-        """Ask for it."""
         self._asked = True
         with contextlib.suppress(BlockingIOError):  # a full pipe holds the request already
             os.write(self._writer, b"!")
 
     def is_set(self) -> bool:
-        """Whether it was asked for."""
         return self._asked
 
     def wait(self, seconds: float) -> bool:
@@ -121,7 +119,6 @@ class Notifier:
         self._send("STATUS=" + " ".join(text.split()))
 
     def stopping(self) -> None:
-        """The service has begun to stop."""
         self._send("STOPPING=1")
 
     def close(self) -> None:

@@ -69,7 +69,6 @@ class FileCheck:
 
     @property
     def ok(self) -> bool:
-        """True when nothing is wrong."""
         return not self.problems
 
 

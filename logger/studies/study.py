@@ -315,7 +315,6 @@ class Study:
 
     @property
     def covers(self) -> tuple[str, ...]:
-        """Names of its items."""
         return tuple(one.name for one in self.items)
 
     @property

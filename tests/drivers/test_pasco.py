@@ -109,28 +109,28 @@ def test_a_profile_of_ones_own(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"version": None}, "version: expected a whole number"),
-        ({"version": "one"}, "version: expected a whole number"),
-        ({"verified": "no idea"}, "verified: expected true or false"),
-        ({"name": 3}, "name: expected text"),
-        ({"framing": "packets"}, "framing: expected frames or lines"),
-        ({"framing": ["frames"]}, "framing: expected frames or lines"),
-        ({"framing": "lines"}, "line: expected keys with values"),
-        ({"rate_hz": 0}, "rate_hz: expected a number from 1 to 10000"),
-        ({"rate_hz": float("nan")}, "rate_hz: expected a number"),
-        ({"rate_hz": True}, "rate_hz: expected a number"),
-        ({"speed": 3}, "speed: expected no such key"),
-        ({"frame": 3}, "frame: expected keys with values"),
-        ({"frame__speed": 3}, "frame.speed: expected no such key"),
-        ({"frame__length_bytes": 5}, "frame.length_bytes: expected a whole number from 6"),
-        ({"frame__sync": "xy"}, "frame.sync: expected bytes in hex"),
-        ({"frame__sync": "aa"}, "frame.sync: expected start bytes that leave"),
-        ({"frame__word": "f32"}, "frame.word: expected u16le or"),
-        ({"frame__offsets": [0, 2, 5]}, "frame.offsets: expected a list of 3 whole numbers from 0 to 4"),
-        ({"frame__offsets": [0, 2]}, "frame.offsets: expected a list of 3"),
-        ({"frame__valid_raw": [7400, 800]}, "frame.valid_raw: expected the lower count first"),
-        ({"frame__upright_axis": "up"}, "frame.upright_axis: expected x or y or z or none"),
-        ({"frame__one_g_raw": [4096, 4424, 4424]}, "frame.one_g_raw: expected counts that differ"),
+        ({"version": None}, "expected the key 'version' here, it is missing"),
+        ({"version": "one"}, "expected a whole number from 1 to 1e+06, found 'one' for 'version'"),
+        ({"verified": "no idea"}, "expected true or false, found 'no idea' for 'verified'"),
+        ({"name": [3]}, "expected a text, found a list for 'name'"),
+        ({"framing": "packets"}, "expected one of frames, lines, found 'packets' for 'framing'"),
+        ({"framing": ["frames"]}, "expected one of frames, lines, found a list for 'framing'"),
+        ({"framing": "lines"}, "expected one of the keys name,"),
+        ({"rate_hz": 0}, "expected a number from 1 to 10000, found '0' for 'rate_hz'"),
+        ({"rate_hz": float("nan")}, "expected a number from 1 to 10000, found '.nan' for 'rate_hz'"),
+        ({"rate_hz": True}, "expected a number from 1 to 10000, found 'true' for 'rate_hz'"),
+        ({"speed": 3}, "expected one of the keys name, version, verified,"),
+        ({"frame": 3}, "expected a mapping (key: value lines), found '3' for 'frame'"),
+        ({"frame__speed": 3}, "expected one of the keys length_bytes, sync,"),
+        ({"frame__length_bytes": 5}, "expected a whole number from 6 to 256, found '5' for 'length_bytes'"),
+        ({"frame__sync": "xy"}, "expected bytes in hex, or empty, found 'xy' for 'sync'"),
+        ({"frame__sync": "aa"}, "expected start bytes that leave"),
+        ({"frame__word": "f32"}, "expected one of u16le, u16be, i16le, i16be, found 'f32' for 'word'"),
+        ({"frame__offsets": [0, 2, 5]}, "expected a whole number from 0 to 4, found '5'"),
+        ({"frame__offsets": [0, 2]}, "expected a list of 3 numbers, found a list for 'offsets'"),
+        ({"frame__valid_raw": [7400, 800]}, "expected the lower count first, found a list for 'valid_raw'"),
+        ({"frame__upright_axis": "up"}, "expected one of x, y, z, none, found 'up' for 'upright_axis'"),
+        ({"frame__one_g_raw": [4096, 4424, 4424]}, "expected counts that differ"),
     ],
 )
 def test_a_bad_profile_is_refused_by_file_and_key(tmp_path, changes, says):
@@ -139,8 +139,8 @@ def test_a_bad_profile_is_refused_by_file_and_key(tmp_path, changes, says):
         load_profile(path)
     place, line, complaint = str(caught.value).split(":", 2)
     assert place == str(path)
-    assert complaint.startswith(f" {says}")
-    key = says.split(":")[0].split(".")[-1]
+    assert says in complaint
+    key = complaint.rsplit("'", 2)[-2]
     lines = path.read_text().splitlines()
     assert key in lines[int(line) - 1] or not any(text.strip().startswith(key) for text in lines)
     assert "\n" not in str(caught.value)

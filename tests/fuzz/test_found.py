@@ -42,7 +42,7 @@ def header(**changes: str) -> str:
     (load_profile, "a: 1\nname: !!bool x\n", ":2: "),
     (load_profile, "name: !!timestamp x\n", ":1: "),
     (load_profile, 'a: 1\nname: "\\UFFFFFFFFF"\n', ":2: "),
-    (load_profile, "a: " + "1:" * 200 + "1.5\n", ": "),
+    (load_profile, "a: " + "1:" * 200 + "1.5\n", ":1: "),
     (load_profile, "a: &a {b: 1}\nc: {<<: *a}\n", ":2: "),
     (load_profile, "a: 1\na: 2\n", ":2: "),
     (load_profile, "framing: 1\n" + "k" * 5000 + ": 1\n", ":2: "),
@@ -97,7 +97,7 @@ def test_every_complaint_about_a_profile_names_its_line(tmp_path: Path) -> None:
     assert "ps2119" in shipped_profiles()
     path.write_text(text.replace("offsets: [0, 2, 4]", "offsets: [0, 2]"))
     line = 1 + path.read_text()[: path.read_text().index("offsets")].count("\n")
-    with pytest.raises(SettingsError, match=rf"mine\.yaml:{line}: frame\.offsets: expected"):
+    with pytest.raises(SettingsError, match=rf"mine\.yaml:{line}: expected a list of 3 numbers, found a list for 'offsets'"):
         load_profile(path)
 
 

@@ -222,7 +222,7 @@ def test_another_device_in_its_place_is_refused_in_one_line(name: str, ride: Cal
     progress = ReadingProgress()
     speaks = driven.supervisor.error == ""
     unread_s = [progress.unread_s(s * 1_000_000, speaks, core.samples) for s in range(15)][-1]
-    said = [driven.supervisor.error, core.accelerometer_unread if unread_s > 10 else ""]
+    said = [driven.supervisor.error, core.accelerometer.unread if unread_s > 10 else ""]
     reported = next(words for words in reversed(said) if words)
     assert re.search(driven.fake.wrong, reported)
     assert "\n" not in reported

@@ -65,7 +65,7 @@ def test_no_reading_from_after_a_dip_is_given_whichever_transfer_it_hits() -> No
         assert {event.data for event in events} == {bytes((1, FILTER_CODE_32_HZ, 64))}
         assert (supervisor.settings_lost, supervisor.restarts) == (1, 1)
         assert 200 - len(events) <= 32  # a quarter of a second, and the restart
-        assert supervisor.dropped <= 30
+        assert supervisor.source.dropped <= 30
 
 
 @pytest.mark.parametrize(("step_us", "most_per_s"), [(10_000, 17), (1_250, 17), (100_000, 10)])
@@ -78,7 +78,7 @@ def test_what_the_looks_cost(step_us: int, most_per_s: float) -> None:
     per_s = (bus.register_reads - start) / 10
     assert 9 < per_s <= most_per_s
     assert len(events) == 10_000_000 // step_us
-    assert supervisor.dropped == 0
+    assert supervisor.source.dropped == 0
 
 
 def test_a_chip_that_loses_its_settings_over_and_over_is_waited_for() -> None:

@@ -52,14 +52,67 @@ class LoggedSession:
     repeated: int = 0
 
 
+Pair = tuple[WindowRecord, WindowRecord]
+Measure = Callable[[WindowRecord, WindowRecord], float | None]
+
+
+def _of(attribute: str) -> Measure:
+    return lambda wanted, found: _apart(getattr(wanted, attribute), getattr(found, attribute))
+
+
+def _apart(wanted: float | None, found: float | None) -> float | None:
+    """None: neither side knows; infinite: one side does."""
+    if wanted is None and found is None:
+        return None
+    return inf if wanted is None or found is None else abs(found - wanted)
+
+
+def _time_of(attribute: str) -> Measure:
+    def measure(wanted: WindowRecord, found: WindowRecord) -> float | None:
+        apart_us = _apart(getattr(wanted, attribute), getattr(found, attribute))
+        return None if apart_us is None else apart_us / US_PER_S
+    return measure
+
+
+def _length_m(row: WindowRecord) -> float | None:
+    return None if row.distance_end_m is None or row.distance_start_m is None \
+        else row.distance_end_m - row.distance_start_m
+
+
+def _contradicts(said: str, meant: str) -> float:
+    return 0.0 if said == meant else inf
+
+
+def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    if "hidden" in found.flags:
+        return 0.0 if found.comfort in (LEAST_WORD, "") else inf
+    return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
+
+
+def _class_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    return _contradicts(found.iri_class, iri_class(found.iri_m_per_km) if found.iri_m_per_km is not None else "")
+
+
+def _place_apart_m(wanted: WindowRecord, found: WindowRecord) -> float | None:
+    """On the ground. None: neither side knows; infinite: one side does."""
+    if wanted.lat_deg is None or wanted.lon_deg is None or found.lat_deg is None or found.lon_deg is None:
+        known = (wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
+        return None if known == (None,) * len(known) else inf
+    return ground_distance_m(wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
+
+
 @dataclass(frozen=True)
 class RowTolerance:
-    """How far a quantity may differ: by ``least``, or by a share of ``of`` the expected row where that is more."""
+    """How far a quantity may differ: by ``least``, or by a share of ``of`` the expected row where that is more.
+
+    measure    how far two rows are apart in it; None: neither side knows it; infinite: one side does
+    """
 
     quantity: str
     unit: str
     least: float
     why: str
+    measure: Measure
     share: float = 0.0
     of: str = ""
 
@@ -69,37 +122,40 @@ class RowTolerance:
         return max(self.least, self.share * scale) if scale is not None else self.least
 
 
-_IRI_ERRORS = {"IRI std": "iri_std_m_per_km", "IRI level std": "iri_level_std_m_per_km",
-               "IRI common std": "iri_common_std_m_per_km", "IRI place std": "iri_place_std_m_per_km"}
+def _scaled(quantity: str, unit: str, why: str, share: float, column: str, least: float = 0.03) -> RowTolerance:
+    """Of a column by a share of itself."""
+    return RowTolerance(quantity, unit, least, why, _of(column), share, column)
+
+
 _COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("VDV", "vdv", "m/s1.75", "mps175"))
 
 TOLERANCES = (
-    RowTolerance("start", "s", 0.03, "three steps of the sample grid"),
-    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by"),
-    RowTolerance("duration", "s", 0.05, "a start and an end"),
-    RowTolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s"),
-    RowTolerance("length", "m", 0.75, "as the distance"),
-    RowTolerance("place", "m", 1.0, "as the distance, and the digits of the log"),
-    RowTolerance("speed", "m/s", 0.1, "0.03 s of braking at 3 m/s2"),
-    RowTolerance("a_w", "m/s2", 0.03, "one sample in thirty belongs to the next window", share=0.1, of="a_w_mps2"),
-    RowTolerance("accel rms", "m/s2", 0.03, "as a_w", share=0.1, of="accel_rms_mps2"),
-    RowTolerance("MTVV", "m/s2", 0.03, "as a_w; its greatest second may end in the next window", share=0.15,
-              of="mtvv_mps2"),
-    RowTolerance("VDV", "m/s1.75", 0.03, "as a_w", share=0.15, of="vdv_mps175"),
-    *(RowTolerance(f"{name} std", unit, 0.03, f"as {name}", share=0.25, of=f"{column}_std_{suffix}")
-      for name, column, unit, suffix in _COMFORT),
-    *(RowTolerance(f"{name} raw", unit, 0.03, f"as {name}", share=0.15, of=f"{column}_raw_{suffix}")
-      for name, column, unit, suffix in _COMFORT),
-    RowTolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
-    RowTolerance("comfort", "", 0, "the words for the row's own a_w"),
-    RowTolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
-    *(RowTolerance(name, "m/km", 0.1, "as the IRI", share=0.25, of=column) for name, column in _IRI_ERRORS.items()),
-    RowTolerance("IRI rms", "m/km", 0.1, "in proportion to the r.m.s. acceleration", share=0.1, of="iri_rms_m_per_km"),
-    RowTolerance("class", "", 0, "that of the row's own IRI"),
-    RowTolerance("samples", "", 4, "as the duration, at 100 Hz"),
-    RowTolerance("clipped", "", 3, "a start and an end"),
-    RowTolerance("segment", "", 0, "counted on"),
-    RowTolerance("drive", "", 0, "counted on"),
+    RowTolerance("start", "s", 0.03, "three steps of the sample grid", _time_of("t_us")),
+    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by", _time_of("utc_us")),
+    RowTolerance("duration", "s", 0.05, "a start and an end", _of("duration_s")),
+    RowTolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s", _of("distance_start_m")),
+    RowTolerance("length", "m", 0.75, "as the distance",
+                 lambda wanted, found: _apart(_length_m(wanted), _length_m(found))),
+    RowTolerance("place", "m", 1.0, "as the distance, and the digits of the log", _place_apart_m),
+    RowTolerance("speed", "m/s", 0.1, "0.03 s of braking at 3 m/s2", _of("speed_mps")),
+    _scaled("a_w", "m/s2", "one sample in thirty belongs to the next window", 0.1, "a_w_mps2"),
+    _scaled("accel rms", "m/s2", "as a_w", 0.1, "accel_rms_mps2"),
+    _scaled("MTVV", "m/s2", "as a_w; its greatest second may end in the next window", 0.15, "mtvv_mps2"),
+    _scaled("VDV", "m/s1.75", "as a_w", 0.15, "vdv_mps175"),
+    *(_scaled(f"{name} {kind}", unit, f"as {name}", share, f"{column}_{kind}_{suffix}")
+      for kind, share in (("std", 0.25), ("raw", 0.15)) for name, column, unit, suffix in _COMFORT),
+    _scaled("crest", "", "a peak at the edge belongs to the next window", 0.2, "crest_factor", 0.3),
+    RowTolerance("comfort", "", 0, "the words for the row's own a_w", _comfort_contradicts),
+    RowTolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", _of("iri_m_per_km"), 0.25,
+                 "iri_std_m_per_km"),
+    *(_scaled(f"IRI {part}std", "m/km", "as the IRI", 0.25, f"iri_{part.replace(' ', '_')}std_m_per_km", 0.1)
+      for part in ("", "level ", "common ", "place ")),
+    _scaled("IRI rms", "m/km", "in proportion to the r.m.s. acceleration", 0.1, "iri_rms_m_per_km", 0.1),
+    RowTolerance("class", "", 0, "that of the row's own IRI", _class_contradicts),
+    RowTolerance("samples", "", 4, "as the duration, at 100 Hz", _of("samples")),
+    RowTolerance("clipped", "", 3, "a start and an end", _of("clipped_samples")),
+    RowTolerance("segment", "", 0, "counted on", _of("segment")),
+    RowTolerance("drive", "", 0, "counted on", _of("drive")),
 )
 
 
@@ -199,7 +255,7 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[LoggedSession],
     if session.is_open:
         matched = _before_utc(matched)
     aligned = _aligned(matched, shift_us)
-    differences = tuple(_difference(tolerance, _MEASURES[tolerance.quantity], aligned) for tolerance in TOLERANCES)
+    differences = tuple(_difference(tolerance, aligned) for tolerance in TOLERANCES)
     held = {wanted.segment for wanted, _ in matched}
     absent = [row for row in expected if row.segment not in held]
     pending = _pending(expected, absent, longest_wait_us(bridge_s)) if session.is_open else 0
@@ -216,10 +272,6 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[LoggedSession],
         flags_differ=sum(not set(wanted.flags) ^ set(found.flags) <= _LATE_FLAGS for wanted, found in matched),
         differences=differences,
     )
-
-
-Pair = tuple[WindowRecord, WindowRecord]
-Measure = Callable[[WindowRecord, WindowRecord], float | None]
 
 
 def _last_pass(rows: Sequence[WindowRecord]) -> Sequence[WindowRecord]:
@@ -314,85 +366,13 @@ def _surplus(rows: Sequence[WindowRecord], held: set[int]) -> tuple[int, ...]:
     return tuple(row.segment for row in rows if first < row.segment < last and row.segment not in held)
 
 
-def _difference(tolerance: RowTolerance, measure: Measure, pairs: Sequence[Pair]) -> Difference:
-    found = [(measure(wanted, row), tolerance.limit(wanted)) for wanted, row in pairs]
+def _difference(tolerance: RowTolerance, pairs: Sequence[Pair]) -> Difference:
+    found = [(tolerance.measure(wanted, row), tolerance.limit(wanted)) for wanted, row in pairs]
     known = [(value, limit) for value, limit in found if value is not None]
     finite = [value for value, _ in known if value != inf]
     return Difference(tolerance=tolerance, compared=len(known), p95=float(np.percentile(finite, 95)) if finite else nan,
                       largest=float(max(finite, default=nan)),
                       outside=sum(bool(value > limit) for value, limit in known))
-
-
-def _of(attribute: str) -> Measure:
-    return lambda wanted, found: _apart(getattr(wanted, attribute), getattr(found, attribute))
-
-
-def _apart(wanted: float | None, found: float | None) -> float | None:
-    """None: neither side knows; infinite: one side does."""
-    if wanted is None and found is None:
-        return None
-    return inf if wanted is None or found is None else abs(found - wanted)
-
-
-def _time_of(attribute: str) -> Measure:
-    def measure(wanted: WindowRecord, found: WindowRecord) -> float | None:
-        apart_us = _apart(getattr(wanted, attribute), getattr(found, attribute))
-        return None if apart_us is None else apart_us / US_PER_S
-    return measure
-
-
-def _length_m(row: WindowRecord) -> float | None:
-    return None if row.distance_end_m is None or row.distance_start_m is None \
-        else row.distance_end_m - row.distance_start_m
-
-
-def _contradicts(said: str, meant: str) -> float:
-    return 0.0 if said == meant else inf
-
-
-def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
-    if "hidden" in found.flags:
-        return 0.0 if found.comfort in (LEAST_WORD, "") else inf
-    return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
-
-
-def _class_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
-    return _contradicts(found.iri_class, iri_class(found.iri_m_per_km) if found.iri_m_per_km is not None else "")
-
-
-def _place_apart_m(wanted: WindowRecord, found: WindowRecord) -> float | None:
-    """On the ground. None: neither side knows; infinite: one side does."""
-    if wanted.lat_deg is None or wanted.lon_deg is None or found.lat_deg is None or found.lon_deg is None:
-        known = (wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
-        return None if known == (None,) * len(known) else inf
-    return ground_distance_m(wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
-
-
-_MEASURES: dict[str, Measure] = {
-    "start": _time_of("t_us"),
-    "UTC": _time_of("utc_us"),
-    "duration": _of("duration_s"),
-    "distance": _of("distance_start_m"),
-    "length": lambda wanted, found: _apart(_length_m(wanted), _length_m(found)),
-    "place": _place_apart_m,
-    "speed": _of("speed_mps"),
-    "a_w": _of("a_w_mps2"),
-    "accel rms": _of("accel_rms_mps2"),
-    "MTVV": _of("mtvv_mps2"),
-    "VDV": _of("vdv_mps175"),
-    **{f"{name} {kind}": _of(f"{column}_{kind}_{suffix}")
-       for kind in ("std", "raw") for name, column, _unit, suffix in _COMFORT},
-    "crest": _of("crest_factor"),
-    "comfort": _comfort_contradicts,
-    "IRI": _of("iri_m_per_km"),
-    **{name: _of(column) for name, column in _IRI_ERRORS.items()},
-    "IRI rms": _of("iri_rms_m_per_km"),
-    "class": _class_contradicts,
-    "samples": _of("samples"),
-    "clipped": _of("clipped_samples"),
-    "segment": _of("segment"),
-    "drive": _of("drive"),
-}
 
 
 def _may_be_outside(count: int) -> int:

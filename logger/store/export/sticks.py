@@ -120,7 +120,6 @@ def _remember(log_folder: DirectoryHandle, home: _Home) -> None:
 
 
 def _homes(log_folder: DirectoryHandle) -> Iterator[_Home]:
-    """The lines that can be read."""
     try:
         text = log_folder.read(HOMES_NAME, 65_536).decode("ascii")
     except (OSError, ValueError):

@@ -139,7 +139,6 @@ class Recognised:
 
     @property
     def is_enough(self) -> bool:
-        """Whether something can be made of it."""
         return "t" in self.columns and (self.has_acceleration or self.has_location or self.has_gravity)
 
     @property
@@ -286,12 +285,10 @@ class Header:
 
     @property
     def names(self) -> Names:
-        """Of the columns."""
         return self.table.names
 
     @property
     def line(self) -> int:
-        """In which they stand."""
         return self.table.line
 
 

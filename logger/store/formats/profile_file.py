@@ -194,7 +194,6 @@ class _Header:
                 self._texts.setdefault(keyword, (self.lines, text[8:]))
 
     def layout(self) -> _Layout:
-        """What the second line says."""
         fields = [field[:_FIELD_CHARS] for field in re.split(r"[,\s]+", self._second) if field]
         expected = f"{self._file}:2: expected channels, samples, records, bytes, key, step"
         try:

@@ -62,7 +62,6 @@ class DumpRecording:
         self.tend()
 
     def write(self, event: Event) -> None:
-        """Add an event."""
         self._try(lambda writer: writer.write(event))
 
     def flush(self) -> None:
@@ -95,7 +94,6 @@ class DumpRecording:
             self._leave()
 
     def close(self) -> None:
-        """End the file."""
         self._try(DumpWriter.close)
         if self._writer is not None:
             self._writer = None

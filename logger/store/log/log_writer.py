@@ -310,11 +310,9 @@ class BufferedLog:
         self._try(SegmentLog.sync)
 
     def rotate(self) -> None:
-        """Begin a new file."""
         self._try(SegmentLog.rotate)
 
     def set_clock_map(self, clock: ClockMap) -> None:
-        """Tell the session's UTC."""
         self._clock = clock
         self._try(lambda segment_log: segment_log.set_clock_map(clock))
 

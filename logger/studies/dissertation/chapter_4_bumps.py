@@ -233,7 +233,6 @@ def _f4_21(effort: Workload) -> Result:
 
 
 def _worst(mass_kg: np.ndarray, chosen: np.ndarray) -> float:
-    """The one farthest from the truth."""
     return float(max(mass_kg[chosen].tolist(), key=lambda one: abs(one - TRUTH[MASS])))
 
 

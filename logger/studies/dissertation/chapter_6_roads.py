@@ -435,7 +435,6 @@ def _biases_percent(mph: int, segments: Sequence[int], effort: Workload) -> Arra
 
 
 def _standard_error(values: Array) -> float:
-    """Of their mean."""
     return float(values.std(ddof=1) / len(values) ** 0.5)
 
 
