@@ -97,7 +97,7 @@ def test_every_complaint_about_a_profile_names_its_line(tmp_path: Path) -> None:
     assert "ps2119" in shipped_profiles()
     path.write_text(text.replace("offsets: [0, 2, 4]", "offsets: [0, 2]"))
     line = 1 + path.read_text()[: path.read_text().index("offsets")].count("\n")
-    with pytest.raises(SettingsError, match=rf"mine\.yaml:{line}: expected a list of 3 numbers, found a list for 'offsets'"):
+    with pytest.raises(SettingsError, match=rf"mine\.yaml:{line}: expected a list of 3 numbers, .* for 'offsets'"):
         load_profile(path)
 
 
