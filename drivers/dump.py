@@ -34,15 +34,9 @@ VERSION = "1"
 ACCELEROMETERS = tuple(accelerometers())
 SOURCES = (*ACCELEROMETERS, GPS)
 
-LINE_BYTES = 65536
-"""Longest line, without its newline."""
-
-EVENT_BYTES = 32000
-"""Most bytes in one event: in hex, with time and source, they fit a line."""
-
-LATEST_US = 10**15 - 1
-"""No monotonic clock has run for 31 years."""
-
+LINE_BYTES = 65536  # Longest line, without its newline
+EVENT_BYTES = 32000  # Most bytes in one event: in hex, with time and source, they fit a line
+LATEST_US = 10**15 - 1  # No monotonic clock has run for 31 years
 _SOURCE_OF = {name.encode(): name for name in SOURCES}
 _BYTES_OF = {name: kind.event_bytes for name, kind in accelerometers().items()} | {GPS: None}
 _HEX_DIGITS_OF = {name.encode(): 2 * size for name, size in _BYTES_OF.items() if size is not None}

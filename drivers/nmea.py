@@ -63,8 +63,7 @@ from drivers.wire_contents import RECEIVER, RecentBytes
 BITS_PER_BYTE = 10
 TOLERANCE = 0.03
 """UARTs that understand each other differ by less than 0.05, half a bit in ten; most by 0.02 at the most."""
-LOOK_S = 0.08
-"""``SerialSource`` sleeps 0.06 s at most; FTDI adapters gather for 0.016 s."""
+LOOK_S = 0.08  # ``SerialSource`` sleeps 0.06 s at most; FTDI adapters gather for 0.016 s
 WINDOW_US = 10_000_000
 _NEEDS_KEPT = 9
 
@@ -128,8 +127,7 @@ DAY_US = 86_400 * US_PER_S
 ROLLOVER_DAYS = 1024 * 7
 ROLLOVERS_MAX = 8
 GPS_EPOCH_DAY = datetime.date(1980, 1, 6).toordinal() - EPOCH_ORDINAL
-DAYS_OF_WEEK = 7
-"""A date in the first week of a count is that of a receiver that has not heard yet which week it is."""
+DAYS_OF_WEEK = 7  # A date in the first week of a count is that of a receiver that has not heard yet which week it is
 
 
 def midnight_utc_us(day: datetime.date) -> int:

@@ -95,8 +95,7 @@ def resultant(instants_us: Floats, periods_us: Floats) -> Floats:
 
 Times = npt.NDArray[np.int64]
 
-NO_TIME = -(2**63)
-"""Stands for the time of a sample that cannot be dated."""
+NO_TIME = -(2**63)  # Stands for the time of a sample that cannot be dated
 
 
 class _Point(NamedTuple):
@@ -531,9 +530,7 @@ def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:
     return slope_us, off_us[-1 - len(off_us) // 4] - off_us[0]
 
 
-WORTH_TELLING = 0.005
-"""Share of lost samples from which on a person is asked to look for the cause."""
-
+WORTH_TELLING = 0.005  # Share of lost samples from which on a person is asked to look for the cause
 DRIFT = 0.005
 """Share of its rate through which a clock has to drift to be reported: a quartz clock keeps to a hundredth of that."""
 

@@ -26,10 +26,8 @@ from pathlib import Path
 from drivers.disk import FileSystem, open_regular
 from logger.errors import BadInput
 
-DISK = FileSystem()
-"""Where all of it goes."""
-BESIDE = ".ridelog-"
-"""How files begin that are being written; one that a killed process has left may be removed."""
+DISK = FileSystem()  # Where all of it goes
+BESIDE = ".ridelog-"  # How files begin that are being written; one that a killed process has left may be removed
 _BLOCK_BYTES = 1 << 20  # of the size of a large file's extents; a call costs nothing beside it
 _AGREED: ContextVar[_Agreed | None] = ContextVar("_AGREED", default=None)
 _WRITTEN: ContextVar[list[Path] | None] = ContextVar("_WRITTEN", default=None)

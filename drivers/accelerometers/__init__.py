@@ -15,8 +15,7 @@ from drivers.catalogue import offers
 if TYPE_CHECKING:
     from drivers.accelerometers.accelerometer import Accelerometer, SerialAccelerometer
 
-DEFAULT = "bma220"
-"""The one that the settings mean when they name none."""
+DEFAULT = "bma220"  # The one that the settings mean when they name none
 
 
 @cache

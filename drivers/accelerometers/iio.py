@@ -60,8 +60,7 @@ RATE_TOLERANCE = 0.02  # drivers name nominal rates
 SCANS, VALUES, DESCRIPTION = b"s", b"p", b"{"
 
 
-_STEP_MPS2, _NOISE_MPS2 = (1e-6, 10.0), (1e-4, 1.0)
-"""From and to: what a step and a noise may be."""
+_STEP_MPS2, _NOISE_MPS2 = (1e-6, 10.0), (1e-4, 1.0)  # From and to: what a step and a noise may be
 
 
 @dataclass(frozen=True)

@@ -286,8 +286,7 @@ def caution_zone(hours: float, exponent: int) -> CautionZone:
 Array = npt.NDArray[np.float64]
 
 LOWEST_RATE_HZ = 80.0
-LEAST_TAKEN_HZ = 40.0
-"""Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above."""
+LEAST_TAKEN_HZ = 40.0  # Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above
 
 
 @dataclass(frozen=True)

@@ -35,15 +35,13 @@ if TYPE_CHECKING:
     import pyarrow
 
 
-Place = tuple[float, float]
-"""Longitude and latitude [degrees]."""
+Place = tuple[float, float]  # Longitude and latitude [degrees]
 Line = tuple[Place, ...]
 Geometry = tuple[Line, ...]
 """Lines in the order driven; a line of one place is a point; nothing where no place is known."""
 
 
-DECIMALS = 6
-"""Of a degree in files of text: 0.1 m (RFC 7946, section 11.2)."""
+DECIMALS = 6  # Of a degree in files of text: 0.1 m (RFC 7946, section 11.2)
 
 
 def half_way(one: Place, other: Place) -> Place:
@@ -88,8 +86,7 @@ def _wrapped(lon_deg: float) -> float:
     return lon_deg if -180.0 <= lon_deg <= 180.0 else (lon_deg + 180.0) % 360.0 - 180.0
 
 
-Value = str | int | float | None
-"""None: not known."""
+Value = str | int | float | None  # None: not known
 
 
 class Kind(Enum):

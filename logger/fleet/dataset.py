@@ -234,8 +234,7 @@ def arrow_rows(rows: Mapping[str, npt.NDArray[Any]]) -> pyarrow.Table:
                           for name, kind in ROW_TYPES.items()})
 
 
-MEMORY = "1GB"
-"""What DuckDB may hold; beyond it, it writes to a temporary folder."""
+MEMORY = "1GB"  # What DuckDB may hold; beyond it, it writes to a temporary folder
 _NAME = "fleet_rows"
 
 

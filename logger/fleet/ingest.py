@@ -100,8 +100,7 @@ def keep_names(dataset: Path, names: Iterable[str], key: bytes) -> None:
 _COUNTS = ("segment", "drive")
 _NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km", "iri_std_m_per_km",
             "a_w_mps2", "duration_s", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
-_LARGEST_COUNT = 2**31 - 1
-"""Of a dataset's column; no logger counts so far."""
+_LARGEST_COUNT = 2**31 - 1  # Of a dataset's column; no logger counts so far
 _HEADERS = tuple(one.encode() for one in HEADERS)
 _LARGEST = {column.name: column.largest for column in COLUMNS}
 
@@ -333,8 +332,7 @@ def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
     return {**found, "pass_windows": windows}
 
 
-BATCH_ROWS = 500_000
-"""Rows of a commit, at least: some 300 MB while they are written."""
+BATCH_ROWS = 500_000  # Rows of a commit, at least: some 300 MB while they are written
 
 
 _MARKS = ("segment", "crc32", "utc_us")

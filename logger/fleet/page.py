@@ -227,8 +227,7 @@ def _line(lat_deg: float, lon_deg: float, heading_deg: float, length_m: float) -
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]
 
-DEEPEST = 15
-"""Where a segment of 66 ft is some 6 pixels long at middle latitudes."""
+DEEPEST = 15  # Where a segment of 66 ft is some 6 pixels long at middle latitudes
 _STEPS = 4096
 
 

@@ -27,16 +27,13 @@ from logger.units import MILE_M
 Array = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.int64]
 
-SEGMENT_M = MILE_M / 80
-"""Side of a cell, and length of a segment: eight make the 0.1 mi of 23 CFR 490."""
-
+SEGMENT_M = MILE_M / 80  # Side of a cell, and length of a segment: eight make the 0.1 mi of 23 CFR 490
 DIRECTIONS = 8
 _BLOCK_CELLS = 64
 _FINE_BITS, _DIRECTION_BITS, _COLUMN_BITS = 6, 3, 15
 _CELL_BITS = 2 * _FINE_BITS + _DIRECTION_BITS
 _BLOCK_DEG = float(np.degrees(_BLOCK_CELLS * SEGMENT_M / EARTH_RADIUS_M))
-ON_MAP = np.int64(1) << 62
-"""This bit is set in keys of segments of a map (``road_map``), never in those of cells."""
+ON_MAP = np.int64(1) << 62  # This bit is set in keys of segments of a map (``road_map``), never in those of cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +99,8 @@ def _fine(keys: Keys) -> tuple[Keys, Keys]:
     return (inside >> _FINE_BITS) & (_BLOCK_CELLS - 1), inside & (_BLOCK_CELLS - 1)
 
 
-_PLACE_STD_M = 4.07
-"""Of a receiver across the road (Newson and Krumm 2009, section 4)."""
-_HEADING_STD_DEG = 20.0
-"""Of the direction between windows 50 ft apart with fixes some metres off."""
+_PLACE_STD_M = 4.07  # Of a receiver across the road (Newson and Krumm 2009, section 4)
+_HEADING_STD_DEG = 20.0  # Of the direction between windows 50 ft apart with fixes some metres off
 _REACH_M = 30.0
 _CANDIDATES = 12
 

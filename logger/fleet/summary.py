@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     import ibis.expr.types as ir
 
 
-YEAR_US = 365.25 * 86400e6
-"""A Julian year."""
+YEAR_US = 365.25 * 86400e6  # A Julian year
 
 
 def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:
@@ -209,15 +208,13 @@ def _inverse_trigamma(value: float) -> float:
 
 Keys = npt.NDArray[np.int64]
 
-FALSE_SHARE = 0.05
-"""Of false ones among the changes that are called significant."""
+FALSE_SHARE = 0.05  # Of false ones among the changes that are called significant
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 SECTION_M = MILE_M / 10
 MOST_PASSES = 1_000_000
 """From which biases are estimated, some 300 MB; of more those of a part of the roads are taken. What the passes of a
 session share then limits a bias, not the number of roads."""
-_ZERO_US = 1_577_836_800_000_000
-"""2020-01-01: years count from here, so that their squares keep their digits."""
+_ZERO_US = 1_577_836_800_000_000  # 2020-01-01: years count from here, so that their squares keep their digits
 
 
 @dataclass(frozen=True, eq=False)

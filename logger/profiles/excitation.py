@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _CUBIC = 3
-FEWEST = _CUBIC + 1
-"""Samples that an excitation has at least."""
+FEWEST = _CUBIC + 1  # Samples that an excitation has at least
 
 
 @dataclass(frozen=True)

@@ -401,12 +401,9 @@ def rank(name: str, names: tuple[str, ...]) -> str:
     return str(names.index(name)) if name in names else "x"
 
 
-UNKNOWN = -(2**31)
-"""Stands for a value that is not known."""
+UNKNOWN = -(2**31)  # Stands for a value that is not known
 _MOST = 2**31 - 1
-_DEG = 1e6
-"""Steps in a degree: 0.11 m, the six decimals that RFC 7946 (section 11.2) calls enough."""
-
+_DEG = 1e6  # Steps in a degree: 0.11 m, the six decimals that RFC 7946 (section 11.2) calls enough
 Ints = npt.NDArray[np.uint32]
 Column = tuple[str, float, int, Array]
 """Name, steps per unit, how many times differences are taken, values (n,) with NaN for unknown."""

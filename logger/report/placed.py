@@ -83,8 +83,7 @@ def _has_iri(one: WindowRecord) -> bool:
     return one.iri_m_per_km is not None and counts(one)
 
 
-MOST_ROWS = 30_000
-"""More take longer to lay over each other than a page should take to make: at 0.6 ms a row, 18 s."""
+MOST_ROWS = 30_000  # More take longer to lay over each other than a page should take to make: at 0.6 ms a row, 18 s
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,7 @@ _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
 _STYLE = "td:first-child{white-space:normal;min-width:9em}figure+.hint{margin-bottom:2em}"
-_UNBROKEN = ("of", "word", "true for")
-"""Columns of short words, which break between items only."""
+_UNBROKEN = ("of", "word", "true for")  # Columns of short words, which break between items only
 _INDEX_STYLE = _STYLE + (
     "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(3),td:nth-child(5){white-space:nowrap}"
     "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"

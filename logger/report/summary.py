@@ -24,9 +24,7 @@ IRI_CLASSES: Mapping[str, str] = {"A": "very good", "B": "good", "C": "average",
 """ISO 8608 letters, best first, in words: of all roads, also of earth. A highway of class A may be poor by 23 CFR 490,
 so the words stand beside no agency's condition."""
 
-COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
-"""ISO 2631 words, best first."""
-
+COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))  # ISO 2631 words, best first
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
 _HIDDEN = "hidden"
 NOT_COUNTED = frozenset({"unsettled"})

@@ -352,11 +352,9 @@ UNITS_M = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": FOOT_M / 12, "ft":
 """Units of lengths, by the ending of a column's name."""
 DOUBTFUL_M_PER_KM = 100.0
 """No road that a car can drive on is as rough, and no limit that is looked for is half as high."""
-ROUGHEST_M_PER_KM = iri_from_gd_n0(2 * CLASS_GD_N0_CM3["H"])
-"""Upper limit of class H: twice its geometric mean."""
+ROUGHEST_M_PER_KM = iri_from_gd_n0(2 * CLASS_GD_N0_CM3["H"])  # Upper limit of class H: twice its geometric mean
 HIGHEST_LIMIT_M_PER_KM = DOUBTFUL_M_PER_KM / 2
-_FINEST_M = 1e-3
-"""No profiler samples more densely; 0.3 m apart are 0.0003 km."""
+_FINEST_M = 1e-3  # No profiler samples more densely; 0.3 m apart are 0.0003 km
 
 
 def unit_doubt(iri_m_per_km: float) -> str:

@@ -350,8 +350,7 @@ def _rows(mean: Means, which: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp
 WORDS = ("excellent", "good", "intermediate", "bad")
 MARKS_M_PER_KM = (2.0, 4.0, 6.0, 8.0)
 LIMITS_M_PER_KM = tuple((one + other) / 2 for one, other in pairwise(MARKS_M_PER_KM))
-LEAST_COVERED = 0.5
-"""Share of a way that has to be known: with less, most of the way may be otherwise."""
+LEAST_COVERED = 0.5  # Share of a way that has to be known: with less, most of the way may be otherwise
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,8 +33,7 @@ Ints = npt.NDArray[np.intp]
 
 SEARCH_M = 25.0
 """How far aside a way is looked for: beyond four standard deviations of the difference of two good fixes."""
-MOST_TURN_DEG = 50.0
-"""Of a window against a way: more is a crossing, or the other direction."""
+MOST_TURN_DEG = 50.0  # Of a window against a way: more is a crossing, or the other direction
 _MOST_CANDIDATES = 64
 _ORIGIN = -1
 _STEP_M = 10.0  # between points of a given line

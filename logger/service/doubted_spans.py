@@ -128,8 +128,7 @@ class Stillness:
 
 
 WINDOW = 2048
-FALSE_ALARM = 1e-10
-"""For each window: in ten years of driving 8 hours a day at 100 Hz, once in a thousand cars."""
+FALSE_ALARM = 1e-10  # For each window: in ten years of driving 8 hours a day at 100 Hz, once in a thousand cars
 PROOF_LASTS = 15
 """Windows, five minutes: a coarse sensor that rightly repeats some samples on a quiet road cannot show that it is well
 again; what it was found to do does not count for longer."""

@@ -32,10 +32,8 @@ from logger.units import US_PER_S
 
 CLIPPED_SHARE = 0.2
 """Of windows: from here on a larger range is better; between 8 and 25 %, and at 14 % of another drive it was not."""
-HIDDEN_SHARE = 0.03
-"""So few hid on a drive at 2 g and one read (R2 0.838) that had 0.905 with 4 reads."""
-FEWEST_WINDOWS = 400
-"""Before these nothing is said: a share of 0.2 is known to 0.02, one of 0.03 to 0.01."""
+HIDDEN_SHARE = 0.03  # So few hid on a drive at 2 g and one read (R2 0.838) that had 0.905 with 4 reads
+FEWEST_WINDOWS = 400  # Before these nothing is said: a share of 0.2 is known to 0.02, one of 0.03 to 0.01
 
 
 class RangeUse:

@@ -41,9 +41,7 @@ SETTLING_S = 4.0
 LINE_OVER_HOLE_US = 500_000
 SILENCE_US = 2_000_000
 START_MEAN_SAMPLES = 50
-NEARLY = 1.02
-"""So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz."""
-
+NEARLY = 1.02  # So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz
 Floats = npt.NDArray[np.float64]
 ComplexFloats = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]

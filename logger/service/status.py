@@ -21,9 +21,7 @@ from drivers.disk import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 
-LARGEST_BYTES = 100_000
-"""Most that is read of a status file; what is cut there is none."""
-
+LARGEST_BYTES = 100_000  # Most that is read of a status file; what is cut there is none
 SensorState = Literal["ok", "absent", "retrying", "silent", "doubtful"]
 ServiceState = Literal["starting", "standing", "recording", "stopping"]
 

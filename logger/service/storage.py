@@ -23,9 +23,7 @@ from logger.store.log.log_writer import BufferedLog, SegmentLog, next_session, r
 from logger.units import US_PER_S
 
 LOOK_US = 10 * US_PER_S
-SHOWN_NOTICES = 5
-"""Most notices about the folder in the status, one screen with the rest; all are in the journal."""
-
+SHOWN_NOTICES = 5  # Most notices about the folder in the status, one screen with the rest; all are in the journal
 log = logging.getLogger(__name__)
 
 

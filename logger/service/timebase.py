@@ -209,8 +209,7 @@ class Timebase:
 
 NORMAL_INTERVAL_US = 1_500_000
 """What is known as well between fixes of a receiver that sends more often: one of five a second may be missing."""
-NORMAL_SHARE = 1.5
-"""Of a receiver's rhythm: half of it is more than any wait, and less than a lost fix."""
+NORMAL_SHARE = 1.5  # Of a receiver's rhythm: half of it is more than any wait, and less than a lost fix
 SLOWEST_RHYTHM_US = 5_000_000
 ACCELERATION_LIMIT_MPS2 = 15.0
 PLACE_JUMP_M = 80.0

@@ -36,9 +36,7 @@ OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
 SILENCE_US = US_PER_S
 """An accelerometer that says nothing for longer has left a gap in a dump: reported, and no damage of the file."""
 
-SHOWN_PROBLEMS = 20
-"""Most problems that are kept in words for one file; all are counted."""
-
+SHOWN_PROBLEMS = 20  # Most problems that are kept in words for one file; all are counted
 _DUMP_START = b"# ridelog-dump "
 
 

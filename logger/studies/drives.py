@@ -238,8 +238,7 @@ def rms_error(estimate: Array, exact: Array) -> float:
 
 MASS = "sprung_mass_kg"
 FRONT, REAR = "front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m"
-TRUTH = {MASS: 875.0, FRONT: 23_088.0, REAR: 23_088.0}
-"""Table 4.2."""
+TRUTH = {MASS: 875.0, FRONT: 23_088.0, REAR: 23_088.0}  # Table 4.2
 
 
 def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput | None = None,

@@ -26,9 +26,7 @@ from drivers.disk import check_regular
 from logger.store.log.atomic_file import ENDING, numbered
 
 BLOCK_BYTES = 1 << 18
-LOCK_NAME = "exported.lock"
-"""In a folder of logs: who changes what it remembers of its exports holds this file."""
-
+LOCK_NAME = "exported.lock"  # In a folder of logs: who changes what it remembers of its exports holds this file
 _TEMPORARY = re.compile(r"[0-9a-f]{16}\.ridelog-tmp")
 _DIRECTORY = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 _READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC

@@ -74,9 +74,7 @@ def _text(line: bytes) -> str:
         raise ValueError("expected ASCII text") from None
 
 
-FOLDER = "ridelog"
-"""On a stick: a logger's files are in ``FOLDER/<identity>``."""
-
+FOLDER = "ridelog"  # On a stick: a logger's files are in ``FOLDER/<identity>``
 NAME = "manifest.sha256"
 MAX_FILES = 100_000
 """Most files of one logger on one stick: ten drives a day, each a log and its sidecar, for 13 years. A list of so many

@@ -158,15 +158,9 @@ def _digest(said: bytes) -> str:
 
 OFF, FIRST_STICK, KEY_FILE = MODES = ("off", "first_stick", "key_file")
 
-KEY_NAME = "ridelog.key"
-"""In the root of a stick."""
-
-STICK_NAME = "stick-id"
-"""In the logger's own folder on a stick: the stick's number."""
-
-PAIRED_NAME = "paired-stick"
-"""In the folder of logs: the number of the stick that was first."""
-
+KEY_NAME = "ridelog.key"  # In the root of a stick
+STICK_NAME = "stick-id"  # In the logger's own folder on a stick: the stick's number
+PAIRED_NAME = "paired-stick"  # In the folder of logs: the number of the stick that was first
 LEAST_KEY_BYTES, MOST_KEY_BYTES = 16, 4096
 _ID_BYTES = 16
 _ID = re.compile(rb"([0-9a-f]{32})\n")

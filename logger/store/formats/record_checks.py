@@ -321,8 +321,7 @@ def end_doubts(name: str, values: Array) -> list[Doubt]:
                   {"at_mps2": one.at, "samples": one.samples}) for one in range_ends(values)]
 
 
-NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)
-"""Columns of a drive that say where and how the car went."""
+NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)  # Columns of a drive that say where and how the car went
 
 
 @dataclass(frozen=True)

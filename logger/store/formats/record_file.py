@@ -27,9 +27,7 @@ USABLE = "usable"
 HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
 _ROUNDING_STEPS = 0.2
-HOLE_STEPS = 2.5
-"""Longer than so many steps is a hole: more than one sample is lost."""
-
+HOLE_STEPS = 2.5  # Longer than so many steps is a hole: more than one sample is lost
 _HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
 
 

@@ -29,9 +29,7 @@ from types import TracebackType
 from drivers.disk import FileSystem
 from logger.errors import BadInput
 
-Warn = Callable[[str], None]
-"""Takes a sentence for the journal and for ``ridelog status``."""
-
+Warn = Callable[[str], None]  # Takes a sentence for the journal and for ``ridelog status``
 ENDING = ".aside"
 _ASIDE = re.compile(re.escape(ENDING) + r"(-[0-9]+)?\Z")
 READ_ONLY = "the disk has become read-only"

@@ -298,8 +298,7 @@ def _plain(text: str) -> str:
 
 
 RESERVE_BYTES = 50_000_000
-STEP_BYTES = 5_000_000
-"""When the reserve is down to this, dumps go; when logs were stopped they go on above it."""
+STEP_BYTES = 5_000_000  # When the reserve is down to this, dumps go; when logs were stopped they go on above it
 
 
 

@@ -242,9 +242,7 @@ class SegmentLog:
         self._stored_clock = self._clock
 
 
-ROWS_A_SIDECAR = 500
-"""Rows after which the sidecar of an open part is written again: 4 km, some minutes."""
-
+ROWS_A_SIDECAR = 500  # Rows after which the sidecar of an open part is written again: 4 km, some minutes
 WAITING_ROWS = 5000
 """Most rows kept in memory, some 5 MB: 38 km of windows of 7.62 m. Of more the oldest are lost, and counted."""
 

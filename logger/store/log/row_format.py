@@ -25,12 +25,8 @@ from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.units import US_PER_S
 
-LINE_BYTES = 4096
-"""More than any row; a longer line is taken for several damaged ones."""
-
-LARGEST = 1e9
-"""Beyond any quantity of a row in the unit of its column; what is larger is not known, and not read."""
-
+LINE_BYTES = 4096  # More than any row; a longer line is taken for several damaged ones
+LARGEST = 1e9  # Beyond any quantity of a row in the unit of its column; what is larger is not known, and not read
 _EPOCH = datetime(1970, 1, 1)
 LATEST_US = (datetime(2200, 1, 1) - _EPOCH) // timedelta(microseconds=1)
 """From here on no instant is written or read [us since 1970]."""
@@ -235,8 +231,7 @@ def _header(columns: Sequence[LogColumn]) -> str:
     return ",".join([*(column.name for column in columns), "crc32"])
 
 
-HEADERS = tuple(_header(COLUMNS[:count]) for count in _COUNTS)
-"""Of logs of today first, then of older ones."""
+HEADERS = tuple(_header(COLUMNS[:count]) for count in _COUNTS)  # Of logs of today first, then of older ones
 HEADER = HEADERS[0]
 SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
 """A row of which nothing is known but what always is."""

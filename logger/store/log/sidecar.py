@@ -174,12 +174,8 @@ def _add(holes: list[Hole], hole: Hole) -> None:
 SIDECAR_BYTES = 1_000_000
 """Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
 
-UNCHECKED = "taken_over_unchecked"
-"""In a sidecar that a repair has made of one without a checksum."""
-
-SETTINGS_LOST = "settings_lost"
-"""In a sidecar that a repair has made where there was none that could be read."""
-
+UNCHECKED = "taken_over_unchecked"  # In a sidecar that a repair has made of one without a checksum
+SETTINGS_LOST = "settings_lost"  # In a sidecar that a repair has made where there was none that could be read
 _SEAL = frozenset({"format", "sha256"})
 
 
