@@ -18,8 +18,7 @@ from typing import Any
 
 
 class CatalogueError(ValueError):
-    """A file of a catalogue, or an installed package, that offers nothing, or something of another name: which, and
-    what was expected."""
+    """A file of a catalogue, or an installed package, that offers nothing or another name, and what was expected."""
 
 
 def names(package: str, offer: str) -> list[str]:

@@ -272,8 +272,7 @@ class BufferedChip(ConfiguredChip, ABC):
 
 
 class Entries(NamedTuple):
-    """Decoded entries of one answer: ``after_loss``, some were lost before them; accelerations (n, 3) [m/s2]; at an
-    end of the range (n,)."""
+    """Entries of one answer: ``after_loss``, some were lost before; accelerations (n, 3) [m/s2]; clipped (n,)."""
 
     after_loss: bool
     accel_mps2: npt.NDArray[np.float64]

@@ -261,9 +261,7 @@ class FixedFramer(_Framer):
     def __init__(self, length: int, plausible: Plausible, oriented: Plausible | None = None, sync: bytes = b"",
                  group: int = 16) -> None:
         super().__init__()
-        self._length = length
-        self._plausible = plausible
-        self._oriented = oriented
+        self._length, self._plausible, self._oriented = length, plausible, oriented
         self._sync = np.frombuffer(sync, dtype=np.uint8)
         self._group = group
         self._in_place = False

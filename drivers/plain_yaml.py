@@ -111,8 +111,7 @@ class Node:
         return ""
 
     def wrong(self, expected: str) -> Exception:
-        """The error to raise for this node: ``file:line: expected <expected>, found <what stands there>
-        [for <key>]``."""
+        """The error for this node: ``file:line: expected <expected>, found <what stands there> [for <key>]``."""
         key = f" for {shortened(self.key)}" if self.key else ""
         return self.complaint(f"expected {expected}, found {self._shown()}{key}")
 
@@ -145,8 +144,7 @@ class Node:
         return self.content
 
     def path(self, after: str = "") -> Path:
-        """The path that stands ``after`` these characters; one that does not begin with / is seen from the folder of
-        the file."""
+        """The path that stands ``after`` these characters; a relative one is seen from the folder of the file."""
         path = Path(self.file).parent.resolve() / self.text().removeprefix(after)
         try:
             path.exists()

@@ -63,9 +63,7 @@ class Deadlines:
     """Instants at equal steps. One that is missed is counted and skipped, never made up for in a burst."""
 
     def __init__(self, step_us: int, now_us: Callable[[], int], sleep: Callable[[float], None]) -> None:
-        self._step_us = step_us
-        self._now_us = now_us
-        self._sleep = sleep
+        self._step_us, self._now_us, self._sleep = step_us, now_us, sleep
         self._next_us = 0
         self.missed = 0
 
@@ -92,9 +90,7 @@ class Scattered:
     missed = 0
 
     def __init__(self, step_us: int, interval_us: int, sleep: Callable[[float], None]) -> None:
-        self._step_us = step_us
-        self._interval_us = interval_us
-        self._sleep = sleep
+        self._step_us, self._interval_us, self._sleep = step_us, interval_us, sleep
         self._rng = random.Random(0)
 
     def wait(self) -> None:
@@ -134,11 +130,7 @@ class ChipSource:
 
     def __init__(self, name: str, open_bus: Callable[[], I2cBus], make_chip: Callable[[I2cBus], Chip],
                  now_us: Callable[[], int], pace: Pace) -> None:
-        self.name = name
-        self._open_bus = open_bus
-        self._make_chip = make_chip
-        self._now_us = now_us
-        self._pace = pace
+        self.name, self._open_bus, self._make_chip, self._now_us, self._pace = name, open_bus, make_chip, now_us, pace
         self._bus: I2cBus | None = None
         self._device: Chip | None = None
         self._held: deque[tuple[int, Event]] = deque()
@@ -225,11 +217,7 @@ class SerialSource:
 
     def __init__(self, name: str, open_port: Callable[[], BytePort], now_us: Callable[[], int], wait_s: float,
                  sleep: Callable[[float], None] = time.sleep) -> None:
-        self.name = name
-        self._open_port = open_port
-        self._now_us = now_us
-        self._wait_s = wait_s
-        self._sleep = sleep
+        self.name, self._open_port, self._now_us, self._wait_s, self._sleep = name, open_port, now_us, wait_s, sleep
         self._rng = random.Random(0)
         self._has_slept = False
         self._port: BytePort | None = None

@@ -90,10 +90,6 @@ def _crc(data: bytes, polynomial: int, bits: int) -> int:
     return register
 
 
-def _novatel_is_right(frame: bytes) -> bool:
-    return crc32(frame[:-4], 0xFFFFFFFF) ^ 0xFFFFFFFF == _low(frame[-4:])
-
-
 _PROTOCOLS = (
     _Protocol("UBX frames (u-blox binary)", RECEIVER, b"\xb5\x62", 6, lambda h: 8 + _low(h[4:6]),
               lambda f: fletcher8(f[2:-2]) == f[-2:]),
@@ -106,7 +102,7 @@ _PROTOCOLS = (
     _Protocol("Septentrio SBF blocks", RECEIVER, b"$@", 8, lambda h: _low(h[6:8]),
               lambda f: _crc(f[4:], 0x1021, 16) == _low(f[2:4])),
     _Protocol("NovAtel binary messages", RECEIVER, b"\xaa\x44\x12", 10, lambda h: 4 + h[3] + _low(h[8:10]),
-              _novatel_is_right),
+              lambda f: crc32(f[:-4], 0xFFFFFFFF) ^ 0xFFFFFFFF == _low(f[-4:])),
     _Protocol("MediaTek binary packets", RECEIVER, b"\x04\x24", 4, lambda h: _low(h[2:4]),
               lambda f: f[-2:] == b"\r\n" and _folded(f[2:-3]) == f[-3]),
     _Protocol("WitMotion frames", SENSOR, b"\x55", 2, lambda h: 11 if 0x4F < h[1] < 0x60 else 0,

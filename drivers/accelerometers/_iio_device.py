@@ -131,18 +131,14 @@ def understood(description: Mapping[str, Any]) -> ScanLayout:
         timestamp = elements.get(TIMESTAMP) if description["clock"] == MONOTONIC else None
         name = str(description["name"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise BadReply(f"an IIO description: expected what the kernel says of its device, found {_shown(error)}"
-                       ) from None
+        raise BadReply(f"an IIO description: expected what the kernel says of its device, found "
+                       f"{shortened(str(error))}") from None
     if not polled and len(axes) != len(AXES):
         raise BadReply("an IIO description: expected scans with in_accel_x, in_accel_y and in_accel_z")
     if rate_hz <= 0 or 0.0 in scale:
         raise BadReply("an IIO description: expected a rate and scales other than 0")
     return ScanLayout(name, polled, rate_hz, axes if len(axes) == len(AXES) else (), timestamp, scan_bytes, scale,
                       offset, matrix)
-
-
-def _shown(error: Exception) -> str:
-    return shortened(str(error))
 
 
 def _number(text: object) -> float:
@@ -350,8 +346,7 @@ class IioDevice:
 
 
 class ScanPort:
-    """The character device of a buffer, as a ``BytePort`` that cannot be written to. NotPresent when it cannot be
-    opened."""
+    """The character device of a buffer, as a ``BytePort`` that takes no writes. NotPresent when it cannot be opened."""
 
     def __init__(self, path: Path, wait_readable: Callable[[int, float], bool]) -> None:
         try:

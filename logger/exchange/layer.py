@@ -259,8 +259,7 @@ class Format(ABC):
 
     @abstractmethod
     def content(self, layer: Layer, file: str) -> Iterable[bytes]:
-        """A file with all rows, in pieces. BadInput, with the name of the ``file`` that it is for, where a library that
-        it takes is missing."""
+        """A file with all rows, in pieces. BadInput, with the name of the ``file``, where a library is missing."""
 
 
 @cache
@@ -294,8 +293,7 @@ EXTRA = "{}: expected the 'maps' extra: pip install 'ridelog[maps]' ({})"
 
 
 def arrow_table(layer: Layer, file: str) -> pyarrow.Table:
-    """One row a feature, with well-known binary as ``geometry``. BadInput that names the file where the extra is
-    missing."""
+    """One row a feature, with well-known binary as ``geometry``. BadInput (the file) where the extra is missing."""
     try:
         import pyarrow
     except ImportError as error:

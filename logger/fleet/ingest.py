@@ -167,8 +167,7 @@ def _checks(data: bytes, wanted: bytes) -> npt.NDArray[np.int64] | None:
 
 
 def _quick(header: bytes, logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]] | None:
-    """All rows of intact logs, read at once: a reading has a cost of its own; None where a row is not what Arrow
-    reads."""
+    """All rows of intact logs, read at once, as each reading costs; None where a row is not what Arrow reads."""
     import pyarrow
     from pyarrow import csv
 

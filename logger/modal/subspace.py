@@ -224,8 +224,7 @@ def _log_det(errors: Array) -> Array:
 
 
 def summed_spectrum(samples: Array, rate_hz: float, segments: int) -> tuple[Array, float]:
-    """Power of each of equal segments of a record (samples, channels), summed over channels, (segments, bins), and the
-    spacing of the bins [Hz]."""
+    """Power (segments, bins) of a record (samples, channels), summed over channels, and the bins' spacing [Hz]."""
     fewest_segments = 4
     shortest_segment = 64
     length = len(samples) // max(segments, 1)

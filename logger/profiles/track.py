@@ -42,8 +42,7 @@ class WheelPath(Protocol):
 
 
 class Stance(Protocol):
-    """Where the wheels (w,) of a car stand: behind the front ones, left of the middle; and their patch [m]. Or whether
-    it is no car but a mass on a base."""
+    """Where wheels (w,) stand, behind the front and left of the middle, their patch [m]; or a mass on a base."""
 
     @property
     def behind_m(self) -> Array: ...

@@ -180,9 +180,11 @@ def _curves(one: Curves) -> list[Html]:
     for number, (line, shape) in enumerate(series):
         parts += _line(frame, line, shape, SERIES[number % len(SERIES)])
     below_px = None if level is None else frame.y(level)
+    names = [line.name for line, _ in series]
     if any(line.faint for line, _ in pairs):
-        return parts + _key_inside([line.name for line, _ in series])
-    return parts + _key([line.name for line, _ in series], below_px)
+        # In the lower left corner, where faint lines have their names at the right.
+        return parts + _keys(names, _CHART.left + 14, _CHART.bottom_px - _KEY_PX * len(names))
+    return parts + _key(names, below_px)
 
 
 def _faint(frame: _Frame, line: Line, shape: _Shape) -> list[Html]:
@@ -231,11 +233,6 @@ def _key(names: list[str], below_px: float | None) -> list[Html]:
     at_the_top = below_px is None or below_px >= _CHART.height / 2
     top = _CHART.top + 10 if at_the_top else _CHART.bottom_px - _KEY_PX * len(names)
     return _keys(names, _CHART.right_px + 6, top)
-
-
-def _key_inside(names: list[str]) -> list[Html]:
-    """The same in the lower left corner, where faint lines have their names at the right."""
-    return _keys(names, _CHART.left + 14, _CHART.bottom_px - _KEY_PX * len(names))
 
 
 def _keys(names: list[str], x: int, top: int) -> list[Html]:
@@ -290,8 +287,7 @@ def _axes(frame: _Frame, x_name: str, y_name: str, log_x: bool = False, log_y: b
 
 @dataclass(frozen=True)
 class Steps:
-    """What is drawn: words and a value (0 or more) per step, at least one; ``level``: a value that has a name, drawn
-    across."""
+    """Words and a value (0 or more) per step, at least one; ``level``: a value with a name, drawn across."""
 
     title: str
     unit: str

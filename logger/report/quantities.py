@@ -27,8 +27,7 @@ _ENDING = re.compile(rf"(?:_(?P<over>(?:n|kg|w|j|pa)(?:_(?:m|s|rad)[2-9]?)+|{_UN
 
 
 def unit_of(name: str) -> str:
-    """The unit that a name ends in, ``N s/m`` of ``damping_n_s_per_m``, ``1/s`` of ``decay_per_s``; nothing for a
-    ratio."""
+    """The unit a name ends in, ``N s/m`` of ``damping_n_s_per_m``, ``1/s`` of ``decay_per_s``; empty: a ratio."""
     ending = _ENDING.search(name)
     assert ending is not None  # the end alone is one
     over, under = _product(ending["over"] or ""), [_product(one) for one in ending["under"].split("per_")[1:]]

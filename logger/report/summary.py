@@ -301,12 +301,9 @@ def _places(places: Sequence[RoughWindow]) -> list[str]:
     if not places:
         return ["  none with a value"]
     return [f"  {number}. IRI {iri_words(place):>11} m/km  at {place_words(place):>20}  "
-            f"({distance_words(place.along_m)} along{_speed(place)}) {comfort_words(place.comfort)}"
+            f"({distance_words(place.along_m)} along{'' if place.speed_mps is None else ', '}"
+            f"{'' if place.speed_mps is None else f'{place.speed_mps * 3.6:.0f} km/h'}) {comfort_words(place.comfort)}"
             for number, place in enumerate(places, start=1)]
-
-
-def _speed(place: RoughWindow) -> str:
-    return "" if place.speed_mps is None else f", {place.speed_mps * 3.6:.0f} km/h"
 
 
 def _can_encode(text: str, encoding: str) -> bool:

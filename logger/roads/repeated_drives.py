@@ -166,8 +166,7 @@ class Means:
 
 
 def variances(passes: Passes, scatter: Scatter) -> Array:
-    """Of each pass (p,): its own, and what the scatter adds at the level of its cell [(m/km)2]; without what is common
-    to all."""
+    """Of each pass (p,): its own, and what the scatter adds at its cell [(m/km)2]; without what is common to all."""
     _, cell = np.unique(passes.key, return_inverse=True)
     level = (np.bincount(cell, passes.iri_m_per_km) / np.maximum(np.bincount(cell), 1))[cell]
     return np.asarray(passes.own_variance
@@ -473,8 +472,7 @@ def _r2(error: Array, truth: Array) -> float:
 
 
 def factor_to(iri_m_per_km: Array, reference_m_per_km: Array) -> float:
-    """What estimates (n,) are to be multiplied by: the geometric mean of reference over estimate; NaN: none is
-    known."""
+    """Factor for estimates (n,): the geometric mean of reference over estimate; NaN: none is known."""
     known = (iri_m_per_km > 0) & (reference_m_per_km > 0)
     if not known.any():
         return float("nan")

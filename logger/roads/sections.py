@@ -125,8 +125,7 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
 
 
 def _scatter_share(iri: Array) -> float:
-    """Variance of windows (n,) about the road around them, half the mean square of the steps to neighbours, as a share
-    of the mean square."""
+    """Variance of windows (n,) about the road (half the mean square step), as a share of the mean square."""
     steps, known = np.diff(iri), iri[np.isfinite(iri)]
     steps = steps[np.isfinite(steps)]
     return float(np.mean(steps**2) / 2 / np.mean(known**2)) if len(steps) and known.any() else 0.0

@@ -60,10 +60,7 @@ class EventCore:
     """
 
     def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Stepped, sink: RowSink) -> None:
-        self.accelerometer = accelerometer
-        self.gps = gps
-        self._pipeline = pipeline
-        self._sink = sink
+        self.accelerometer, self.gps, self._pipeline, self._sink = accelerometer, gps, pipeline, sink
         self._fixes: list[Fix] = []
         self._next_step_us: int | None = None
         self._last_event_us = 0

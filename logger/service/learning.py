@@ -255,9 +255,7 @@ class ReceiverLearning(CarriedLearning[CarriedDelay]):
     def __init__(self, folder: Path, alignment: DriveAlignment, known: CarriedDelay, learnt: CarriedDelay | None,
                  files: FileSystem | None = None) -> None:
         super().__init__(DELAY, folder, known, files, DELAY.fields(learnt) if learnt else None)
-        self._alignment = alignment
-        self._learnt = learnt
-        self.known = known
+        self._alignment, self._learnt, self.known = alignment, learnt, known
 
     @property
     def now(self) -> CarriedDelay | None:

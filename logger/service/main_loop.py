@@ -70,9 +70,7 @@ class Listener(threading.Thread):
 
     def __init__(self, supervisor: Supervisor, events: deque[Event], pace: Callable[[], None]) -> None:
         super().__init__(name=supervisor.name, daemon=True)
-        self._supervisor = supervisor
-        self._events = events
-        self._pace = pace
+        self._supervisor, self._events, self._pace = supervisor, events, pace
         self._stop_asked = threading.Event()
         self.failure: BaseException | None = None
         self.waiting_since_us: int | None = None
@@ -130,9 +128,7 @@ class Player:
     """
 
     def __init__(self, core: EventCore, rate: float, progress: Callable[[float], None]) -> None:
-        self._core = core
-        self._rate = rate
-        self._progress = progress
+        self._core, self._rate, self._progress = core, rate, progress
 
     def play(self, events: Iterable[Event]) -> Playback:
         """All events, then the end of the drive."""
@@ -174,10 +170,7 @@ class MainLoop:
 
     def __init__(self, core: EventCore, storage: Storage, listeners: list[Listener], events: deque[Event],
                  sync_s: float, beat_s: float, beat: Callable[[int], None]) -> None:
-        self._core = core
-        self._storage = storage
-        self._listeners = listeners
-        self._events = events
+        self._core, self._storage, self._listeners, self._events = core, storage, listeners, events
         self._merger = EventMerger()
         self._sync_us = round(sync_s * US_PER_S)
         self._beat_us = round(beat_s * US_PER_S)

@@ -79,7 +79,10 @@ class RoughnessQueue:
     def ready(self) -> list[tuple[Waiting, WindowEstimate | None]]:
         """Windows whose estimate has come, or for which there will be none."""
         done = []
-        while self._queue and self._has_settled(self._queue[0].window):
+        while self._queue:
+            window = self._queue[0].window
+            if _is_whole(window) and window.leg == self._leg and window.number >= self._expected:
+                break
             waiting = self._queue.popleft()
             key = (waiting.window.leg, waiting.window.number)
             done.append((waiting, self._estimates.pop(key, None) if _is_whole(waiting.window) else None))
@@ -92,9 +95,6 @@ class RoughnessQueue:
             if self._leg is not None:
                 self._estimates[self._leg, estimate.number] = estimate
             self._expected = estimate.number + 1
-
-    def _has_settled(self, window: Window) -> bool:
-        return not _is_whole(window) or window.leg != self._leg or window.number < self._expected
 
 
 def _is_whole(window: Window) -> bool:
@@ -145,10 +145,7 @@ class Pipeline(JudgedDrive):
                  alignment: DriveAlignment, comfort: ComfortColumns, range_use: RangeUse,
                  spectra: SpectraKeeper) -> None:
         super().__init__(alignment, settings.latency_s)
-        self._settings = settings
-        self._chain = chain
-        self._estimator = estimator
-        self._relation = relation
+        self._settings, self._chain, self._estimator, self._relation = settings, chain, estimator, relation
         self._comfort = comfort
         self._roughness = RoughnessQueue(estimator)
         self._cutter = WindowCutter(settings.window_m, settings.blind_window_s, GRID_STEP_US)
@@ -193,7 +190,8 @@ class Pipeline(JudgedDrive):
         self.range_use.take(block, fixes)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
-        self._release(self._settled_until_us(now_us))
+        # Samples before this instant will not learn more about their motion.
+        self._release(now_us - FIX_DELAY_US if self._is_lost(now_us) else self._last_known_us(now_us))
         ended = self._active_us is not None and now_us - self._active_us >= self._drive_end_us
         if ended:
             self._end_leg()
@@ -238,10 +236,6 @@ class Pipeline(JudgedDrive):
     def crowded_samples(self) -> int:
         """Samples left out because they came too soon after another."""
         return self._chain.crowded_samples
-
-    def _settled_until_us(self, now_us: int) -> int:
-        """Samples before this instant will not learn more about their motion."""
-        return now_us - FIX_DELAY_US if self._is_lost(now_us) else self._last_known_us(now_us)
 
     def _is_lost(self, now_us: int) -> bool:
         """No fix has come for longer than is bridged."""

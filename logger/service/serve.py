@@ -64,10 +64,7 @@ class StatusReporter:
     def __init__(self, config: Config, core: EventCore, storage: Storage, pipeline: Pipeline, accelerometer: Supervisor,
                  gps: Supervisor, counters: Mapping[str, Callable[[], dict[str, int]]], notices: tuple[str, ...] = (),
                  learning: ReceiverLearning | None = None, noise: NoiseLearning | None = None) -> None:
-        self._config = config
-        self._core = core
-        self._storage = storage
-        self._pipeline = pipeline
+        self._config, self._core, self._storage, self._pipeline = config, core, storage, pipeline
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
         self._notices = notices

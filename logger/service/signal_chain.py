@@ -75,9 +75,7 @@ class SignalChain:
 
     def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None, coarse: bool,
                  make_filter: Callable[[SectionRows], BlockFilter | FixedFilter] = BlockFilter) -> None:
-        self._axis = axis
-        self._coarse = coarse
-        self._oversample = oversample
+        self._axis, self._coarse, self._oversample = axis, coarse, oversample
         self._reads = oversample if coarse else 1
         self._resampler = GridResampler(GRID_RATE_HZ * oversample)
         self._decimator = Decimator(oversample)

@@ -72,8 +72,7 @@ class FileCheck:
 
 @dataclass
 class _Findings:
-    """What is being found in one file, the records at its ends, the damaged lines beyond them, and the holes that a
-    repair has left."""
+    """What is found in one file, the records at its ends, damaged lines beyond them, holes that a repair left."""
 
     good: int = 0
     torn: int = 0
@@ -346,17 +345,14 @@ def _check_manifest(path: Path) -> FileCheck:
             findings.corrupt = 1
             findings.wrong(f"corrupt: {error}")
             return findings.check(path, "manifest", "manifest")
-        present = {name for name in folder.each_name() if name in listed or _is_of_ours(name)}
+        present = {name for name in folder.each_name() if name in listed or LogName.of(Path(name))
+                   or name.endswith(DUMP_ENDINGS)}
         for name, digest in listed.items():
             _compare_with_manifest(findings, folder, name, digest, name in present)
     for name in sorted(present - set(listed)):
         findings.gaps += 1
         findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
     return findings.check(path, "manifest", "manifest")
-
-
-def _is_of_ours(name: str) -> bool:
-    return LogName.of(Path(name)) is not None or name.endswith(DUMP_ENDINGS)
 
 
 def _compare_with_manifest(findings: _Findings, folder: DirectoryHandle, name: str, digest: str, present: bool) -> None:

@@ -117,8 +117,7 @@ def drive_over(road: Track, speed_mps: float, conditions: Conditions, vehicle: V
 
 
 def random_road(iri_m_per_km: float, length_m: float, seed: int, waviness: float = STANDARD_WAVINESS) -> Track:
-    """A random road whose places count from 0 m to its length, with some more before and behind, of this IRI on the
-    average of such roads."""
+    """A random road from 0 m to its length, with some more on either side, of this IRI on average."""
     road_spacing_m = 0.05
     whole_m = _BEFORE_M + length_m + _BEHIND_M
     gd_n0_cm3 = (iri_m_per_km / iri_per_root_gd(waviness)) ** 2

@@ -221,8 +221,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Result:
-    """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures; what of the
-    print can be checked."""
+    """What a study found: tables, printed beside ours; what agrees or not, and why; pictures; what can be checked."""
 
     tables: tuple[Table, ...]
     verdict: str
@@ -335,8 +334,7 @@ class Study:
         return tuple(one for one in result.values if item in (one.of or self.covers))
 
     def differs(self, result: Result) -> str:
-        """A sentence that names the checks which do not hold, and the items whose checks come to another word; empty:
-        all is as stated."""
+        """A sentence on checks that do not hold and items whose checks come to another word; empty: as stated."""
         wrong = [one.wrong for one in result.values if not one.holds]
         for item in self.items:
             found = word_of(self.checks_of(item.name, result))

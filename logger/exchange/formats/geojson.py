@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Format, Geometry, Layer, Line, type_of
+from logger.exchange.layer import DECIMALS, LINES, POINT, TYPE_NAMES, Format, Geometry, Layer, type_of
 
 
 class GeoJson(Format):
@@ -28,13 +28,10 @@ class GeoJson(Format):
 def _geometry(geometry: Geometry) -> dict[str, Any] | None:
     if not geometry:
         return None
-    kind, lines = type_of(geometry), [_places(line) for line in geometry]
+    kind = type_of(geometry)
+    lines = [[[round(degrees, DECIMALS) for degrees in place] for place in line] for line in geometry]
     return {"type": TYPE_NAMES[kind],
             "coordinates": lines if kind == LINES else lines[0][0] if kind == POINT else lines[0]}
-
-
-def _places(line: Line) -> list[list[float]]:
-    return [[round(degrees, DECIMALS) for degrees in place] for place in line]
 
 
 FORMAT = GeoJson()

@@ -329,8 +329,7 @@ def _before_utc(pairs: Sequence[Pair]) -> list[Pair]:
 
 
 def _aligned(pairs: Sequence[Pair], shift_us: int) -> list[Pair]:
-    """The pairs with the service's clock, segments and drives counted as in the replay. Where no rows were written
-    before, no drive had been either."""
+    """The pairs with clock, segments and drives as in the replay; without rows before, no drive was before either."""
     segments = round(_median([found.segment - wanted.segment for wanted, found in pairs]))
     drives = round(_median([found.drive - wanted.drive for wanted, found in pairs])) if segments else 0
     return [(wanted, replace(found, t_us=found.t_us - shift_us, segment=found.segment - segments,

@@ -74,8 +74,7 @@ class DirectoryHandle:
         return cls(os.open(path, _DIRECTORY))
 
     def inside(self, name: str, make: bool = True) -> DirectoryHandle:
-        """The folder of that name in this one, made when it is not there and ``make``. Raises ``OSError`` for a link or
-        a file."""
+        """The folder of that name in this one, made if ``make``. Raises ``OSError`` for a link or a file."""
         try:
             return DirectoryHandle(os.open(name, _DIRECTORY | os.O_NOFOLLOW, dir_fd=self._descriptor))
         except FileNotFoundError:
@@ -214,8 +213,7 @@ class DirectoryHandle:
         self.sync()
 
     def replace(self, name: str, blocks: Iterable[bytes]) -> None:
-        """Write a file that is there whole, in place of the old one, or not at all. What has its name and is no file
-        is put aside."""
+        """Write a file whole, in place of the old one, or not at all. What has its name and is no file is put aside."""
         temporary, _ = self.write(blocks)
         try:
             self._make_way(name)

@@ -108,8 +108,7 @@ def _line(named: tuple[str, Mark]) -> str:
 
 
 def _stored(log_folder: DirectoryHandle) -> Iterator[tuple[str, Mark]]:
-    """The marks, one at a time; they are true once all have come. Raises ValueError where their file is not there,
-    cannot be read, or is not whole."""
+    """The marks, one at a time; true once all have come. Raises ValueError where their file is not there or whole."""
     try:
         with log_folder.open(MARKS_NAME) as file:
             lines = list_lines(file.blocks())
@@ -244,11 +243,7 @@ class _Export:
 
     def __init__(self, card: DirectoryHandle, stick: DirectoryHandle, identity: str, report: Callable[[Progress], None],
                  name: str, why_not: str) -> None:
-        self._card = card
-        self._stick = stick
-        self._identity = identity
-        self._report = report
-        self._name = name
+        self._card, self._stick, self._identity, self._report, self._name = card, stick, identity, report, name
         self._counts = not why_not
         self._digits = secrets.token_hex(4)
         self._marks = read_marks(card)
@@ -448,8 +443,7 @@ def _overlap(one: Path, other: Path) -> bool:
 
 
 def _lineage(folder: Path) -> list[tuple[int, int] | None]:
-    """What distinguishes a folder and all that hold it from others, itself first: device and inode; None for what is
-    not."""
+    """Device and inode of a folder and of all that hold it, itself first; None for what is not there."""
     resolved = folder.resolve()
     return [_identity(path) for path in (resolved, *resolved.parents)]
 

@@ -71,8 +71,7 @@ class _Home:
 
 
 def logger_identity(log_folder: DirectoryHandle, place: Path) -> str:
-    """The 12 hex digits of the logger whose folder this is, at ``place``, made when there are none. Raises ``OSError``
-    when there can be none."""
+    """The 12 hex digits of the logger whose folder this is, at ``place``, made if needed. Raises ``OSError``."""
     here = _Home("", _machine(), str(place.resolve()))
     known = _known(log_folder, here)
     if known is not None and known.place == here.place and _read_identity(log_folder) == known.identity:
@@ -148,12 +147,8 @@ def _machine() -> str:
         except OSError:
             continue
         if said.strip(b"0") and said != b"uninitialized":  # as systemd says at the first boot
-            return _digest(said)
+            return hashlib.sha256(b"ridelog " + said).hexdigest()[:12]
     return ""
-
-
-def _digest(said: bytes) -> str:
-    return hashlib.sha256(b"ridelog " + said).hexdigest()[:12]
 
 
 OFF, FIRST_STICK, KEY_FILE = MODES = ("off", "first_stick", "key_file")

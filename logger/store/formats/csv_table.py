@@ -154,7 +154,8 @@ def _unknown(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said:
     for number, end, line in head:
         for delimiter in _delimiters(line, said):
             cells = _names(line, delimiter)
-            if len(cells) > 1 and any(map(_is_value, cells)) and all(_is_value(one) or _is_empty(one) for one in cells):
+            if len(cells) > 1 and any(map(_is_value, cells)) and all(
+                    _is_value(one) or one.lower() in _EMPTY for one in cells):
                 alike = [(before, names) for before in reversed(above) for names in [_names(before[2], delimiter)]
                          if len(names) == len(cells) and not any(map(_is_value, names))]
                 if len(alike) > 1 and unit_of is not None and any(map(unit_of, alike[0][1])):
@@ -220,10 +221,6 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _is_value(cell: str) -> bool:
     return bool(_NUMBER.fullmatch(cell.replace(",", "."))) or seconds_of_date(cell) is not None
-
-
-def _is_empty(cell: str) -> bool:
-    return cell.lower() in _EMPTY
 
 
 def _text(data: bytes, file: str) -> bytes:

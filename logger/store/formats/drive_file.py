@@ -109,8 +109,7 @@ def read_run_facts(folder: Path) -> RecordFacts:
 
 
 def read_forces(folder: Path) -> tuple[AppliedForce, ...]:
-    """What the forces of a rig act on, by the ``run.yaml`` of its folder; none where there is none. BadInput as
-    ``read_run_facts``."""
+    """What the forces of a rig act on, by the ``run.yaml`` of its folder, if any. BadInput as ``read_run_facts``."""
     path = folder / RUN
     said = load_mapping(path).mapping(optional=_KEYS) if path.exists() else {}
     return tuple(_force(name, node) for name, node in said["forces"].mapping().items()) if "forces" in said else ()

@@ -167,7 +167,8 @@ def named_columns(text: str) -> Named:
     """The columns of ``--columns "t=time:ms,x=ax:g,..."``. Raises BadInput for a role or a unit that is not known."""
     starts = [found.start() for found in re.finditer(rf"(?:^|(?<=,))(?={_ENTRY.pattern})", text)]
     if not starts or starts[0] != 0:
-        raise BadInput(f"--columns: expected {_form()}, found {shown(text)}")
+        raise BadInput(f"--columns: expected ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}, found "
+                       f"{shown(text)}")
     named: dict[str, tuple[LayoutColumn, ...]] = {}
     for start, end in zip(starts, [*starts[1:], len(text) + 1], strict=True):
         role, _, rest = text[start : end - 1].partition("=")
@@ -270,10 +271,6 @@ def advice(names: Sequence[str]) -> str:
             chosen.append(f"{role}={fits[0].strip()}" + ("" if unit_in(fits[0], role) or role in PLACE else ":UNIT"))
     example = ",".join(chosen) if len(chosen) > 1 else "t=TIME:ms,x=X:g,y=Y:g,z=Z:g,lat=LAT,lon=LON,speed=SPEED:km/h"
     return f'--columns "{example}"'
-
-
-def _form() -> str:
-    return f"ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,8 +44,7 @@ class _Matrix:
 
 
 def read_arrays(path: Path, names: tuple[str, ...]) -> list[Array]:
-    """Arrays of these names, each as one row of numbers (n,), column by column. Raises BadInput for what is not there
-    or no numbers."""
+    """Arrays of these names, each as a row (n,), column by column. BadInput for what is not there or no numbers."""
     found = {one.name: one for one in _load(path)}
     arrays = []
     for name in names:

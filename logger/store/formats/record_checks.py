@@ -86,8 +86,7 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Resampled:
-    """How a record was laid on an even grid: its own rate [Hz], its widest step [s], the share of repeated samples that
-    were dropped before."""
+    """How a record was laid on an even grid: its rate [Hz], its widest step [s], the share of repeats dropped."""
 
     from_hz: float
     to_hz: float
@@ -142,8 +141,8 @@ def even_record(t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Arr
         doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven])
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
-        raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
-                       f"{_rate_hz(t_s):.4g}): --resample drops the repeats")
+        raise BadInput(f"{file}: {repeats.complaint} ({1 / np.median(np.diff(fresh_times(repeats, t_s))):.3g} Hz "
+                       f"written at {_rate_hz(t_s):.4g}): --resample drops the repeats")
     kept = ~held if repeats is None else repeats.fresh
     doubts += [doubt for name, axis in zip(accel, samples[kept].T, strict=True) for doubt in end_doubts(name, axis)]
     if asked.resample_hz is None:
@@ -176,8 +175,7 @@ def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
 
 
 def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
-    """The same with the doubts that the marks (n,) of a drive raise, as ``logger.runs`` has them; None: there are
-    none."""
+    """The same with the doubts that the marks (n,) of a drive raise (``logger.runs``); None: there are none."""
     if usable is None:
         return record
     share, clipped = float((usable == NO_READING).mean()), int(np.count_nonzero(usable == CLIPPED))
@@ -261,13 +259,8 @@ def _rate_hz(t_s: Array) -> float:
     return float((len(t_s) - 1) / (t_s[-1] - t_s[0]))
 
 
-def _true_rate_hz(repeats: RepeatedSamples, t_s: Array) -> float:
-    return float(1.0 / np.median(np.diff(fresh_times(repeats, t_s))))
-
-
 def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
-    """What makes one doubt that samples (n, axes) are in m/s2. BadInput where they are in g, as gravity is in them, or
-    are all 0."""
+    """Doubts that samples (n, axes) are in m/s2. BadInput where they are in g, by the gravity in them, or all 0."""
     # A mean so near to 1 with so little about it is a record in g: 3 % is what sensors are off.
     GRAVITY, gravity_near, gravity_calm = 1.0, 0.03, 0.35
     # R.m.s. about the mean: on a moving car it is more (0.15 on a new motorway, a tenth of it in g) and less.

@@ -20,7 +20,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,10 +37,6 @@ from logger.vehicle.models import GOLDEN_CAR
 from logger.vehicle.named_parameters import PRELOAD, changed, names, read, sized
 from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, OWN_NAMES, Axle, SensorPlace, Vehicle
-
-if TYPE_CHECKING:
-    from logger.vehicle.effect import Chosen
-
 
 _CAR_KEYS = ("sprung_mass_kg", "front", "contact_patch_m")
 # What moves of a component may be too light to matter.
@@ -196,8 +192,7 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
 
 
 def _plain_number(node: Node, name: str, known: dict[str, Known]) -> Node:
-    """The number of a node without how well it is known, which is added to ``known``. BadInput for what says neither.
-    """
+    """The number of a node without how well it is known, which goes to ``known``. BadInput for neither."""
     if name == PRELOAD:
         return _plain_preload(node, known)
     if isinstance(node.content, tuple):
@@ -437,8 +432,8 @@ def write_model(path: Path | str, model: CarModel, comments: str = "") -> None:
                  if read(model.given, name) != read(model.vehicle, name)}
         keys["given"] = moved | {name: _known_words(one) for name, one in model.known.items()}
     if model.history:
-        keys["history"] = [_OneLine(step=one.step, error=float(one.error),
-                                    noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
+        keys["history"] = [_OneLine(step=one.step, error=float(one.error), noise_floor_error=one.noise_floor_error
+                                    and float(one.noise_floor_error)) for one in model.history]
     text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
     write_text(path, comments + text)
 
@@ -446,10 +441,6 @@ def write_model(path: Path | str, model: CarModel, comments: str = "") -> None:
 def _known_words(known: Known) -> object:
     """How well a number was known, as YAML writes it."""
     return _OneLineList(json.loads(known.words)) if known.words.startswith("[") else known.words
-
-
-def _float_or_none(value: float | None) -> float | None:
-    return None if value is None else float(value)
 
 
 class _OneLine(dict[str, object]):

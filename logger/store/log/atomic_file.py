@@ -165,8 +165,7 @@ def name_of_temporary(path: Path) -> str | None:
 
 
 def _created(files: FileSystem, path: Path) -> tuple[Path, int]:
-    """An empty temporary file and its descriptor. Names of which something there is not to be written to are passed
-    over."""
+    """An empty temporary file and its descriptor. Names that something has which takes no bytes are passed over."""
     for temporary in numbered(path.with_name(f"{path.name}.tmp")):
         is_in_the_way = is_taken(temporary)
         try:

@@ -47,10 +47,7 @@ class DumpRecording:
 
     def __init__(self, directory: Path, header: DumpHeader, session: Callable[[], int | None],
                  now_us: Callable[[], int], files: FileSystem) -> None:
-        self._directory = directory
-        self._header = header
-        self._session = session
-        self._now_us = now_us
+        self._directory, self._header, self._session, self._now_us = directory, header, session, now_us
         self._files = files
         self._writer: DumpWriter | None = None
         self._path = directory
@@ -115,8 +112,7 @@ class DumpRecording:
             self._leave()
 
     def _leave(self) -> None:
-        """The next file gets another name. One without events goes: a disk that refuses for a day would leave a file
-        for each minute of it."""
+        """The next file gets another name. One without events goes: a disk may refuse each minute for a day."""
         if not self._holds_events:
             try:
                 self._files.remove(self._path)
@@ -197,8 +193,7 @@ def mount_of(folder: Path, mounts: Sequence[Mount]) -> Mount | None:
 
 
 def are_on_one_disk(one: Path, other: Path) -> bool:
-    """Whether two folders lie on the same file system, by whatever path, or on parts of the same disk. Raises
-    ``OSError``."""
+    """Whether two folders lie on one file system, by whatever path, or on one disk. Raises ``OSError``."""
     devices = [folder.stat().st_dev for folder in (one, other)]
     if devices[0] == devices[1]:
         return True
@@ -267,8 +262,7 @@ def _room(mount: Mount) -> tuple[int, int, int] | None:
 
 
 def _disk(device: int, mount: Mount | None) -> Path | None:
-    """The disk of a device number, which a file system of several devices or volumes does not have: then that of what
-    is mounted."""
+    """The disk of a device number; of a file system of several devices, that of what is mounted."""
     for number in (device, _device_of(mount)):
         place = (BLOCK_DEVICES / f"{os.major(number)}:{os.minor(number)}").resolve()
         if place.is_dir():
@@ -347,10 +341,7 @@ class DiskQuota:
 
     def __init__(self, directory: Path, limits: QuotaLimits, exported: Callable[[Path], set[str]],
                  files: FileSystem) -> None:
-        self._directory = directory
-        self._limits = limits
-        self._exported = exported
-        self._files = files
+        self._directory, self._limits, self._exported, self._files = directory, limits, exported, files
         self._logs_held = False
         self._dumps_held = False
         self._read_only = False
@@ -398,7 +389,9 @@ class DiskQuota:
         found = []
         for path in self._directory.iterdir():
             own = OwnFile.of(path.name)
-            if own is None or own.is_open or not is_file(path) or (own.kind == ".json" and not self._is_alone(path)):
+            if own is None or own.is_open or not is_file(path):
+                continue
+            if own.kind == ".json" and any(is_taken(path.with_suffix(ending)) for ending in (".csv", ".csv.part")):
                 continue
             is_dump = own.kind == ENDING
             sidecar = path.with_suffix(".json")
@@ -407,10 +400,6 @@ class DiskQuota:
             is_exported = all(each.name in exported for each in paths)
             found.append((own.session, own.part, _Kept(paths, size_bytes, is_dump, is_exported)))
         return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]
-
-    @staticmethod
-    def _is_alone(sidecar: Path) -> bool:
-        return not any(is_taken(sidecar.with_suffix(ending)) for ending in (".csv", ".csv.part"))
 
     def _make_room(self, goal_bytes: int, files: list[_Kept]) -> None:
         for kept in files:

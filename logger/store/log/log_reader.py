@@ -111,8 +111,7 @@ def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
 
 
 def read_found(found: Iterable[tuple[Path, Path | None]]) -> list[LoggedFile]:
-    """The logs that ``find_logs_in`` found, as they are read; those that are there no more are left out. BadInput as
-    ``read_logged``."""
+    """The logs that ``find_logs_in`` found, but those that are there no more. BadInput as ``read_logged``."""
     return [logged for log, place in found if (logged := read_logged(log, place)) is not None]
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.printable import counted
-from logger.records import WindowRecord
 from logger.store.log.atomic_file import (
     Warn,
     disk_words,
@@ -92,8 +91,7 @@ def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_i
 
 
 def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
-    """Remove a temporary file that a cut has left. What has the name of a log, a sidecar or such a file and is none is
-    put aside."""
+    """Remove what a cut left as temporary; put aside what has such a name, a log's or a sidecar's, and is no file."""
     whole_name = name_of_temporary(path) or path.name
     is_temporary = whole_name != path.name
     own = OwnFile.of(whole_name)
@@ -112,8 +110,7 @@ def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
 
 
 def _remove_lone(files: FileSystem, sidecar: Path, warn: Warn) -> None:
-    """Remove the sidecar of a part that had not yet got its name. That of a finished log which somebody took away
-    stays."""
+    """Remove the sidecar of a part that had no name yet. That of a finished log that was taken away stays."""
     try:
         said = (read_sidecar(sidecar, files) or {}).get("log")
         if isinstance(said, dict) and said.get("state") == "open":
@@ -187,8 +184,7 @@ def _is_damaged(files: FileSystem, finished: Path) -> bool:
 
 
 def _explains_a_gap(files: FileSystem, part: Path, tally: Tally, limit: int | None) -> bool:
-    """True for a part without an intact row where rows are missing between the parts around it, so that a file has to
-    stay that says why."""
+    """True for a part without an intact row that has to stay, to say why rows are missing between its neighbours."""
     if limit is None or not tally.damaged_rows:
         return False
     earlier = sorted((log for log in logs_of_session(part) if _place(log) < _place(part)), key=_place, reverse=True)
@@ -302,7 +298,7 @@ def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]
     lines = [HEADER]
     for row in rows:
         lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
-                     else format_row(_with_utc(row.record, clock)))
+                     else format_row(replace(without_utc(row.record), utc_us=row.record.t_us + clock.offset_us)))
         if len(lines) >= 256:
             yield _joined(lines)
             lines.clear()
@@ -311,10 +307,6 @@ def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]
 
 def _joined(lines: list[str]) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
-
-
-def _with_utc(record: WindowRecord, clock: ClockMap) -> WindowRecord:
-    return replace(without_utc(record), utc_us=record.t_us + clock.offset_us)
 
 
 def remove_part(files: FileSystem, part: Path) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import isfinite
@@ -97,10 +97,6 @@ def _read_count(text: str) -> int:
     return int(text)
 
 
-def _seconds_of_us(name: str, attribute: str) -> LogColumn:
-    return LogColumn(name, attribute, _write_seconds, _read_seconds)
-
-
 def _read_decimal(text: str, pattern: str, largest: float) -> float:
     """A number as the pattern writes it, and in no other way."""
     value = float(text)
@@ -153,7 +149,7 @@ def _read_word(text: str, known: re.Pattern[str]) -> str:
 COLUMNS = (
     _count("segment"),
     LogColumn("t_utc", "utc_us", write_utc, _read_utc),
-    _seconds_of_us("t_s", "t_us"),
+    LogColumn("t_s", "t_us", _write_seconds, _read_seconds),
     _number("distance_start_m", 3),
     _number("distance_end_m", 3),
     _number("lat_deg", 7, 90.0),
@@ -227,11 +223,8 @@ _COUNTS = (len(COLUMNS), 29, 23)
 from the noise."""
 
 
-def _header(columns: Sequence[LogColumn]) -> str:
-    return ",".join([*(column.name for column in columns), "crc32"])
-
-
-HEADERS = tuple(_header(COLUMNS[:count]) for count in _COUNTS)  # Of logs of today first, then of older ones
+# Of logs of today first, then of older ones.
+HEADERS = tuple(",".join([*(column.name for column in COLUMNS[:count]), "crc32"]) for count in _COUNTS)
 HEADER = HEADERS[0]
 SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
 """A row of which nothing is known but what always is."""

@@ -273,8 +273,7 @@ def sidecar_or_nothing(log: Path, files: FileSystem | None = None) -> dict[str, 
 
 
 def repairs_of(content: dict[str, Any]) -> Tally:
-    """What a sidecar says of earlier repairs of its log: damaged lines, a torn tail, holes. What cannot be is left
-    out."""
+    """Earlier repairs by a sidecar: damaged lines, a torn tail, holes. What cannot be is left out."""
     said = content.get("log")
     if not isinstance(said, dict):
         return Tally()

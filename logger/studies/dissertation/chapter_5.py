@@ -347,7 +347,7 @@ def _t5_5(effort: Workload) -> Result:
 
 
 def _record(surface: str, kmh: float, iri: float, seed: int) -> Array:
-    shape = _bumps if surface == "speed bumps" else _flat
+    shape = _bumps if surface == "speed bumps" else np.zeros_like
     return record_of(shape, kmh / 3.6, 60.0, PS_2119.on(iri, seed)).measured_mps2
 
 
@@ -366,10 +366,6 @@ def _row_t5_5(printed: tuple[str, float, float, float, float], iri: float, accel
                                                                        for low, high in bands_hz)]
     return (surface, kmh, iri, largest_g, float(np.abs(accel).max()) / STANDARD_GRAVITY_MPS2, f1_hz, peaks[0], f2_hz,
             peaks[1])
-
-
-def _flat(place_m: np.ndarray) -> np.ndarray:
-    return np.zeros_like(place_m)
 
 
 def _bumps(place_m: np.ndarray) -> np.ndarray:

@@ -124,7 +124,8 @@ def _t6_1(effort: Workload) -> Result:
             for bump, pair in enumerate(PRINTED_PERCENT, start=1)])))
     errors = {"printed": np.ravel(PRINTED_PERCENT), "their way": theirs, "ours": ours}
     scatter = Picture(Curves("Errors of the mass, sorted by size", "share of the drives [%]", "error of the mass [%]",
-                             tuple(_sorted(name, found) for name, found in errors.items())),
+                             tuple(Line(name, 100 * (np.arange(len(found)) + 0.5) / len(found), np.sort(np.abs(found)))
+                                   for name, found in errors.items())),
                       "Fig 6.1: the estimated bump and the recorded response to it")
     return Result((printed, one_by_one, many), verdict, (scatter,), values)
 
@@ -139,10 +140,6 @@ def _largest(cases: Sequence[tuple[float, float, float]], way: int) -> float:
     """Error of their way (0) or ours (1) with a width or a speed that is off [%]."""
     return max(abs(found[way]) for case, found in zip(CASES_T6_1, cases, strict=True)
                if case[0][:5] in ("width", "speed"))
-
-
-def _sorted(name: str, errors: np.ndarray) -> Line:
-    return Line(name, 100 * (np.arange(len(errors)) + 0.5) / len(errors), np.sort(np.abs(errors)))
 
 
 def _both_ways(height: float, width: float, speed: float, iri: float, seed: int) -> tuple[float, float, float]:

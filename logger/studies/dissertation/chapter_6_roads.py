@@ -288,7 +288,8 @@ def _f6_16(effort: Workload) -> Result:
         *(Column(f"IRI {level:g}") for level in (1, 2, 4, 8)),
         Column("little uncomfortable from IRI [m/km]", ".1f")), tuple(
         (float(mph[number]), one.a_w_per_iri.slope, 100 * one.a_w_per_iri.spread, checks.get(number),
-         *(_word(one.a_w_per_iri.slope * level) for level in (1, 2, 4, 8)),
+         *(comfort_word(one.a_w_per_iri.slope * level).replace("_", " ").replace(" uncomfortable", "")
+           for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
     verdict = ("Comfort falls in proportion to roughness, and with speed, as the text says. The printed pictures have "
                "no numbers in the text. For this car a straight line through the origin holds for each speed, because "
@@ -311,10 +312,6 @@ def _f6_16(effort: Workload) -> Result:
                                                                            "profiles",
                   max((check / float(per_iri[number]) for number, check in checks.items()),
                       key=lambda one: abs(one - 1)), 0.85, 1.15)]))
-
-
-def _word(a_w_mps2: float) -> str:
-    return comfort_word(a_w_mps2).replace("_", " ").replace(" uncomfortable", "")
 
 
 F6_16 = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
