@@ -48,13 +48,14 @@ class BadRow(BadInput):
 
 @dataclass(frozen=True)
 class LogColumn:
-    """One column: its name in the file, the record's attribute, how a value is written and read, and how large a number
-    may be; 0: it holds no such number."""
+    """One column: its name in the file, the record's attribute, how a value is written and read, what people read of
+    it, and how large a number may be; 0: it holds no such number."""
 
     name: str
     attribute: str
     write: Callable[[Any], str]
     read: Callable[[str], Any]
+    meaning: str
     largest: float = 0.0
 
 
@@ -107,7 +108,7 @@ def _read_decimal(text: str, pattern: str, largest: float) -> float:
     return value
 
 
-def _number(name: str, decimals: int, largest: float = LARGEST) -> LogColumn:
+def _number(name: str, decimals: int, meaning: str, largest: float = LARGEST) -> LogColumn:
     """A float that may be unknown: None, NaN and what is beyond ``largest`` are written as nothing."""
     pattern = f"%.{decimals}f"
 
@@ -117,10 +118,10 @@ def _number(name: str, decimals: int, largest: float = LARGEST) -> LogColumn:
     def read(text: str) -> float | None:
         return _read_decimal(text, pattern, largest) if text else None
 
-    return LogColumn(name, name, write, read, largest)
+    return LogColumn(name, name, write, read, meaning, largest)
 
 
-def _known_number(name: str, decimals: int) -> LogColumn:
+def _known_number(name: str, decimals: int, meaning: str) -> LogColumn:
     """A float that is always known. Writing NaN or one beyond ``LARGEST`` raises ``ValueError``."""
     pattern = f"%.{decimals}f"
 
@@ -129,15 +130,15 @@ def _known_number(name: str, decimals: int) -> LogColumn:
             raise ValueError(f"{name} is {value}, expected a finite number up to {LARGEST:g}")
         return pattern % value
 
-    return LogColumn(name, name, write, lambda text: _read_decimal(text, pattern, LARGEST), LARGEST)
+    return LogColumn(name, name, write, lambda text: _read_decimal(text, pattern, LARGEST), meaning, LARGEST)
 
 
-def _count(name: str) -> LogColumn:
-    return LogColumn(name, name, lambda value: f"{value:d}", _read_count)
+def _count(name: str, meaning: str) -> LogColumn:
+    return LogColumn(name, name, lambda value: f"{value:d}", _read_count, meaning)
 
 
-def _word(name: str, known: re.Pattern[str]) -> LogColumn:
-    return LogColumn(name, name, str, lambda text: _read_word(text, known))
+def _word(name: str, known: re.Pattern[str], meaning: str) -> LogColumn:
+    return LogColumn(name, name, str, lambda text: _read_word(text, known), meaning)
 
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
@@ -147,76 +148,47 @@ def _read_word(text: str, known: re.Pattern[str]) -> str:
 
 
 COLUMNS = (
-    _count("segment"),
-    LogColumn("t_utc", "utc_us", write_utc, _read_utc),
-    LogColumn("t_s", "t_us", _write_seconds, _read_seconds),
-    _number("distance_start_m", 3),
-    _number("distance_end_m", 3),
-    _number("lat_deg", 7, 90.0),
-    _number("lon_deg", 7, 180.0),
-    _number("speed_mps", 3),
-    _number("iri_m_per_km", 3),
-    _number("iri_std_m_per_km", 3),
-    _number("iri_rms_m_per_km", 3),
-    _number("a_w_mps2", 4),
-    _number("mtvv_mps2", 4),
-    _number("vdv_mps175", 4),
-    _number("crest_factor", 3),
-    _word("comfort", _COMFORT),
-    _word("iri_class", _CLASS),
-    LogColumn("flags", "flags", "|".join, lambda text: tuple(_read_word(text, FLAGS).split("|")) if text else ()),
-    _count("drive"),
-    _known_number("duration_s", 6),
-    _number("accel_rms_mps2", 4),
-    _count("samples"),
-    _count("clipped_samples"),
-    _number("a_w_std_mps2", 4),
-    _number("mtvv_std_mps2", 4),
-    _number("vdv_std_mps175", 4),
-    _number("a_w_raw_mps2", 4),
-    _number("mtvv_raw_mps2", 4),
-    _number("vdv_raw_mps175", 4),
-    _number("iri_level_std_m_per_km", 3),
-    _number("iri_common_std_m_per_km", 3),
-    _number("iri_place_std_m_per_km", 3),
+    _count("segment", "number of the window since the service started"),
+    LogColumn("t_utc", "utc_us", write_utc, _read_utc, "start of the window, UTC from the GPS"),
+    LogColumn("t_s", "t_us", _write_seconds, _read_seconds, "start of the window, seconds of the monotonic clock"),
+    _number("distance_start_m", 3, "travelled distance with known speed, at the window's start"),
+    _number("distance_end_m", 3, "the same at its end"),
+    _number("lat_deg", 7, "latitude of its middle", 90.0),
+    _number("lon_deg", 7, "longitude of its middle", 180.0),
+    _number("speed_mps", 3, "mean speed"),
+    _number("iri_m_per_km", 3, "best estimate of the IRI"),
+    _number("iri_std_m_per_km", 3, "its standard error"),
+    _number("iri_rms_m_per_km", 3, "IRI by the relation of r.m.s. acceleration and speed (Blum 2015, 6.3)"),
+    _number("a_w_mps2", 4,
+            "ISO 2631-1, weighting Wk: r.m.s. of the weighted acceleration of the ride, without the sensor's noise"),
+    _number("mtvv_mps2", 4, "the same: maximum transient vibration value, the largest running r.m.s. over 1 s"),
+    _number("vdv_mps175", 4, "the same: vibration dose value"),
+    _number("crest_factor", 3, "largest weighted reading over a_w_raw_mps2"),
+    _word("comfort", _COMFORT, "words of ISO 2631-1; where its ranges overlap, the more severe one"),
+    _word("iri_class", _CLASS,
+          "ISO 8608 class with the same IRI: A below 3.05, B below 6.09, C below 12.19, D below 24.37 m/km"),
+    LogColumn("flags", "flags", "|".join, lambda text: tuple(_read_word(text, FLAGS).split("|")) if text else (),
+              "words joined by a bar: why something is empty or doubtful"),
+    _count("drive", "number of the drive since the service started"),
+    _known_number("duration_s", 6, "time from the window's start to its end"),
+    _number("accel_rms_mps2", 4, "r.m.s. of the vertical acceleration, without its mean"),
+    _count("samples", "how many samples the window holds"),
+    _count("clipped_samples", "how many of them were at the end of the sensor's range"),
+    _number("a_w_std_mps2", 4, "standard error of a_w_mps2"),
+    _number("mtvv_std_mps2", 4, "standard error of mtvv_mps2"),
+    _number("vdv_std_mps175", 4, "standard error of vdv_mps175"),
+    _number("a_w_raw_mps2", 4, "as a_w_mps2, of the readings as they are: with noise and rounding"),
+    _number("mtvv_raw_mps2", 4, "as mtvv_mps2, of the readings as they are"),
+    _number("vdv_raw_mps175", 4, "as vdv_mps175, of the readings as they are"),
+    _number("iri_level_std_m_per_km", 3,
+            "part of iri_std_m_per_km from the road's level, shared by neighbours: it fades along the road as "
+            "exp(-d / 30 m)"),
+    _number("iri_common_std_m_per_km", 3,
+            "part of it from the vehicle's and the sensor's parameters, shared by all windows and drives of a car"),
+    _number("iri_place_std_m_per_km", 3,
+            "part of it from the position: what a window gains at its end, its neighbour loses"),
 )
-COLUMN_MEANINGS = {
-    "segment": "number of the window since the service started",
-    "t_utc": "start of the window, UTC from the GPS",
-    "t_s": "start of the window, seconds of the monotonic clock",
-    "distance_start_m": "travelled distance with known speed, at the window's start",
-    "distance_end_m": "the same at its end",
-    "lat_deg": "latitude of its middle",
-    "lon_deg": "longitude of its middle",
-    "speed_mps": "mean speed",
-    "iri_m_per_km": "best estimate of the IRI",
-    "iri_std_m_per_km": "its standard error",
-    "iri_rms_m_per_km": "IRI by the relation of r.m.s. acceleration and speed (Blum 2015, 6.3)",
-    "a_w_mps2": "ISO 2631-1, weighting Wk: r.m.s. of the weighted acceleration of the ride, without the sensor's noise",
-    "mtvv_mps2": "the same: maximum transient vibration value, the largest running r.m.s. over 1 s",
-    "vdv_mps175": "the same: vibration dose value",
-    "crest_factor": "largest weighted reading over a_w_raw_mps2",
-    "comfort": "words of ISO 2631-1; where its ranges overlap, the more severe one",
-    "iri_class": "ISO 8608 class with the same IRI: A below 3.05, B below 6.09, C below 12.19, D below 24.37 m/km",
-    "flags": "words joined by a bar: why something is empty or doubtful",
-    "drive": "number of the drive since the service started",
-    "duration_s": "time from the window's start to its end",
-    "accel_rms_mps2": "r.m.s. of the vertical acceleration, without its mean",
-    "samples": "how many samples the window holds",
-    "clipped_samples": "how many of them were at the end of the sensor's range",
-    "a_w_std_mps2": "standard error of a_w_mps2",
-    "mtvv_std_mps2": "standard error of mtvv_mps2",
-    "vdv_std_mps175": "standard error of vdv_mps175",
-    "a_w_raw_mps2": "as a_w_mps2, of the readings as they are: with noise and rounding",
-    "mtvv_raw_mps2": "as mtvv_mps2, of the readings as they are",
-    "vdv_raw_mps175": "as vdv_mps175, of the readings as they are",
-    "iri_level_std_m_per_km": "part of iri_std_m_per_km from the road's level, shared by neighbours: it fades along "
-                              "the road as exp(-d / 30 m)",
-    "iri_common_std_m_per_km": "part of it from the vehicle's and the sensor's parameters, shared by all windows and "
-                               "drives of a car",
-    "iri_place_std_m_per_km": "part of it from the position: what a window gains at its end, its neighbour loses",
-    "crc32": "check value of the row",
-}
+COLUMN_MEANINGS = {**{column.name: column.meaning for column in COLUMNS}, "crc32": "check value of the row"}
 """What people read of each; the last one ends each line, and is no field of a record."""
 _COUNTS = (len(COLUMNS), 29, 23)
 """Columns of logs: as they are now, before errors told what windows share of them, and before the ride was separated
