@@ -3,14 +3,14 @@
 Problem. A misspelt key that silently becomes a default costs a season of data. So a setting is taken only when
 its name, type and range are right, and anything else is refused with file, line and what was expected.
 
-Solution. One dataclass per section holds the defaults; one table per section says how each key is read. The
-shipped ``config/ridelog.yaml`` is the documentation, and holds every key with its default.
+Solution. One dataclass per section holds of each key its default and how it is read. The shipped
+``config/ridelog.yaml`` is the documentation, and holds every key with its default.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,129 +33,24 @@ AUTO = "auto"
 LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
 WHEELBASES_M, MASSES_KG = (1.5, 6.0), (300.0, 10_000.0)  # from the smallest car with two axles to a lorry
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-
-
-@dataclass(frozen=True)
-class AccelerometerConfig:
-    """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
-    ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used;
-    ``noise_mps2`` the r.m.s. noise of one reading (``AUTO``: learnt; None, in no settings but those of recordings by
-    loggers that did not learn it: what is usual of it)."""
-
-    driver: str = DEFAULT
-    vertical_axis: str = "+z"
-    sections: Mapping[str, Any] = field(
-        default_factory=lambda: {name: kind.settings() for name, kind in accelerometers().items()})
-    noise_mps2: float | str | None = AUTO
-
-    @property
-    def kind(self) -> Accelerometer[Any]:
-        return accelerometers()[self.driver]
-
-    @property
-    def settings(self) -> Any:
-        return self.sections[self.driver]
-
-
 _GPS_BEGAN = date(1980, 1, 6)
-
-
-@dataclass(frozen=True)
-class GpsConfig:
-    """The receiver's line; its latency (None: as it was learnt), the longest loss that is bridged, 1024-week periods to
-    add, and the date (ISO 8601) before which what it says cannot be true; where its antenna sits, and how far off the
-    places are that it gives from one window to another (standard deviation)."""
-
-    port: str = "/dev/serial0"
-    baud: int = 9600
-    latency_s: float | None = None
-    bridge_s: float = 10.0
-    week_rollovers: int = 0
-    earliest_date: str = "2026-01-01"
-    antenna_behind_front_axle_m: float = 0.0
-    place_std_m: float = 1.0
-
-
-@dataclass(frozen=True)
-class PipelineConfig:
-    """``low_pass_hz`` None: no low-pass before the roughness relation; ``arithmetic`` is float or fixed."""
-
-    window_m: float = WINDOW_M
-    low_pass_hz: float | None = None
-    slow_mps: float = 4.5
-    stationary_mps: float = 0.5
-    drive_end_s: float = 300.0
-    blind_window_s: float = 5.0
-    arithmetic: str = "float"
-
-
-@dataclass(frozen=True)
-class LogConfig:
-    """Where the logs go, when a file is full, how long a row may stay off the disk, and the room that may be used."""
-
-    directory: Path = Path("/var/lib/ridelog")
-    max_file_bytes: int = 4_000_000
-    record_dump: bool = False
-    sync_s: float = 1.0
-    quota_bytes: int | None = None
-    keep_free_bytes: int = 200_000_000
-
-
-@dataclass(frozen=True)
-class Config:
-    """All settings of the service. ``vehicle`` is the path of its file; of a car that is not known (``GENERIC``) its
-    wheelbase [m] and curb weight [kg] may be; None: neither is. Paths are resolved."""
-
-    accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig)
-    gps: GpsConfig = GpsConfig()
-    vehicle: Path = field(default_factory=lambda: vehicle_file(GENERIC))
-    wheelbase_m: float | None = None
-    mass_kg: float | None = None
-    vehicle_error: float = 0.05
-    pipeline: PipelineConfig = PipelineConfig()
-    log: LogConfig = LogConfig()
-    pairing: Pairing = NOT_PAIRED
-    status_file: Path = Path("/run/ridelog/status.json")
-
-
-def find_config(given: Path | None) -> Path:
-    """The file to read: the one given, else the machine's (``MACHINE_CONFIG``), else the shipped one."""
-    if given is not None:
-        return given
-    return MACHINE_CONFIG if MACHINE_CONFIG.exists() else shipped("config") / "ridelog.yaml"
-
-
-def load_config(path: Path) -> Config:
-    """Read the settings of a file. Raises BadInput, ``FILE:LINE: expected ...``, for anything not as documented."""
-    return _section(Config, {
-        "accelerometer": _accelerometer,
-        "gps": _gps,
-        "vehicle": _vehicle,
-        "wheelbase_m": _or_none("null", _number(*WHEELBASES_M)),
-        "mass_kg": _or_none("null", _number(*MASSES_KG)),
-        "vehicle_error": _number(0, 1),
-        "pipeline": _pipeline,
-        "log": _log,
-        "pairing": _pairing,
-        "status_file": _file_to_write,
-    })(load_mapping(path))
-
-
-def load_pairing(path: Path) -> Pairing:
-    """The pairing alone, of settings in which other keys may be wrong. Raises BadInput where it cannot be read."""
-    entry = load_mapping(path).mapping().get("pairing")
-    return NOT_PAIRED if entry is None else _pairing(entry)
-
-
 Read = Callable[[Node], Any]
 Section = TypeVar("Section")
 
 
-def _section(kind: type[Section], readers: Mapping[str, Read]) -> Callable[[Node], Section]:
-    """Make the reader of a mapping: each key there is by its own reader, the others keep the dataclass's default."""
+def _setting(default: Any, read: Read) -> Any:
+    """A field of a section: its default, and how it is read."""
+    return field(default=default, metadata={"read": read})
+
+
+def _section(kind: type[Section], readers: Mapping[str, Read] | None = None) -> Callable[[Node], Section]:
+    """Make the reader of a mapping: each key there is by its own reader, the others keep the dataclass's default.
+    ``readers`` None: they stand in its fields."""
+    known = readers if readers is not None else {
+        one.name: one.metadata["read"] for one in fields(kind)}  # type: ignore[arg-type]
+
     def read(node: Node) -> Section:
-        entries = node.mapping(optional=readers)
-        return kind(**{key: readers[key](entry) for key, entry in entries.items()})
+        return kind(**{key: known[key](entry) for key, entry in node.mapping(optional=known).items()})
     return read
 
 
@@ -242,6 +137,39 @@ def _blamed(error: SettingsError, section: Node) -> BadInput:
     return BadInput(f"{entry.file}:{entry.line}: {error}")
 
 
+def _date(node: Node) -> str:
+    text = node.text()
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        raise node.wrong(f"a date such as {_GPS_BEGAN:%Y-%m-%d}") from None
+    if day < _GPS_BEGAN:
+        raise node.wrong(f"a date from {_GPS_BEGAN:%Y-%m-%d} on, when GPS time began")
+    return day.isoformat()
+
+
+@dataclass(frozen=True)
+class AccelerometerConfig:
+    """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
+    ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used;
+    ``noise_mps2`` the r.m.s. noise of one reading (``AUTO``: learnt; None, in no settings but those of recordings by
+    loggers that did not learn it: what is usual of it)."""
+
+    driver: str = DEFAULT
+    vertical_axis: str = "+z"
+    sections: Mapping[str, Any] = field(
+        default_factory=lambda: {name: kind.settings() for name, kind in accelerometers().items()})
+    noise_mps2: float | str | None = AUTO
+
+    @property
+    def kind(self) -> Accelerometer[Any]:
+        return accelerometers()[self.driver]
+
+    @property
+    def settings(self) -> Any:
+        return self.sections[self.driver]
+
+
 def _accelerometer(node: Node) -> AccelerometerConfig:
     kinds = accelerometers()
     readers: dict[str, Read] = {
@@ -262,55 +190,89 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     return config
 
 
-def _date(node: Node) -> str:
-    text = node.text()
-    try:
-        day = date.fromisoformat(text)
-    except ValueError:
-        raise node.wrong(f"a date such as {_GPS_BEGAN:%Y-%m-%d}") from None
-    if day < _GPS_BEGAN:
-        raise node.wrong(f"a date from {_GPS_BEGAN:%Y-%m-%d} on, when GPS time began")
-    return day.isoformat()
+@dataclass(frozen=True)
+class GpsConfig:
+    """The receiver's line; its latency (None: as it was learnt), the longest loss that is bridged, 1024-week periods to
+    add, and the date (ISO 8601) before which what it says cannot be true; where its antenna sits, and how far off the
+    places are that it gives from one window to another (standard deviation)."""
+
+    port: str = _setting("/dev/serial0", Node.text)
+    baud: int = _setting(9600, _reader(BAUDS))
+    latency_s: float | None = _setting(None, _or_none("auto", _number(0, 2)))
+    bridge_s: float = _setting(10.0, _number(0, 60))
+    week_rollovers: int = _setting(0, _whole(0, ROLLOVERS_MAX))
+    earliest_date: str = _setting("2026-01-01", _date)
+    antenna_behind_front_axle_m: float = _setting(0.0, _number(-3, 15))
+    place_std_m: float = _setting(1.0, _number(0, 100))
 
 
-_gps = _section(GpsConfig, {
-    "port": Node.text,
-    "baud": _reader(BAUDS),
-    "latency_s": _or_none("auto", _number(0, 2)),
-    "bridge_s": _number(0, 60),
-    "week_rollovers": _whole(0, ROLLOVERS_MAX),
-    "earliest_date": _date,
-    "antenna_behind_front_axle_m": _number(-3, 15),
-    "place_std_m": _number(0, 100),
-})
+@dataclass(frozen=True)
+class PipelineConfig:
+    """``low_pass_hz`` None: no low-pass before the roughness relation; ``arithmetic`` is float or fixed."""
 
-_read_pipeline = _section(PipelineConfig, {
-    "window_m": _number(1, 1000),
-    "low_pass_hz": _or_none("null", _number(1, 45)),
-    "slow_mps": _number(0.1, 50),
-    "stationary_mps": _number(0.05, 5),
-    "drive_end_s": _number(10, 86400),
-    "blind_window_s": _number(1, 60),
-    "arithmetic": lambda node: node.choice("float", "fixed"),
-})
-
-_log = _section(LogConfig, {
-    "directory": Node.path,
-    "max_file_bytes": _whole(10_000, 1_000_000_000),
-    "record_dump": Node.boolean,
-    "sync_s": _number(0.1, 60),
-    "quota_bytes": _or_none("null", _whole(200_000_000, 10**15)),
-    "keep_free_bytes": _whole(0, 10**15),
-})
-
-
-_pairing = _section(Pairing, {"mode": lambda node: node.choice(*MODES), "key_file": Node.path})
+    window_m: float = _setting(WINDOW_M, _number(1, 1000))
+    low_pass_hz: float | None = _setting(None, _or_none("null", _number(1, 45)))
+    slow_mps: float = _setting(4.5, _number(0.1, 50))
+    stationary_mps: float = _setting(0.5, _number(0.05, 5))
+    drive_end_s: float = _setting(300.0, _number(10, 86400))
+    blind_window_s: float = _setting(5.0, _number(1, 60))
+    arithmetic: str = _setting("float", lambda node: node.choice("float", "fixed"))
 
 
 def _pipeline(node: Node) -> PipelineConfig:
-    pipeline = _read_pipeline(node)
+    pipeline = _section(PipelineConfig)(node)
     if pipeline.stationary_mps >= pipeline.slow_mps:
         entry = node.mapping().get("stationary_mps", node)
         raise BadInput(f"{entry.file}:{entry.line}: expected stationary_mps to be less than slow_mps, found "
                        f"{pipeline.stationary_mps:g} and {pipeline.slow_mps:g}")
     return pipeline
+
+
+@dataclass(frozen=True)
+class LogConfig:
+    """Where the logs go, when a file is full, how long a row may stay off the disk, and the room that may be used."""
+
+    directory: Path = _setting(Path("/var/lib/ridelog"), Node.path)
+    max_file_bytes: int = _setting(4_000_000, _whole(10_000, 1_000_000_000))
+    record_dump: bool = _setting(False, Node.boolean)
+    sync_s: float = _setting(1.0, _number(0.1, 60))
+    quota_bytes: int | None = _setting(None, _or_none("null", _whole(200_000_000, 10**15)))
+    keep_free_bytes: int = _setting(200_000_000, _whole(0, 10**15))
+
+
+_pairing = _section(Pairing, {"mode": lambda node: node.choice(*MODES), "key_file": Node.path})
+
+
+@dataclass(frozen=True)
+class Config:
+    """All settings of the service. ``vehicle`` is the path of its file; of a car that is not known (``GENERIC``) its
+    wheelbase [m] and curb weight [kg] may be; None: neither is. Paths are resolved."""
+
+    accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig, metadata={"read": _accelerometer})
+    gps: GpsConfig = _setting(GpsConfig(), _section(GpsConfig))
+    vehicle: Path = field(default_factory=lambda: vehicle_file(GENERIC), metadata={"read": _vehicle})
+    wheelbase_m: float | None = _setting(None, _or_none("null", _number(*WHEELBASES_M)))
+    mass_kg: float | None = _setting(None, _or_none("null", _number(*MASSES_KG)))
+    vehicle_error: float = _setting(0.05, _number(0, 1))
+    pipeline: PipelineConfig = _setting(PipelineConfig(), _pipeline)
+    log: LogConfig = _setting(LogConfig(), _section(LogConfig))
+    pairing: Pairing = _setting(NOT_PAIRED, _pairing)
+    status_file: Path = _setting(Path("/run/ridelog/status.json"), _file_to_write)
+
+
+def find_config(given: Path | None) -> Path:
+    """The file to read: the one given, else the machine's (``MACHINE_CONFIG``), else the shipped one."""
+    if given is not None:
+        return given
+    return MACHINE_CONFIG if MACHINE_CONFIG.exists() else shipped("config") / "ridelog.yaml"
+
+
+def load_config(path: Path) -> Config:
+    """Read the settings of a file. Raises BadInput, ``FILE:LINE: expected ...``, for anything not as documented."""
+    return _section(Config)(load_mapping(path))
+
+
+def load_pairing(path: Path) -> Pairing:
+    """The pairing alone, of settings in which other keys may be wrong. Raises BadInput where it cannot be read."""
+    entry = load_mapping(path).mapping().get("pairing")
+    return NOT_PAIRED if entry is None else _pairing(entry)
