@@ -44,6 +44,7 @@ from logger.printable import counted
 from logger.report.document import (
     EMPTY,
     Html,
+    asset,
     concatenated,
     data_block,
     document,
@@ -54,7 +55,6 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.page import asset
 from logger.report.placed import damaged
 from logger.report.quantities import known
 from logger.report.summary import distance_words

@@ -16,8 +16,6 @@ import json
 import zlib
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
-from importlib import resources
 from itertools import chain
 from math import isfinite
 from typing import Any
@@ -33,6 +31,7 @@ from logger.records import WindowRecord
 from logger.report.document import (
     EMPTY,
     Html,
+    asset,
     bullets,
     concatenated,
     data_block,
@@ -126,12 +125,6 @@ def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: s
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
     ], style=asset("page.css"), script='"use strict";\n' + "".join(map(asset, SCRIPTS)), images_from=host)
-
-
-@cache
-def asset(name: str, package: str = "logger.report") -> str:
-    """A file of a page's script or style, out of the assets of a package."""
-    return (resources.files(package) / "assets" / name).read_text("utf-8")
 
 
 def _sources(base_name: str, host: str) -> str:
