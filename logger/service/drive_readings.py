@@ -70,8 +70,7 @@ class RangeUse:
             return ""
         clipped, hidden = self._clipped / self._windows, self._hidden / self._windows
         if clipped > CLIPPED_SHARE:
-            return self._said(f"it clipped in {clipped:.0%} of this drive's windows",
-                              self._others.wider)
+            return self._said(f"it clipped in {clipped:.0%} of this drive's windows", self._others.wider)
         for (setting, _), beyond in zip(self._others.finer, self._beyond / max(self._blocks, 1), strict=True):
             if beyond < CLIPPED_SHARE:
                 seldom = f"only {beyond:.1%} of this drive" if beyond else "nothing of this drive"

@@ -167,8 +167,7 @@ def named_columns(text: str) -> Named:
     """The columns of ``--columns "t=time:ms,x=ax:g,..."``. Raises BadInput for a role or a unit that is not known."""
     starts = [found.start() for found in re.finditer(rf"(?:^|(?<=,))(?={_ENTRY.pattern})", text)]
     if not starts or starts[0] != 0:
-        raise BadInput(f"--columns: expected ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}, found "
-                       f"{shown(text)}")
+        raise BadInput(f"--columns: expected ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}, found {shown(text)}")
     named: dict[str, tuple[LayoutColumn, ...]] = {}
     for start, end in zip(starts, [*starts[1:], len(text) + 1], strict=True):
         role, _, rest = text[start : end - 1].partition("=")
