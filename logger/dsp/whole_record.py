@@ -25,7 +25,7 @@ windowed sinc (``low_pass``) to the rate that is wanted: of a lower one it passe
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from math import ceil
 from typing import Any
 
@@ -177,9 +177,9 @@ def in_band(samples: Array, rate_hz: float, low_hz: float, high_hz: float) -> Ar
     none. Before and after the record its ends are held."""
     found = np.asarray(samples, float)
     if high_hz < rate_hz / 2:
-        found = _through(found, _taps(high_hz, HALF_WIDTH_HZ, rate_hz))
+        found = _low_passed(found, high_hz, HALF_WIDTH_HZ, rate_hz)
     if low_hz > 0:
-        found = found - _through(found, _taps(low_hz, min(HALF_WIDTH_HZ, 0.5 * low_hz), rate_hz))
+        found = found - _low_passed(found, low_hz, min(HALF_WIDTH_HZ, 0.5 * low_hz), rate_hz)
     return found
 
 
@@ -188,14 +188,17 @@ def reach(rate_hz: float) -> int:
     return ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * HALF_WIDTH_HZ / rate_hz))
 
 
-@cache
-def _taps(cutoff_hz: float, half_width_hz: float, rate_hz: float) -> Array:
+def _low_passed(samples: Array, cutoff_hz: float, half_width_hz: float, rate_hz: float) -> Array:
+    from scipy.fft import next_fast_len
+
     half = ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * half_width_hz / rate_hz))
-    return low_pass_taps(half, 1, 2 * cutoff_hz / rate_hz, _BAND_STOP_DB)
+    held = np.pad(samples, half, mode="edge")
+    size = next_fast_len(len(held), real=True)
+    gain = _gain(half, 2 * cutoff_hz / rate_hz, size)
+    return np.fft.irfft(np.fft.rfft(held, size) * gain, size)[2 * half : len(held)]
 
 
-def _through(samples: Array, taps: Array) -> Array:
-    from scipy.signal import fftconvolve
-
-    half = len(taps) // 2
-    return np.asarray(fftconvolve(np.pad(samples, half, mode="edge"), taps, mode="valid"))
+@lru_cache(maxsize=32)  # records of one length pass the same filter hundreds of times
+def _gain(half: int, cutoff: float, size: int) -> npt.NDArray[np.complex128]:
+    """Transform of the taps of a low-pass, the first at 0, over so many samples."""
+    return np.fft.rfft(low_pass_taps(half, 1, cutoff, _BAND_STOP_DB), size)

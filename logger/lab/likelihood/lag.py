@@ -177,7 +177,7 @@ def _centred(values: Array, groups: npt.NDArray[np.intp]) -> Array:
 
 def _slope(values: Array, against: Array, freedom: int) -> Trend:
     """Slope of values over another variable through 0, with Student's test."""
-    from scipy.stats import t
+    from scipy.special import stdtr
 
     size = float(against @ against)
     if not size > 0:
@@ -185,4 +185,4 @@ def _slope(values: Array, against: Array, freedom: int) -> Trend:
     slope = float(values @ against) / size
     residual = values - slope * against
     error = float(np.sqrt(residual @ residual / freedom / size))
-    return Trend(slope, error, float(2 * t.sf(abs(slope) / error, freedom)) if error > 0 else float("nan"))
+    return Trend(slope, error, float(2 * stdtr(freedom, -abs(slope) / error)) if error > 0 else float("nan"))

@@ -49,8 +49,7 @@ class Coherence:
 
     def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
         """Share of the residual power between two frequencies that is coherent with the road, and its p-value."""
-        from scipy.special import digamma, polygamma
-        from scipy.stats import gamma
+        from scipy.special import digamma, gammaincc, polygamma
 
         inside = np.flatnonzero((self.f_hz >= low_hz) & (self.f_hz < high_hz) & (self.f_hz > 0))
         power = float(self.power[inside].sum())
@@ -62,7 +61,7 @@ class Coherence:
         statistic = -float(np.log1p(-np.minimum(tested, 1 - 1e-12)).sum())
         mean = len(tested) * float(digamma(n) - digamma(n - q))
         variance = len(tested) * float(polygamma(1, n - q) - polygamma(1, n))
-        return max(share, 0.0), float(gamma.sf(statistic, mean**2 / variance, scale=variance / mean))
+        return max(share, 0.0), float(gammaincc(mean**2 / variance, statistic * mean / variance))
 
 
 def coherence_with_road(residuals: ModelResiduals) -> Coherence:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -176,10 +175,6 @@ class Screened:
         """The largest gain of the trials."""
         return self.trials[0].gain
 
-    def begins_at(self, one: Chosen) -> bool:
-        """Whether the first trial has the shape of an effect: the fit that it would begin is known."""
-        return self.trials[0].one.is_shaped_as(one)
-
 
 def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     """Values of those parameters of an effect that another one has as well, clipped to their ranges: a resonance keeps
@@ -189,11 +184,11 @@ def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, 
 
 
 def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
-             near: Mapping[str, float] = MappingProxyType({})) -> Screened:
+             near: Chosen | None = None) -> Screened:
     """Trials of an effect on a model.
 
     misaligned    ways in which the runs may be misaligned
-    near          values of an effect in whose place this one is tried
+    near          the effect in whose place this one is tried; the fit that would begin at that itself is known
     """
     # Where the distance errors are of a usual size, or their trend was removed, positions are not far wrong.
     realigns = base.state.size.is_unusually_large and not base.trend_removed and not effect.reshapes
@@ -202,7 +197,7 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         trials += [values for values in effect.trials(one_way) if values not in trials]
     prior = base.posterior.prior
     known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
-    if shared := shared_parameters(effect, near):
+    if near is not None and (shared := shared_parameters(effect, near.values)):
         trials.append(trials[0] | shared)
     if known:  # the fitted values of the car's own numbers are a trial as well
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
@@ -222,6 +217,7 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     best = [one for by_shape in found.values()
             for one in _optima([by_shape[value] for value in sorted(by_shape)])[:2]]
     best += _delayed_trials(base, effect, misaligned[0])
+    best = [trial for trial in best if near is None or not trial.one.is_shaped_as(near)]
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
 
 
@@ -312,8 +308,7 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
         return at(strength, scaled)
     # A resonance half as strong has another frequency, and its change may be of another shape.
-    return max((_with_predicted_gain(base, trial) for trial in (at(strength, scaled), at(1.0, one))),
-               key=lambda trial: trial.gain)
+    return max(_with_predicted_gain(base, at(strength, scaled)), at(1.0, one), key=lambda trial: trial.gain)
 
 
 def _goes_both_ways(effect: Effect) -> bool:

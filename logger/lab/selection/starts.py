@@ -10,7 +10,7 @@ squares, and only from there the likelihood decides. The model without the effec
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -50,10 +50,6 @@ class Started(Screened):
         """The larger gain of the two."""
         return max(self.trials[0].gain, self.gain_by_squares)
 
-    def begins_at(self, one: Chosen) -> bool:
-        """Never: it begins in cars that were drawn, too."""
-        return False
-
 
 @dataclass(eq=False)
 class UnknownNumbers(MeasuredRoad):
@@ -77,7 +73,7 @@ class UnknownNumbers(MeasuredRoad):
         return Baseline.of(self._likeliest(
             by_squares.of_all(self._anchor(by_squares, near, self.starts), near), posterior))
 
-    def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+    def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
         """Effects screened on the model, and by squares in cars that are drawn."""
         local = super().screened(base, effects, seen, near, pool, progress)

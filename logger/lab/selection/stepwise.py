@@ -8,11 +8,10 @@ whatever gains most in its place is kept, or nothing. The next round begins with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -46,25 +45,21 @@ class SearchEffort:
 
     effects                    most effects that are added
     fitted                     how many effects are fitted at most
-    fit_share, refine_share    least gain for that, and for a fit with derivatives of its own, as a share of the largest
-                               gain or of the required one (with a tenth for fitting, a sensor's bandwidth was missed)
-    win_share                  least gain for fitting, as a share of what a fit that may be taken has gained, or of
-                               what chance may gain: fits gain up to seven times what their screening did (measured on
-                               cases of the examination)
+    fit_share, refine_share    of what has to be gained, as far as that is known, an effect that is fitted has gained so
+                               much by its screening, and one that is fitted with derivatives of its own by its rough
+                               fit: fits gain up to seven times what their screening did (measured on cases of the
+                               examination)
     tie_share                  all fits of an effect from different starts that gain this share of its best are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
-    least                      gain below which nothing is fitted
     """
 
     effects: int = 4
     fitted: int = 6
-    fit_share: float = 0.03
+    fit_share: float = 0.1
     refine_share: float = 0.25
-    win_share: float = 0.1
     tie_share: float = 0.9
     round_share: float = 0.02
-    least: float = 0.0
 
 
 class FittedModel(Protocol):
@@ -98,9 +93,6 @@ class Promise(Protocol):
     @property
     def gain(self) -> float: ...
 
-    def begins_at(self, one: Chosen) -> bool:
-        """Whether a fit of it would begin at this effect, with the same shape."""
-
 
 class Fitted(Protocol):
     """A fit of a model with one more effect, its last, and by how much its score is below that of the model without."""
@@ -123,10 +115,10 @@ F = TypeVar("F", bound=Fitted)
 class Likelihood(Protocol[M, P, F]):
     """What a search asks of a likelihood: of drives over a measured road, or over one that is integrated out."""
 
-    def screened(self, base: M, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+    def screened(self, base: M, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[P]:
-        """Effects screened on a model, the largest gain first; ``near`` are values of one in whose place they are
-        tried, ``seen`` how the runs are misaligned."""
+        """Effects screened on a model, the largest gain first; ``near`` is the one in whose place they are tried, and
+        no trial of its own, ``seen`` how the runs are misaligned."""
 
     def laid_anew(self, base: M) -> M | None:
         """The model for effects that shift runs, where what they do may have been taken for a distance error."""
@@ -166,7 +158,7 @@ class Likelihood(Protocol[M, P, F]):
 class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
 
-    def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+    def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
         """Effects screened by simulations at their trial values."""
         misaligned = [seen]
@@ -175,7 +167,7 @@ class MeasuredRoad:
         found = []
         for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")
-            found.append(one)
+            found += [one] if one.trials else []
         return sorted(found, key=lambda one: -one.gain)
 
     def laid_anew(self, base: Baseline) -> Baseline | None:
@@ -262,14 +254,6 @@ class Selection(Generic[M, P, F]):
     last: SearchRound[P, F] = SearchRound((), ())
 
 
-@dataclass(frozen=True, eq=False)
-class Replaced(Generic[M]):
-    """One of a model's effects, in whose place others are tried."""
-
-    now: M
-    one: Chosen
-
-
 @dataclass(eq=False)
 class Search(Generic[M, P, F]):
     """A search among effects, on models whose first ``present`` effects are given."""
@@ -303,7 +287,7 @@ class Search(Generic[M, P, F]):
             if not untried:
                 break
             self.progress(f"round {len(steps) + 1}")
-            last = tried = self.round(now, untried, self._required_gain(now) if steps else 0.0)
+            last = tried = self.round(now, untried)
             first = first if steps else tried
             best = self._simplest(now, tried)
             if best is None and not steps and (under := self._underlaid(now, tried)) is not None:
@@ -335,10 +319,13 @@ class Search(Generic[M, P, F]):
         effect explains a part of it: it may be the right one, and what it would be added to its imitation."""
         if not self.likelihood.is_within_calibration(now) or not any(self.may_imitate(now, one) for one in tried.fits):
             return now
-        other = now
+        other, rivals = now, dict(self._rivals)
         for name in names_of(now)[self.present:]:
             other = self._reconsider(other, name)
-        return other if other.score < now.score - INDISTINGUISHABLE else now
+        if other.score < now.score - INDISTINGUISHABLE:
+            return other
+        self._rivals = rivals
+        return now
 
     def _underlaid(self, now: M, tried: SearchRound[P, F]) -> M | None:
         """The model with an effect that is nearly always there and may hide others; None where there is no such effect,
@@ -355,43 +342,42 @@ class Search(Generic[M, P, F]):
         now, gains = self.eliminate_backward(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
-    def round(self, now: M, effects: Sequence[Effect], required_gain: float = 0.0,
-              instead: Replaced[M] | None = None) -> SearchRound[P, F]:
+    def round(self, now: M, effects: Sequence[Effect], instead_of: Chosen | None = None, base: M | None = None,
+              to_gain: float | None = None) -> SearchRound[P, F]:
         """Every effect tried on a model. Where its distance errors are large, effects that shift runs are also tried
         with the recorded distances: what they do may have been taken for a start or scale error.
 
-        required_gain    least gain that counts
-        instead          the effect in whose place they are tried; None: in addition
+        Fits are dear. One is made as long as its effect may still gain what has to be gained: more than chance does, or
+        the effect in whose place it is tried, and then what the best fit that may be taken has gained.
+
+        instead_of    the effect in whose place they are tried; None: in addition
+        base          the model on which they are screened; None: this one
+        to_gain       gain of that effect; None: what chance may gain
         """
-        effort = self.effort
+        effort, base = self.effort, now if base is None else base
+        to_gain = min_gain(len(self.effects)) if to_gain is None else to_gain
+        lost = base.score - now.score
         with ThreadPoolExecutor(self.workers) as pool:
-            base, near, least = now, dict[str, float](), effort.fit_share * required_gain
-            if instead is not None:
-                near = dict(instead.one.values)
-                base = self.likelihood.stripped(instead.now, instead.one.effect.name) or now
-                least = effort.win_share * (base.score - instead.now.score)
-            unfitted = self._screen_all(pool, base, effects, near)
-            worth = [(base, one) for one in self._promising_of(unfitted, least)]
+            unfitted = self._screen_all(pool, base, effects, instead_of)
+            worth = [(base, one) for one in unfitted[: effort.fitted] if one.gain > effort.fit_share * (lost + to_gain)]
             self._promising |= {one.effect.name for _, one in worth}
-            if instead is not None:
-                worth = [(base, one) for base, one in worth if not one.begins_at(instead.one)]
             aligning = [one for one in effects if one.realigns]
             if aligning and (there := self.likelihood.laid_anew(now)) is not None:
-                worth += [(there, one) for one in self._promising_of(self._screen_all(pool, there, aligning), least)]
+                worth += [(there, one) for one in self._screen_all(pool, there, aligning)[: effort.fitted]
+                          if one.gain > effort.fit_share * to_gain]
             self.progress(f"fitting {len(worth)} of them")
-            tries = self._fit_all_roughly(pool, now.score, worth[:1], least)
-            by_chance = min(required_gain, min_gain(len(self.effects)))
-            least = max(least, effort.win_share * max(self._reached(now, tries), by_chance))
+            tries = self._fit_all_roughly(pool, now.score, worth[:1], 0.0)
+            to_gain = max(to_gain, self._reached(now, tries))
+            enough = effort.fit_share * to_gain
             # What only shifts a run gains nothing to first order where the distance errors have taken it.
-            may_win = [pair for pair in worth[1:] if pair[1].gain > least or not pair[1].effect.reshapes]
-            # The first round is shown as a table: there what cannot win is fitted, too, from its best trial.
-            tries += self._fit_all_roughly(pool, now.score, may_win if required_gain else worth[1:], least)
+            tries += self._fit_all_roughly(pool, now.score, [
+                pair for pair in worth[1:] if pair[1].gain > enough or not pair[1].effect.reshapes], enough)
             rough = _best_of_each(tries)
-            enough = effort.refine_share * max(rough[0].gain, required_gain) if rough else np.inf
+            enough = effort.refine_share * max([to_gain, *(one.gain for one in rough)])
             best = {one.effect.name: one.gain for one in rough if one.gain > enough}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
                     if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
-            if len(good) == 1 and instead is None and self.is_accepted(now, good[0]):
+            if len(good) == 1 and instead_of is None and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
             refine = partial(self.likelihood.refined, now, least=effort.round_share * now.explanation)
@@ -406,7 +392,7 @@ class Search(Generic[M, P, F]):
         return SearchRound(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
     def _screen_all(self, pool: ThreadPoolExecutor, base: M, effects: Sequence[Effect],
-                    near: Mapping[str, float] = MappingProxyType({})) -> list[P]:
+                    near: Chosen | None = None) -> list[P]:
         """Screenings of effects on a model, the largest gain first."""
         return self.likelihood.screened(base, effects, self.misalignment, near, pool, self.progress)
 
@@ -420,12 +406,6 @@ class Search(Generic[M, P, F]):
         """The largest gain of fits that may be taken; 0: there is none."""
         return max((one.gain for one in fits if one.gain > self._required_gain(now)
                     and not self.likelihood.is_doubtful(now, one)), default=0.0)
-
-    def _promising_of(self, unfitted: Sequence[P], least: float) -> list[P]:
-        """The first of some screenings in the order of their gain, down to a least one and to a share of the largest.
-        """
-        least = max(self.effort.least, self.effort.fit_share * unfitted[0].gain, least)
-        return [one for one in unfitted[: self.effort.fitted] if one.gain > least]
 
     def is_accepted(self, now: M, one: F) -> bool:
         """Whether an effect gains enough, and its values are within its range and within what the record shows."""
@@ -501,8 +481,8 @@ class Search(Generic[M, P, F]):
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")
         without = added_to or self.without(now, name)
         gain = without.score - now.score
-        tried = self.round(without, may_be if added_to is not None else [*may_be, here.effect], gain,
-                           Replaced(now, here))
+        tried = self.round(without, may_be if added_to is not None else [*may_be, here.effect], here,
+                           self.likelihood.stripped(now, name), gain)
         best = self._simplest(without, tried)
         alike: tuple[str, ...] = ()
         if best is not None and self._is_preferred(best, here, gain):

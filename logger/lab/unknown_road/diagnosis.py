@@ -161,10 +161,6 @@ class RoadTrial:
         """The largest gain."""
         return self.starts[0].gain
 
-    def begins_at(self, one: Chosen) -> bool:
-        """Never: a fit of few steps is no end."""
-        return False
-
 
 @dataclass(frozen=True, eq=False)
 class RoadCandidate:
@@ -197,11 +193,12 @@ class UnmeasuredRoad:
     starts: int = 2
     first_steps: int = 2
 
-    def screened(self, base: RoadModel, effects: Sequence[Effect], seen: Misalignment, near: Mapping[str, float],
+    def screened(self, base: RoadModel, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[RoadTrial]:
         """Effects screened by score tests at their trial values, all at once."""
+        known = {} if near is None else near.values
         trials = [chosen(one, values) for one in effects
-                  for values in (*one.trials(), *([one.trials()[0] | shared_parameters(one, near)] if near else []))]
+                  for values in (*one.trials(), *([one.trials()[0] | shared_parameters(one, known)] if known else []))]
         progress(f"screening {len(effects)} effects")
         by_effect: dict[str, list[TrialOnRoad]] = {}
         for one in sorted(screen(base.problem, base.fit, trials), key=lambda one: -one.gain):
@@ -304,8 +301,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     base = RoadModel(replace(before, problem=before.problem.moved_as(before.state)))
     search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
         tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
-        # A fit takes as long as ten over a measured road; 6 is less than what one number costs.
-        effort=SearchEffort(effects=3, fitted=3, fit_share=0.1, least=6.0))
+        # A fit takes as long as ten over a measured road: what gains less than one number costs is not worth it.
+        effort=SearchEffort(effects=3, fitted=3, fit_share=0.3))
     selection = search.run(base)
     now, steps = selection.now, dict(selection.steps)
     names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
@@ -434,10 +431,10 @@ def _confounded_numbers(model: SameRoadFit) -> tuple[Finding, ...]:
 def _excess(model: RoadModel) -> float:
     """Share by which what no road explains is above the noise; where chance may give as much, no more than
     ``UNEXPLAINED``. Degrees of freedom of a sample are reduced by the recorder's filter."""
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     noise = model.noise
     above = model.state.noise_mps2 / noise.deviation_mps2 - 1
     freedom = 2 * PASS_OF_RATE * model.problem.samples
     error = np.hypot(noise.standard_error_mps2 / noise.deviation_mps2, (2 * freedom) ** -0.5)
-    return float(above if above > norm.isf(FALSE_ALARM / 2) * error else min(above, UNEXPLAINED))
+    return float(above if above > -ndtri(FALSE_ALARM / 2) * error else min(above, UNEXPLAINED))

@@ -22,7 +22,7 @@ from logger.lab.selection.screening import (
     without_effect,
 )
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.vehicle.effect import Misalignment
+from logger.vehicle.effect import Chosen, Misalignment
 
 from ...support.lab.runs_with_residual import CAR
 from ...support.lab.secret_runs import EFFECTS, Dense, hidden, posterior_of, secret_runs
@@ -175,9 +175,19 @@ def test_a_sharp_resonance_promises_most_of_its_gain_wherever_it_is(frequency_hz
     sharp = hidden("sensor_mount_resonance", frequency_hz=frequency_hz, damping_ratio=damping_ratio)
     base = fitted(posterior_of(secret_runs([sharp], noise_mps2=0.2)))
     alone = screen(base, sharp.effect, [STILL])
-    near = screen(base, sharp.effect, [STILL], sharp.values)
+    near = screen(base, sharp.effect, [STILL], Chosen(EFFECTS["occupant"], sharp.values))
     assert alone.gain > 0.5 * near.gain > 50
     assert near.trials[0].one.values == pytest.approx(dict(sharp.values), rel=0.05)
+
+
+def test_the_fit_that_would_begin_at_the_effect_itself_is_not_tried_and_its_other_shapes_are() -> None:
+    sharp = hidden("sensor_mount_resonance", frequency_hz=18.2, damping_ratio=0.03)
+    base = fitted(posterior_of(secret_runs([sharp], noise_mps2=0.2)))
+    alone = screen(base, sharp.effect, [STILL])
+    again = screen(base, sharp.effect, [STILL], alone.trials[0].one)
+    assert [one.one.values for one in alone.trials[1:]] == [one.one.values for one in again.trials]
+    offset = hidden("sensor_offset", offset_m=0.2)
+    assert not screen(base, offset.effect, [STILL], offset).trials  # of one shape
 
 
 def test_numbers_that_are_shared_stay_inside_the_range_of_the_effect_that_takes_them() -> None:
