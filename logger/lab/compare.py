@@ -27,8 +27,7 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep
-from logger.lab.selection.holdout import cross_validate
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose

@@ -39,10 +39,9 @@ from logger.lab.residuals.road_coherence import best_linear_share
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
-from logger.lab.selection.holdout import HoldOut, cross_validate
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data

@@ -17,7 +17,7 @@ from logger.lab.residuals.breakdown import breakdown
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
-from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, ErrorStep
+from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 

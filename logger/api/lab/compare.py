@@ -38,7 +38,7 @@ from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, se
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.lab.selection.add_effect import Number as ShiftedNumber
-from logger.lab.selection.error_scale import JUDGED_ON, fit_percent
+from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.report.charts import chart
 from logger.report.document import (

@@ -41,8 +41,8 @@ from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
-from logger.lab.selection.error_scale import JUDGED_ON
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
+from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.unknown_road import diagnosis
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad

@@ -26,7 +26,7 @@ from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
 from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects, add
-from logger.lab.selection.error_scale import JUDGED_ON, ErrorStep
+from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
 from logger.report.charts import chart
 from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles

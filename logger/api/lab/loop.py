@@ -52,7 +52,7 @@ from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.lab.selection.add_effect import AddedEffects
-from logger.lab.selection.error_scale import JUDGED_ON
+from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
 from logger.report.charts import chart
 from logger.report.document import (

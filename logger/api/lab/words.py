@@ -16,7 +16,7 @@ from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift
 from logger.lab.residuals.unexplained import Shape, SpatialLine
-from logger.lab.selection.error_scale import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
+from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.charts import Steps, chart, steps_figure
 from logger.report.document import EMPTY, Html, grid, hint, section

@@ -27,9 +27,8 @@ from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
-from logger.lab.selection.error_scale import AS_FILED, REFITTED, ErrorStep, rising
 from logger.lab.selection.evidence import FALSE_ALARM
-from logger.lab.selection.holdout import cross_validate
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate, rising
 from logger.runs import are_on_rig
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import read

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,9 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
+JUDGED_ON = "held-out stretches"
+"""What the errors of steps and candidates are errors of."""
+AS_FILED, REFITTED = "the vehicle as its file says", "its parameters refitted"
 # A relative difference below it is a rounding: errors are printed to two digits or three.
 ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
@@ -93,3 +97,22 @@ def _solve_scaled(information: Array, gradient: Array) -> Array:
     scale = np.where(size > 0, size, 1.0)
     scaled = information / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
     return np.asarray(np.linalg.solve(scaled, gradient / scale) / scale)
+
+
+def fit_percent(error: float) -> float:
+    """The fit per cent of a normalised r.m.s. error."""
+    return 100 * (1 - error)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorStep:
+    """A model: what was done, and its error on what no fit saw."""
+
+    words: str
+    error: float
+
+
+def rising(steps: Sequence[ErrorStep]) -> list[str]:
+    """What was done in those steps that raise the error by more than a rounding."""
+    return [now.words for before, now in pairwise(steps)
+            if now.error > (1 + ROUNDING) * before.error]
