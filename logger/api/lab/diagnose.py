@@ -177,8 +177,12 @@ def _compared(bench: Bench) -> str:
 
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
     if found.missing:
-        one = found.missing[0].effect.name
-        return "Next: " + question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
+        one, *others = (one.effect.name for one in found.missing)
+        command = question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
+        if not others:
+            return f"Next: {command}"
+        return wrapped([f"Next: add {enumerated([one, *others], 'and')} one after the other. What is fitted before all "
+                        f"are in is biased by the others."]) + f"\n{command}"
     if found.beyond and not found.exceeds_noise:
         words = (f"Next: see whether {', '.join(found.beyond)} of the vehicle's file can be right. From the runs "
                  "alone they are found by")

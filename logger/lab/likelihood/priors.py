@@ -131,7 +131,7 @@ class VehiclePrior:
         Of all cars within the tolerance the likeliest is found, by the likelihood alone to second order. Where it
         explains the runs worse than the fitted one by ``CONFLICT_SIGMA`` squared, the file is wrong in those numbers
         that are at the end of their tolerance in it. So two lengths of which the runs know the sum alone, a wheelbase,
-        show an error of that. A number that nobody measured has no end of a tolerance.
+        show an error of that. A number that may be twice as large, or nothing, has no end of a tolerance.
         """
         from scipy.optimize import lsq_linear
 
@@ -145,7 +145,7 @@ class VehiclePrior:
         # The fitted place is the mean of the runs' own estimate and of the prior's, by their information.
         likeliest = (1 + weights) / np.sqrt(weights) * (ways[:, known].T @ place)
         # A change is a share of the number: 20 % less is no more than 20 % more, though its logarithm is.
-        high = np.where(self._not_measured, np.inf, Tolerance.band)
+        high = np.where(self.deviations < 1, Tolerance.band, np.inf)
         low = np.minimum(np.log1p(-np.minimum(high * self.deviations, 0.9)) / self.deviations, -high)
         within = np.asarray(lsq_linear(columns, likeliest, (low, high)).x, float)
         worse = ((columns @ within - likeliest) ** 2).sum() - ((columns @ place - likeliest) ** 2).sum()

@@ -116,3 +116,12 @@ def test_a_number_that_nobody_measured_contradicts_nothing() -> None:
     assert not unknown.is_in_conflict(gone, errors) and PRIOR.is_in_conflict(gone, errors)
     well = np.diag(errors**2)
     assert name not in unknown.beyond_tolerance(gone, well) and name in PRIOR.beyond_tolerance(gone, well)
+
+
+def test_a_number_known_to_a_fifth_that_comes_out_a_thousandth_of_the_file_is_beyond_its_tolerance() -> None:
+    """Forces of a bench in kN."""
+    name = "front.suspension_damping_n_s_per_m"
+    roughly = VehiclePrior.of(CAR, Tolerance(by_name={name: 0.2}))
+    off = np.where(np.array(roughly.names) == name, np.log(1e-3), 0.0)
+    assert roughly.is_vague
+    assert {*roughly.beyond_tolerance(off, np.diag((0.01 * roughly.deviations) ** 2))} == {name}
